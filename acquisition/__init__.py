@@ -1,0 +1,1 @@
+"""Plant protocols on one side, :class:`core.blocks.SampleBlock` on the other."""

@@ -1,0 +1,109 @@
+"""From converter counts to engineering units, the same way for every adapter."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.raw import RawBlock
+from core.blocks import SampleBlock
+from core.quality import GOOD, Quality, Reading, Reason, bad, missing
+
+COUNTS_FULL_SCALE = 32768
+"""Counts of a 16-bit converter that stand for its full-scale voltage."""
+
+
+@dataclass(frozen=True)
+class ChannelCalibration:
+    """How the counts of one waveform channel become its engineering unit.
+
+    Parameters
+    ----------
+    full_scale_v
+        Converter input voltage at 32768 counts.
+    unit_per_v
+        Engineering units per volt: the reciprocal of the transducer's sensitivity.
+    ok_min_v, ok_max_v
+        The mean voltage of a healthy transducer lies between these (gap OK limits).
+    """
+
+    full_scale_v: float
+    unit_per_v: float
+    ok_min_v: float
+    ok_max_v: float
+
+    @property
+    def unit_per_count(self) -> float:
+        """Engineering units per count."""
+        return self.full_scale_v / COUNTS_FULL_SCALE * self.unit_per_v
+
+
+@dataclass(frozen=True)
+class SlowCalibration:
+    """Name and plausible range of one slow channel."""
+
+    id: str
+    minimum: float
+    maximum: float
+
+
+@dataclass(frozen=True)
+class UnitCalibration:
+    """Everything needed to read one unit's device, in wire order."""
+
+    unit: str
+    rate_hz: float
+    channels: tuple[ChannelCalibration, ...]
+    slow: tuple[SlowCalibration, ...]
+
+
+def calibrate(raw: RawBlock, calibration: UnitCalibration) -> SampleBlock:
+    """Turn counts into engineering units and device flags into qualities.
+
+    The result is bit-identical for identical counts, whichever adapter carried them.
+    """
+    gain = np.array([c.unit_per_count for c in calibration.channels], dtype=np.float32)
+    samples = raw.counts.astype(np.float32)
+    samples *= gain[:, np.newaxis]
+    return SampleBlock(
+        unit=calibration.unit,
+        epoch=raw.epoch,
+        first_index=raw.first_index,
+        start_ns=raw.start_ns,
+        rate_hz=raw.rate_hz,
+        samples=samples,
+        channel_quality=_channel_qualities(raw, calibration.channels),
+        slow={c.id: _slow_reading(v, c) for c, v in zip(calibration.slow, raw.slow, strict=True)},
+        rejected=raw.rejected,
+    )
+
+
+def _channel_qualities(
+    raw: RawBlock, channels: Iterable[ChannelCalibration]
+) -> tuple[Quality, ...]:
+    lowest = raw.counts.min(axis=1)
+    highest = raw.counts.max(axis=1)
+    mean = raw.counts.mean(axis=1)
+    return tuple(
+        _channel_quality(c, ok, int(lo), int(hi), float(m))
+        for c, ok, lo, hi, m in zip(channels, raw.ok, lowest, highest, mean, strict=True)
+    )
+
+
+def _channel_quality(
+    channel: ChannelCalibration, ok: bool, lowest: int, highest: int, mean: float
+) -> Quality:
+    mean_v = mean * channel.full_scale_v / COUNTS_FULL_SCALE
+    if not ok or not channel.ok_min_v <= mean_v <= channel.ok_max_v:
+        return bad(Reason.SENSOR_FAILURE)
+    if lowest == -COUNTS_FULL_SCALE or highest == COUNTS_FULL_SCALE - 1:
+        return bad(Reason.CLIPPED)
+    return GOOD
+
+
+def _slow_reading(value: float, channel: SlowCalibration) -> Reading:
+    if not np.isfinite(value):
+        return missing(Reason.NOT_MEASURED)
+    if not channel.minimum <= value <= channel.maximum:
+        return missing(Reason.OUT_OF_RANGE)
+    return Reading(float(value))

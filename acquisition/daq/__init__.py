@@ -1,0 +1,1 @@
+"""The simulated DAQ: any raw feed, served over the real protocol."""

@@ -1,0 +1,1 @@
+"""A simulated plant on the 10-DOF model: excitation, transducers, converter."""

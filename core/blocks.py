@@ -1,0 +1,78 @@
+"""`SampleBlock`: what every adapter delivers and everything downstream consumes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from core.arrays import SampleArray
+from core.quality import Quality, Reading
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """Samples that a device offered and the adapter refused, directly before a block.
+
+    Parameters
+    ----------
+    reason
+        Short snake-case word, used as a counter's label.
+    n_samples
+        Per channel.
+    """
+
+    reason: str
+    n_samples: int
+
+
+@dataclass(frozen=True)
+class SampleBlock:
+    """Consecutive samples of all waveform channels of one unit.
+
+    Parameters
+    ----------
+    unit
+        Identifier of the generating unit.
+    epoch
+        Changes when the device restarts its sample count.
+    first_index
+        Index of the first sample in this epoch, never wrapping.
+    start_ns
+        Time of the first sample, UTC nanoseconds since 1970.
+    rate_hz
+        Samples per second and channel.
+    samples
+        (n_channels, n_samples) in the engineering unit of each channel.
+    channel_quality
+        One for each channel, valid for the whole block.
+    slow
+        Slowly changing readings that belong to the time of the block, by slow channel.
+    rejected
+        What was refused between the previous block and this one; the rest of a jump in
+        ``first_index`` is a gap.
+    """
+
+    unit: str
+    epoch: int
+    first_index: int
+    start_ns: int
+    rate_hz: float
+    samples: SampleArray
+    channel_quality: tuple[Quality, ...]
+    slow: Mapping[str, Reading] = field(default_factory=dict)
+    rejected: tuple[Rejection, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim != 2 or len(self.channel_quality) != self.samples.shape[0]:
+            raise ValueError(
+                f"samples of shape {self.samples.shape} need a quality per channel,"
+                f" got {len(self.channel_quality)}"
+            )
+
+    @property
+    def n_samples(self) -> int:
+        """Samples per channel."""
+        return int(self.samples.shape[1])
+
+    @property
+    def stop_index(self) -> int:
+        """Index of the first sample after the block."""
+        return self.first_index + self.n_samples

@@ -1,0 +1,81 @@
+"""How far a value may be believed: good, uncertain or bad, and why (after OPC UA)."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+
+class Level(IntEnum):
+    """Ordered from best to worst, so that the worst of several is their maximum."""
+
+    GOOD = 0
+    UNCERTAIN = 1
+    BAD = 2
+
+
+class Reason(StrEnum):
+    """Why a value is not simply good. The names appear in the API and in the store."""
+
+    OK = "ok"
+    WAITING_FOR_DATA = "waiting_for_data"
+    NOT_CONNECTED = "not_connected"
+    STALE = "stale"
+    SENSOR_FAILURE = "sensor_failure"
+    CLIPPED = "clipped"
+    NOT_FINITE = "not_finite"
+    NOT_MEASURED = "not_measured"
+    OUT_OF_RANGE = "out_of_range"
+    SPEED_UNKNOWN = "speed_unknown"
+    STANDSTILL = "standstill"
+    FEW_SEGMENTS = "few_segments"
+    LOW_COVERAGE = "low_coverage"
+    INSUFFICIENT_EXCITATION = "insufficient_excitation"
+
+
+@dataclass(frozen=True)
+class Quality:
+    """A level with the reason for it."""
+
+    level: Level
+    reason: Reason
+
+
+GOOD = Quality(Level.GOOD, Reason.OK)
+
+
+def uncertain(reason: Reason) -> Quality:
+    """Quality of a value that is shown but should be doubted."""
+    return Quality(Level.UNCERTAIN, reason)
+
+
+def bad(reason: Reason) -> Quality:
+    """Quality of a value that must not be shown."""
+    return Quality(Level.BAD, reason)
+
+
+def worst(qualities: Iterable[Quality]) -> Quality:
+    """Quality of a value derived from several: the worst of them, the first among equals."""
+    return max(qualities, key=lambda quality: quality.level, default=GOOD)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One number with its quality; a bad reading has no number at all.
+
+    Raises
+    ------
+    ValueError
+        If a bad reading carries a number or a usable one lacks it.
+    """
+
+    value: float | None
+    quality: Quality = GOOD
+
+    def __post_init__(self) -> None:
+        if (self.value is None) != (self.quality.level is Level.BAD):
+            raise ValueError(f"a reading of quality {self.quality} cannot have value {self.value}")
+
+
+def missing(reason: Reason) -> Reading:
+    """Build the reading that says why there is no number."""
+    return Reading(None, bad(reason))

@@ -1,0 +1,1 @@
+"""The dashboard: static pages over the HTTP API, no build step."""

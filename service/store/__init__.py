@@ -1,0 +1,1 @@
+"""Durable trends: one interface, one back end so far (SQLite)."""
