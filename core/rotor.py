@@ -94,8 +94,7 @@ def receptance(matrices: RotorMatrices, frequency_hz: float) -> ComplexArray:
     omega_rad_s = 2.0 * math.pi * frequency_hz
     damping = matrices.damping + matrices.speed_rad_s * matrices.gyroscopic
     dynamic = matrices.stiffness - omega_rad_s**2 * matrices.mass + 1j * omega_rad_s * damping
-    inverse: ComplexArray = np.linalg.inv(dynamic)
-    return inverse
+    return np.linalg.inv(dynamic).astype(np.complex128, copy=False)
 
 
 def bearing_response(

@@ -1,0 +1,1 @@
+"""Published figures beside padwatch's: the tables of Brito et al., rebuilt."""
