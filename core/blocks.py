@@ -1,10 +1,11 @@
 """`SampleBlock`: what every adapter delivers and everything downstream consumes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from core.arrays import SampleArray
 from core.quality import Quality, Reading
+from core.units import ns_from_s
 
 
 @dataclass(frozen=True)
@@ -76,3 +77,21 @@ class SampleBlock:
     def stop_index(self) -> int:
         """Index of the first sample after the block."""
         return self.first_index + self.n_samples
+
+    def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
+        """Return a part of the block, counted from its own start; what was rejected stays in front.
+
+        Raises
+        ------
+        ValueError
+            If the part begins outside the block.
+        """
+        if not 0 <= start <= self.n_samples:
+            raise ValueError(f"part from sample {start} of a block of {self.n_samples}")
+        return replace(
+            self,
+            first_index=self.first_index + start,
+            start_ns=self.start_ns + ns_from_s(start / self.rate_hz),
+            samples=self.samples[:, start:stop],
+            rejected=() if start else self.rejected,
+        )

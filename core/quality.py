@@ -1,8 +1,9 @@
 """How far a value may be believed: good, uncertain or bad, and why (after OPC UA)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from statistics import fmean
 
 
 class Level(IntEnum):
@@ -79,3 +80,11 @@ class Reading:
 def missing(reason: Reason) -> Reading:
     """Build the reading that says why there is no number."""
     return Reading(None, bad(reason))
+
+
+def mean_reading(readings: Sequence[Reading]) -> Reading:
+    """Mean of the usable readings; when the newest is not usable, nothing is."""
+    if readings[-1].value is None:
+        return readings[-1]
+    values = [reading.value for reading in readings if reading.value is not None]
+    return Reading(fmean(values), worst(r.quality for r in readings if r.value is not None))

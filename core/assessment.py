@@ -1,0 +1,80 @@
+"""`Assessment`: what is known of one bearing at one refresh."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from core.arrays import SampleArray
+from core.cross_spectrum import CrossSpectrum
+from core.quality import Quality, Reading
+from core.speed import SpeedSource
+
+
+@dataclass(frozen=True)
+class AveragingWindow:
+    """Which samples a result stands on.
+
+    Parameters
+    ----------
+    first_index, stop_index
+        Of the samples in this epoch; the last sample is ``stop_index - 1``.
+    n_segments
+        Segments in which all four channels were usable.
+    n_segments_wanted
+        Segments of a full average.
+    n_voided
+        Segments begun and lost to gaps or restarts since the service started.
+    coverage
+        Share of the segments that could have been in the window and are, 0 to 1.
+    """
+
+    epoch: int
+    first_index: int
+    stop_index: int
+    n_segments: int
+    n_segments_wanted: int
+    n_voided: int
+    coverage: float
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class OrbitTrace:
+    """The newest turns of the shaft in its bearing, means removed.
+
+    Parameters
+    ----------
+    shaft_x_um, shaft_y_um
+        (n_samples,) each.
+    """
+
+    start_ns: int
+    rate_hz: float
+    shaft_x_um: SampleArray
+    shaft_y_um: SampleArray
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Everything about one bearing at one refresh.
+
+    Parameters
+    ----------
+    time_ns
+        End of the newest segment, UTC.
+    readings
+        One for each quantity of :data:`core.quantities.CATALOGUE`.
+    quality
+        Of the bearing's 1× results as a whole: the worst of its measured inputs.
+    spectrum
+        At the bins; displacement, µm.
+    """
+
+    unit: str
+    bearing: str
+    time_ns: int
+    window: AveragingWindow
+    speed_source: SpeedSource
+    quality: Quality
+    readings: Mapping[str, Reading]
+    spectrum: CrossSpectrum
+    orbit: OrbitTrace | None

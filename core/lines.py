@@ -1,0 +1,112 @@
+"""Spectral lines: transforms of one segment, and amplitudes at exact frequencies.
+
+Amplitudes are zero-to-peak; the taper is Hann's, periodic, as in the paper (Brito et al., 3.1).
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy import fft
+
+from core.arrays import ComplexArray, FloatArray, SampleArray
+
+
+@lru_cache(maxsize=8)
+def hann(n_samples: int) -> FloatArray:
+    """Periodic Hann taper, (n_samples,), read-only."""
+    taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n_samples) / n_samples)
+    taper.setflags(write=False)
+    return taper
+
+
+def tapered(samples: SampleArray | FloatArray) -> FloatArray:
+    """Remove each channel's mean and apply the taper, scaled so that a line reads 0-to-peak.
+
+    Parameters
+    ----------
+    samples : (n_channels, n_samples)
+
+    Returns
+    -------
+    (n_channels, n_samples)
+    """
+    centred = np.asarray(samples, dtype=np.float64)
+    centred = centred - centred.mean(axis=1, keepdims=True)
+    taper = hann(centred.shape[1])
+    weighted: FloatArray = centred * (2.0 * taper / taper.sum())
+    return weighted
+
+
+def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
+    """Phasors at the first bins above zero of the discrete Fourier transform.
+
+    Returns
+    -------
+    (n_channels, n_lines), line 0 being bin 1.
+    """
+    phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
+    return phasors
+
+
+def exact_phasors(
+    tapered_samples: FloatArray, rate_hz: float, frequency_hz: FloatArray
+) -> ComplexArray:
+    """Phasors at any frequencies, on or off the bins: one discrete Fourier sum each.
+
+    Parameters
+    ----------
+    tapered_samples : (n_channels, n_samples)
+    frequency_hz : (n_lines,)
+        Between zero and ``rate_hz / 2``, both excluded.
+
+    Returns
+    -------
+    (n_channels, n_lines)
+
+    Raises
+    ------
+    ValueError
+        If a frequency is out of range.
+    """
+    if np.any(frequency_hz <= 0.0) or np.any(frequency_hz >= rate_hz / 2.0):
+        raise ValueError(f"frequencies {frequency_hz} must lie between 0 and {rate_hz / 2.0} Hz")
+    time_s = np.arange(tapered_samples.shape[1]) / rate_hz
+    basis = np.exp(-2j * np.pi * np.outer(time_s, frequency_hz))
+    phasors: ComplexArray = tapered_samples @ basis
+    return phasors
+
+
+def peak_frequency_hz(
+    power: FloatArray, frequency_hz: FloatArray, band_hz: tuple[float, float]
+) -> float | None:
+    """Frequency of the strongest line in a band, between the bins.
+
+    A tone that falls between two bins of a Hann spectrum at ``k + d`` shows them in the amplitude
+    ratio ``a = (1 + d) / (2 - d)``, so ``d = (2a - 1) / (a + 1)`` (Grandke 1983, eq. 10).
+
+    Parameters
+    ----------
+    power : (n_lines,)
+    frequency_hz : (n_lines,)
+        Evenly spaced.
+    band_hz
+        Lowest and highest frequency of interest.
+
+    Returns
+    -------
+    None when the strongest line of the band is no peak but the flank of one outside it.
+    """
+    inside = np.flatnonzero((frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1]))
+    inside = inside[(inside > 0) & (inside < power.size - 1)]
+    if inside.size == 0:
+        return None
+    top = int(inside[np.argmax(power[inside])])
+    if power[top] < max(power[top - 1], power[top + 1]):
+        return None
+    left = top - 1 if power[top - 1] >= power[top + 1] else top
+    if power[left] <= 0.0 or power[left + 1] <= 0.0:
+        return float(frequency_hz[top])
+    ratio = float(np.sqrt(power[left + 1] / power[left]))
+    offset = np.clip((2.0 * ratio - 1.0) / (ratio + 1.0), 0.0, 1.0)
+    found = float(frequency_hz[left] + offset * (frequency_hz[1] - frequency_hz[0]))
+    return found if band_hz[0] <= found <= band_hz[1] else None

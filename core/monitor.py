@@ -1,0 +1,163 @@
+"""`UnitMonitor`: sample blocks of one unit in, assessments of its bearings out."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from core.account import Gap, SampleAccount
+from core.assessment import Assessment, AveragingWindow, OrbitTrace
+from core.bearing_results import BearingResults
+from core.blocks import SampleBlock
+from core.machine import Bearing, Unit
+from core.quality import worst
+from core.ring import Ring
+from core.segments import Segment, SegmentTransform
+from core.settings import AnalysisSettings
+from core.units import hz_from_rpm
+
+ORBIT_TURNS = 3
+
+JUDGED = (
+    "order1_shaft_x_um_pk",
+    "order1_shaft_y_um_pk",
+    "order1_bearing_x_um_pk",
+    "order1_bearing_y_um_pk",
+    "order1_k_eff_xx_n_per_m",
+    "order1_k_eff_yy_n_per_m",
+)
+"""The readings whose worst quality is the quality of the assessment."""
+
+
+class UnitMonitor:
+    """Watches one unit. All state of its analysis is here and nowhere else.
+
+    The results depend on the samples and their indices alone, not on how they were cut into blocks
+    or when they arrived.
+    """
+
+    def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
+        self.unit = unit
+        self._settings = settings
+        self._ring = Ring(len(unit.channels), 2 * settings.segment_samples)
+        self._transform = SegmentTransform(unit, settings)
+        self._next_start: int | None = None
+        self._first_start = 0
+        self._n_voided = 0
+        self._gaps: list[Gap] = []
+
+    @property
+    def account(self) -> SampleAccount:
+        """Where every sample went that the unit's device offered."""
+        return self._ring.account
+
+    def drain_gaps(self) -> list[Gap]:
+        """Hand over the gaps found since the last call, to be recorded."""
+        gaps, self._gaps = self._gaps, []
+        return gaps
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return what has been learnt by it.
+
+        Parameters
+        ----------
+        block
+            Must follow its predecessors in index order; repeated samples are dropped.
+
+        Returns
+        -------
+        One assessment for each bearing and each hop that the block completes; mostly none.
+
+        Raises
+        ------
+        ValueError
+            If the block is not of this unit, or has another sampling rate or number of channels;
+            the message gives both.
+        """
+        if block.unit != self.unit.id:
+            raise ValueError(f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}")
+        if block.rate_hz != self.unit.rate_hz:
+            raise ValueError(f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
+        assessments: list[Assessment] = []
+        for piece in _pieces(block, self._settings.segment_samples):
+            self._write(piece)
+            assessments += self._complete_segments()
+        return assessments
+
+    def _write(self, block: SampleBlock) -> None:
+        epoch = self._ring.epoch
+        gap = self._ring.write(block)
+        if gap is not None:
+            self._gaps.append(gap)
+        restarted = self._ring.epoch != epoch
+        if restarted:
+            self._transform.clear()
+            self._first_start = self._ring.contiguous_from
+        if self._next_start is None:
+            self._next_start = self._ring.contiguous_from
+        elif restarted or self._next_start < self._ring.contiguous_from:
+            self._n_voided += 1
+            self._next_start = self._ring.contiguous_from
+
+    def _complete_segments(self) -> list[Assessment]:
+        assessments: list[Assessment] = []
+        start = self._next_start or 0
+        while self._ring.holds(start, start + self._settings.segment_samples):
+            window = self._ring.read(start, start + self._settings.segment_samples)
+            segment = self._transform.add(window)
+            assessments += [self._assess(bearing, segment) for bearing in self.unit.bearings]
+            self._next_start = start = start + self._settings.hop_samples
+        return assessments
+
+    def _assess(self, bearing: Bearing, newest: Segment) -> Assessment:
+        settings = self._settings
+        n_possible = 1 + (newest.first_index - self._first_start) // settings.hop_samples
+        segments = list(self._transform.segments)
+        results = BearingResults(
+            self.unit,
+            bearing,
+            settings,
+            segments,
+            self._transform.frequency_hz,
+            min(settings.n_segments, n_possible),
+        )
+        readings = results.readings()
+        n_samples = newest.stop_index - segments[0].first_index
+        return Assessment(
+            unit=self.unit.id,
+            bearing=bearing.id,
+            time_ns=newest.stop_ns,
+            window=AveragingWindow(
+                epoch=newest.epoch,
+                first_index=segments[0].first_index,
+                stop_index=newest.stop_index,
+                n_segments=results.n_segments,
+                n_segments_wanted=settings.n_segments,
+                n_voided=self._n_voided,
+                coverage=results.coverage,
+                duration_s=n_samples / self.unit.rate_hz,
+            ),
+            speed_source=newest.speed.source,
+            quality=worst(r.quality for name, r in readings.items() if name in JUDGED),
+            readings=readings,
+            spectrum=results.spectrum,
+            orbit=self._orbit(bearing, newest),
+        )
+
+    def _orbit(self, bearing: Bearing, newest: Segment) -> OrbitTrace | None:
+        ids = [channel.id for channel in self.unit.channels]
+        rows = [ids.index(bearing.shaft_x), ids.index(bearing.shaft_y)]
+        if newest.speed.rpm.value is None or not newest.usable[rows].all():
+            return None
+        n_samples = round(ORBIT_TURNS / hz_from_rpm(newest.speed.rpm.value) * self.unit.rate_hz)
+        stop = newest.stop_index
+        window = self._ring.read(max(stop - n_samples, newest.first_index), stop)
+        signs = np.array([[self.unit.channels[row].direction] for row in rows], dtype=np.float32)
+        traces = signs * window.samples[rows]
+        traces -= traces.mean(axis=1, keepdims=True)
+        return OrbitTrace(window.start_ns, window.rate_hz, traces[0], traces[1])
+
+
+def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:
+    """Cut a long block so that the ring never overruns the segment being filled."""
+    for start in range(0, block.n_samples, n_most):
+        yield block.from_sample(start, start + n_most)

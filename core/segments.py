@@ -1,0 +1,144 @@
+"""Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import ComplexArray, FloatArray
+from core.lines import bin_phasors, exact_phasors, peak_frequency_hz, tapered
+from core.machine import Channel, Unit
+from core.quality import Level, Quality, Reading, Reason, bad
+from core.ring import Window
+from core.settings import AnalysisSettings
+from core.speed import Speed, running_speed
+from core.transducers import displacement_factor
+from core.units import hz_from_rpm
+
+ORDER1, VORTEX = range(2)
+"""Where the two order lines stand in `Segment.order_phasors_um_pk`."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One transformed segment of a unit.
+
+    Parameters
+    ----------
+    channel_quality
+        One for each channel, throughout the segment.
+    mean
+        (n_channels,) mean of the samples, engineering units of each channel.
+    bin_phasors_um_pk
+        (n_channels, n_lines) displacement phasors at the bins above zero.
+    order_frequency_hz
+        (2,) exact frequencies of 1× and of the vortex.
+    order_phasors_um_pk
+        (n_channels, 2) displacement phasors at exactly these.
+    """
+
+    epoch: int
+    first_index: int
+    stop_index: int
+    stop_ns: int
+    channel_quality: tuple[Quality, ...]
+    slow: Mapping[str, Reading]
+    mean: FloatArray
+    speed: Speed
+    bin_phasors_um_pk: ComplexArray
+    order_frequency_hz: FloatArray
+    order_phasors_um_pk: ComplexArray
+
+    @property
+    def usable(self) -> npt.NDArray[np.bool_]:
+        """(n_channels,) whether each channel may be believed."""
+        return np.array([quality.level is not Level.BAD for quality in self.channel_quality])
+
+
+class SegmentTransform:
+    """Transforms windows of one unit and keeps the ones that are averaged.
+
+    Parameters
+    ----------
+    unit
+        Gives sampling rate, channels and rated speed.
+    """
+
+    def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
+        self._unit = unit
+        self._settings = settings
+        bin_hz = unit.rate_hz / settings.segment_samples
+        n_lines = min(int(settings.max_frequency_hz / bin_hz), settings.segment_samples // 2 - 1)
+        self.frequency_hz: FloatArray = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
+        self._bin_factor = _factors(unit.channels, self.frequency_hz)
+        shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
+        self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
+        self.segments: deque[Segment] = deque(maxlen=settings.n_segments)
+
+    def clear(self) -> None:
+        """Forget all segments: the device counts anew."""
+        self.segments.clear()
+
+    def add(self, window: Window) -> Segment:
+        """Transform a window, keep it, and drop what has left the averaging time."""
+        finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
+        quality = tuple(
+            q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
+            for q, good in zip(window.channel_quality, finite, strict=True)
+        )
+        samples = np.where(finite[:, np.newaxis], window.samples, 0.0).astype(np.float64)
+        prepared = tapered(samples)
+        bins = bin_phasors(prepared, self.frequency_hz.size) * self._bin_factor
+        usable = np.array([q.level is not Level.BAD for q in quality])
+        speed, order_hz = self._orders(window, bins, usable)
+        segment = Segment(
+            epoch=window.epoch,
+            first_index=window.first_index,
+            stop_index=window.stop_index,
+            stop_ns=window.stop_ns,
+            channel_quality=quality,
+            slow=window.slow,
+            mean=samples.mean(axis=1),
+            speed=speed,
+            bin_phasors_um_pk=bins,
+            order_frequency_hz=order_hz,
+            order_phasors_um_pk=exact_phasors(prepared, window.rate_hz, order_hz)
+            * _factors(self._unit.channels, order_hz),
+        )
+        self._keep(segment)
+        return segment
+
+    def _keep(self, segment: Segment) -> None:
+        self.segments.append(segment)
+        span = self._settings.n_segments * self._settings.hop_samples
+        while self.segments[0].first_index <= segment.first_index - span:
+            self.segments.popleft()
+
+    def _orders(
+        self, window: Window, bins: ComplexArray, usable: npt.NDArray[np.bool_]
+    ) -> tuple[Speed, FloatArray]:
+        """Measure the speed, and locate the two order lines with it."""
+        newest = _power(bins, usable & self._is_shaft)
+        speed = running_speed(
+            self._unit, window.slow, self.frequency_hz, newest, self._settings.min_speed_fraction
+        )
+        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        # the rope wanders and one segment resolves it poorly: the average shows where it is
+        averaged = newest + sum(
+            _power(s.bin_phasors_um_pk, s.usable & self._is_shaft) for s in self.segments
+        )
+        low, high = self._settings.vortex_band
+        peak_hz = peak_frequency_hz(averaged, self.frequency_hz, (low * turn_hz, high * turn_hz))
+        return speed, np.array([turn_hz, peak_hz or self._settings.vortex_order * turn_hz])
+
+
+def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
+    power: FloatArray = (np.abs(phasors[counted]) ** 2).sum(axis=0)
+    return power
+
+
+def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
+    """(n_channels, n_lines) displacement per engineering unit."""
+    return np.array([displacement_factor(channel, frequency_hz) for channel in channels])
