@@ -1,0 +1,76 @@
+/** The page as a whole: polls the overview, follows the address, redraws every second. */
+
+import { NotReachable, ask } from "./api.js";
+import { formatAge, formatTime, formatZone } from "./format.js";
+import { setText } from "./dom.js";
+import { SILENCE, failedNow, heardNow, moment, viewAt } from "./live.js";
+import { poll } from "./poll.js";
+import { routeOf } from "./route.js";
+import { bearingPage } from "./pages/bearing.js";
+import { overviewPage } from "./pages/overview.js";
+
+const OVERVIEW_PERIOD_S = 2;
+const REDRAW_PERIOD_MS = 1000;
+
+const main = document.getElementById("main");
+const banner = document.getElementById("banner");
+let live = SILENCE;
+let page = null;
+
+async function askOverview(signal) {
+  try {
+    live = heardNow(await ask(["overview"], [], signal), moment());
+  } catch (failure) {
+    if (signal.aborted) return;
+    live = failedNow(live, failureWords(failure), moment());
+  }
+  draw();
+}
+
+function draw() {
+  const view = viewAt(live, moment());
+  drawBar(view);
+  page.draw(view);
+}
+
+function drawBar(view) {
+  setText(document.getElementById("plant"), view.plant ?? "");
+  setText(document.getElementById("clock"), `${formatTime(Date.now())} ${formatZone(Date.now())}`);
+  setText(document.getElementById("service"), serviceSentence(view));
+  banner.hidden = view.failure === null;
+  setText(document.getElementById("failure"), view.failure ?? "");
+  setText(document.getElementById("failure-age"), view.failure === null ? "" : failureAge(view));
+}
+
+function serviceSentence(view) {
+  if (view.silenceS === null) return "Waiting for the service’s first answer.";
+  return `Service answered ${formatAge(view.silenceS)} ago`;
+}
+
+function failureWords(failure) {
+  const what = failure instanceof NotReachable ? "Service not reachable." : "Service answers with an error.";
+  return `${what} ${failure.message} Trying again every ${OVERVIEW_PERIOD_S} s.`;
+}
+
+function failureAge(view) {
+  const numbers = view.current ? "Numbers are those of the last answer." : "No number is shown as current.";
+  return `For ${formatAge(view.failedS)} now. ${numbers}`;
+}
+
+function openPage() {
+  const route = routeOf(location.hash);
+  page?.close();
+  main.replaceChildren();
+  page = route ? bearingPage(main, route.unit, route.bearing) : overviewPage(main);
+  window.scrollTo(0, 0);
+  draw();
+}
+
+document.querySelector(".skip").addEventListener("click", (click) => {
+  click.preventDefault();
+  main.focus();
+});
+window.addEventListener("hashchange", openPage);
+openPage();
+poll(askOverview, () => OVERVIEW_PERIOD_S);
+setInterval(draw, REDRAW_PERIOD_MS);

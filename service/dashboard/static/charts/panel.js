@@ -1,0 +1,62 @@
+/** The frame of a chart: a chart with a caption, or a sentence why there is none. Never blank. */
+
+import { element, setText } from "../dom.js";
+import { formatAge } from "../format.js";
+import { mark } from "../parts/mark.js";
+import { plotly } from "./plotly.js";
+import { CONFIG } from "./style.js";
+
+/** Returns `{ node, show(traces, layout, caption), explain(sentence), trouble(sentence), draw(ageS, currentWords) }`. */
+export function panel(title, name, ...controls) {
+  const chart = element("div", { class: "chart", hidden: "" });
+  const sentence = element("p", { class: "sentence" }, "Waiting for the service’s first answer.");
+  const caption = element("span");
+  const freshness = mark();
+  freshness.node.hidden = true;
+  const foot = element("figcaption", { hidden: "" }, freshness.node, caption);
+  const node = element(
+    "figure",
+    { class: "panel figure", "data-chart": name },
+    element("div", { class: "panel-head" }, element("h2", {}, title), ...controls),
+    chart,
+    sentence,
+    foot,
+  );
+  let trouble = null;
+  return {
+    node,
+    async show(traces, layout, words) {
+      const library = await plotly();
+      reveal(chart, sentence, foot, true);
+      chart.setAttribute("role", "img");
+      chart.setAttribute("aria-label", `${title}. ${words}`);
+      setText(caption, words);
+      trouble = null;
+      await library.react(chart, traces, layout, CONFIG);
+    },
+    explain(words) {
+      reveal(chart, sentence, foot, false);
+      setText(sentence, words);
+      trouble = null;
+    },
+    /** The newest question failed: a chart already drawn stays, and says that it is old. */
+    trouble(words) {
+      if (chart.hidden) setText(sentence, words);
+      trouble = words;
+    },
+    /** Called every second; `notCurrent` says why the data are not current, or null. */
+    draw(ageS, notCurrent) {
+      const words = trouble ?? notCurrent;
+      freshness.node.hidden = words === null;
+      if (words === null) return;
+      const age = ageS === null ? "" : ` Drawn from data ${formatAge(ageS)} old.`;
+      freshness.draw("bad", `Not current: ${words}${age}`);
+    },
+  };
+}
+
+function reveal(chart, sentence, foot, drawn) {
+  chart.hidden = !drawn;
+  foot.hidden = !drawn;
+  sentence.hidden = drawn;
+}

@@ -1,0 +1,125 @@
+/** A quantity against time: the band between smallest and largest, the mean as a line. */
+
+import { formatTime, kindOf } from "../format.js";
+import { DOUBT_COLOUR, X_BAND, X_COLOUR, Y_BAND, Y_COLOUR, axis, baseLayout } from "./style.js";
+
+const LOOKS = {
+  x: { colour: X_COLOUR, band: X_BAND, dash: "solid" },
+  y: { colour: Y_COLOUR, band: Y_BAND, dash: "dash" },
+};
+
+/**
+ * Buckets of one series in pieces without interruption, scaled to the shown unit.
+ *
+ * Buckets nobody wrote to are narrower than the refresh and mean nothing; a bucket without a value,
+ * or a step wider than two and a half refreshes, is an interruption and is drawn as one.
+ */
+export function piecesOf(trends, name, refreshS) {
+  const series = trends.series[name];
+  const widestStepS = 2.5 * Math.max(trends.bucket_s, refreshS);
+  const pieces = [];
+  let piece = null;
+  trends.time.forEach((timeS, index) => {
+    if (series.mean[index] === null) {
+      if (series.count[index] > 0 || series.worst_level[index] === "bad") piece = null;
+      return;
+    }
+    if (piece === null || timeS - piece.at(-1).timeS > widestStepS) pieces.push((piece = []));
+    piece.push(bucketAt(series, index, timeS, kindOf(name).scale));
+  });
+  return pieces;
+}
+
+function bucketAt(series, index, timeS, scale) {
+  return {
+    timeS,
+    minimum: series.min[index] / scale,
+    maximum: series.max[index] / scale,
+    mean: series.mean[index] / scale,
+    level: series.worst_level[index],
+  };
+}
+
+const at = (bucket) => formatTime(bucket.timeS * 1000);
+
+/** Traces for one series: band, mean, and a triangle wherever the mean is to be doubted. */
+export function trendTraces(pieces, name, label, axisLetter, changes = {}) {
+  const look = { ...LOOKS[axisLetter], ...changes };
+  return [bandTrace(pieces, look, label), meanTrace(pieces, look, name, label), doubtTrace(pieces, label)];
+}
+
+function bandTrace(pieces, look, label) {
+  const outline = (piece) => [
+    ...piece.map((bucket) => [at(bucket), bucket.maximum]),
+    ...piece.toReversed().map((bucket) => [at(bucket), bucket.minimum]),
+    [null, null], // ends the closed shape, so that no band spans an interruption
+  ];
+  const points = pieces.flatMap(outline);
+  return {
+    ...column(points),
+    type: "scatter",
+    mode: "lines",
+    fill: "toself",
+    fillcolor: look.band,
+    line: { width: 0 },
+    hoverinfo: "skip",
+    legendgroup: label,
+    showlegend: false,
+  };
+}
+
+function meanTrace(pieces, look, name, label) {
+  const kind = kindOf(name);
+  const points = pieces.flatMap((piece) => [...piece.map((bucket) => [at(bucket), bucket.mean]), [null, null]]);
+  return {
+    ...column(points),
+    type: "scatter",
+    mode: pieces.some((piece) => piece.length === 1) ? "lines+markers" : "lines",
+    name: label,
+    legendgroup: label,
+    line: { color: look.colour, width: 1.8, dash: look.dash },
+    marker: { color: look.colour, size: 4 },
+    connectgaps: false,
+    hovertemplate: `${label}: %{y:.${kind.decimals}f} ${kind.unit}<extra></extra>`,
+  };
+}
+
+function doubtTrace(pieces, label) {
+  const doubted = pieces.flat().filter((bucket) => bucket.level !== "good");
+  return {
+    ...column(doubted.map((bucket) => [at(bucket), bucket.mean])),
+    type: "scatter",
+    mode: "markers",
+    marker: { symbol: "triangle-up-open", size: 7, color: DOUBT_COLOUR },
+    hoverinfo: "skip",
+    legendgroup: label,
+    showlegend: false,
+  };
+}
+
+function column(points) {
+  return { x: points.map((point) => point[0]), y: points.map((point) => point[1]) };
+}
+
+/** Layout with the whole asked-for span on the time axis, however little of it has data. */
+export function trendLayout(trends, title, revision) {
+  const range = [trends.start, trends.end].map((time) => formatTime(Date.parse(time)));
+  return baseLayout(revision, {
+    xaxis: axis("", { type: "date", range, hoverformat: "%Y-%m-%d %H:%M:%S" }),
+    yaxis: axis(title, { rangemode: "tozero" }),
+    hovermode: "x unified",
+  });
+}
+
+/** How much of the span is there and how much of it is doubtful, in one sentence. */
+export function trendCaption(allPieces) {
+  const buckets = allPieces.flat(2);
+  const doubted = buckets.filter((bucket) => bucket.level !== "good").length;
+  const times = buckets.map((bucket) => bucket.timeS * 1000);
+  const span = `Data from ${formatTime(earliest(times))} to ${formatTime(latest(times))}.`;
+  const doubt = doubted ? " Triangles: uncertain." : "";
+  return `${span} Band: smallest to largest; line: mean.${doubt}`;
+}
+
+const earliest = (times) => times.reduce((a, b) => Math.min(a, b));
+const latest = (times) => times.reduce((a, b) => Math.max(a, b));

@@ -1,0 +1,64 @@
+/** How a number is written, everywhere on the page: decimals, units, ages and times. */
+
+const KINDS = [
+  { name: /_n_per_m$/, scale: 1e9, decimals: 3, unit: "GN/m" },
+  { name: /_um_pk$/, scale: 1, decimals: 2, unit: "µm 0-pk" },
+  { name: /_um$/, scale: 1, decimals: 2, unit: "µm" },
+  { name: /_rpm$/, scale: 1, decimals: 2, unit: "r/min" },
+  { name: /_mw$/, scale: 1, decimals: 1, unit: "MW" },
+  { name: /_c$/, scale: 1, decimals: 1, unit: "°C" },
+  { name: /_deg$/, scale: 1, decimals: 1, unit: "°" },
+  { name: /_hz$/, scale: 1, decimals: 4, unit: "Hz" },
+  { name: /_ratio$|_coherence_/, scale: 1, decimals: 3, unit: "" },
+];
+
+/** Scale, decimals and unit that a quantity is shown with; its name carries its unit. */
+export function kindOf(quantity) {
+  const kind = KINDS.find((candidate) => candidate.name.test(quantity));
+  if (!kind) throw new Error(`no number format for the quantity ${quantity}`);
+  return kind;
+}
+
+/** Fixed decimals, a true minus sign, and no minus before a rounded zero. */
+export function formatFixed(value, decimals) {
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+}
+
+/** The digits of a reading, without unit. */
+export function formatQuantity(quantity, value) {
+  const kind = kindOf(quantity);
+  return formatFixed(value / kind.scale, kind.decimals);
+}
+
+/** Whole numbers in groups of three: 1 234 567. */
+export function formatCount(count) {
+  return String(count).replace(/\B(?=(\d{3})+$)/g, " ");
+}
+
+/** A duration in the two units that matter: 4 s, 2 min 05 s, 3 h 07 min, 12 d 4 h. */
+export function formatAge(durationS) {
+  const whole = Math.max(0, Math.floor(durationS));
+  const pad = (number) => String(number).padStart(2, "0");
+  if (whole < 60) return `${whole} s`;
+  if (whole < 3600) return `${Math.floor(whole / 60)} min ${pad(whole % 60)} s`;
+  if (whole < 86400) return `${Math.floor(whole / 3600)} h ${pad(Math.floor((whole % 3600) / 60))} min`;
+  return `${Math.floor(whole / 86400)} d ${Math.floor((whole % 86400) / 3600)} h`;
+}
+
+/** Local date and time of the browser, `2026-07-01 03:12:45`; plotly reads it the same way. */
+export function formatTime(timeMs) {
+  const date = new Date(timeMs);
+  const two = (number) => String(number).padStart(2, "0");
+  const day = `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())}`;
+  return `${day} ${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}`;
+}
+
+/** The browser's distance from UTC at that time: `UTC+02:00`. */
+export function formatZone(timeMs) {
+  const minutes = -new Date(timeMs).getTimezoneOffset();
+  if (minutes === 0) return "UTC";
+  const two = (number) => String(number).padStart(2, "0");
+  const size = Math.abs(minutes);
+  return `UTC${minutes < 0 ? "−" : "+"}${two(Math.floor(size / 60))}:${two(size % 60)}`;
+}

@@ -1,0 +1,69 @@
+/** What the service said last, how long ago, and what of it may still be shown. */
+
+/** Numbers older than this many seconds in the browser are not shown any more. */
+export const CURRENT_LIMIT_S = 10;
+
+const NOT_REACHABLE = { level: "bad", reason: "service_not_reachable" };
+
+/** Nothing has been heard yet. */
+export const SILENCE = { overview: null, heard: null, failure: null, failedSince: null };
+
+/** Two clocks, since a steady one may stand still while a laptop sleeps. */
+export function moment() {
+  return { steadyMs: performance.now(), wallMs: Date.now() };
+}
+
+/** Seconds between two moments, the larger of both clocks: rather too old than too young. */
+export function secondsBetween(earlier, later) {
+  return Math.max(later.steadyMs - earlier.steadyMs, later.wallMs - earlier.wallMs, 0) / 1000;
+}
+
+/** The state after a good answer. */
+export function heardNow(overview, now) {
+  return { overview, heard: now, failure: null, failedSince: null };
+}
+
+/** The state after a question that failed; the last answer stays, and ages. */
+export function failedNow(live, sentence, now) {
+  return { ...live, failure: sentence, failedSince: live.failedSince ?? now };
+}
+
+/** What to show at this moment: ages counted on, and no number that is no longer current. */
+export function viewAt(live, now) {
+  const silenceS = live.heard ? secondsBetween(live.heard, now) : null;
+  const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
+  return {
+    current,
+    silenceS,
+    failure: live.failure,
+    failedS: live.failedSince ? secondsBetween(live.failedSince, now) : null,
+    plant: live.overview?.plant.name ?? null,
+    refreshS: live.overview?.refresh_s ?? null,
+    serviceTimeMs: live.overview ? Date.parse(live.overview.time) + silenceS * 1000 : null,
+    units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, silenceS, current)),
+  };
+}
+
+function agedUnit(unit, silenceS, current) {
+  const source = { ...unit.source, data_age_s: aged(unit.source.data_age_s, silenceS) };
+  return {
+    ...unit,
+    source: current ? source : { ...source, state: "unknown", reason: null, since: null },
+    bearings: unit.bearings.map((latest) => agedLatest(latest, silenceS, current)),
+  };
+}
+
+function agedLatest(latest, silenceS, current) {
+  const shown = { ...latest, age_s: aged(latest.age_s, silenceS) };
+  return current ? shown : { ...shown, quality: NOT_REACHABLE, speed_source: null, readings: withheld(latest.readings) };
+}
+
+function withheld(readings) {
+  return Object.fromEntries(
+    Object.entries(readings).map(([name, reading]) => [name, { ...reading, value: null, ...NOT_REACHABLE }]),
+  );
+}
+
+function aged(ageS, silenceS) {
+  return ageS === null ? null : ageS + silenceS;
+}

@@ -1,0 +1,76 @@
+/** One bearing: its numbers large, its charts, and what they rest on. */
+
+import { bearingCharts } from "./bearing_charts.js";
+import { bearingNumbers } from "./bearing_numbers.js";
+import { element, setText } from "../dom.js";
+import { formatAge, formatTime } from "../format.js";
+import { levelWords, mark } from "../parts/mark.js";
+import { sourceView } from "../parts/source.js";
+import { bearingAddress } from "../route.js";
+import { reasonSentence, reasonWords } from "../words.js";
+import { windowFacts } from "./window_facts.js";
+
+/** Returns `{ draw(view), close() }`. */
+export function bearingPage(main, unitId, bearingId) {
+  document.title = `padwatch: ${unitId} ${bearingId}`;
+  const missing = element("p", { class: "sentence" });
+  const content = element("div", { class: "bearing", hidden: "" });
+  main.append(missing, content);
+  const parts = [headPart(unitId, bearingId), bearingNumbers(), bearingCharts(unitId, bearingId), windowFacts()];
+  content.append(...parts.map((part) => part.node));
+  return {
+    draw(view) {
+      const unit = view.units.find((one) => one.id === unitId);
+      const latest = unit?.bearings.find((one) => one.bearing === bearingId);
+      content.hidden = !latest;
+      missing.hidden = Boolean(latest);
+      if (latest) for (const part of parts) part.draw(latest, unit, view);
+      else missing.replaceChildren(missingSentence(view, unitId, bearingId), " ", overviewLink());
+    },
+    close() {
+      for (const part of parts) part.close?.();
+    },
+  };
+}
+
+function missingSentence(view, unitId, bearingId) {
+  if (view.silenceS === null) return "No numbers yet: the service has not answered.";
+  return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
+}
+
+const overviewLink = () => element("a", { href: "#/" }, "Overview");
+
+/** Where we are, how good it is, how old it is. */
+function headPart(unitId, bearingId) {
+  const title = element("h1", {}, `${unitId} ${bearingId}`);
+  const siblings = element("nav", { class: "siblings", "aria-label": "Bearings of this unit" }, overviewLink());
+  const quality = mark();
+  const why = element("span", { class: "why-sentence" });
+  const age = element("span", { class: "data-age" });
+  const source = sourceView();
+  const state = element("div", { class: "state" }, quality.node, why, age);
+  return {
+    node: element("header", { class: "bearing-head" }, siblings, title, state, source.node),
+    draw(latest, unit) {
+      drawSiblings(siblings, unit, bearingId);
+      setText(title, `${unit.name}, ${bearingId}`);
+      const { level, reason } = latest.quality;
+      quality.draw(level, levelWords(level, reasonWords(reason)));
+      setText(why, level === "good" ? "" : reasonSentence(reason));
+      setText(age, windowAge(latest));
+      source.draw(unit.source);
+    },
+  };
+}
+
+function windowAge(latest) {
+  if (latest.age_s === null) return "No segment has been analysed yet.";
+  return `Newest segment ended ${formatAge(latest.age_s)} ago, ${formatTime(Date.now() - latest.age_s * 1000)}`;
+}
+
+function drawSiblings(nav, unit, bearingId) {
+  if (nav.childElementCount === unit.bearings.length + 1) return;
+  const links = unit.bearings.map(({ bearing }) => element("a", { href: bearingAddress(unit.id, bearing) }, bearing));
+  links.find((link) => link.textContent === bearingId).setAttribute("aria-current", "page");
+  nav.replaceChildren(overviewLink(), ...links);
+}

@@ -1,0 +1,115 @@
+/** The charts of a bearing and the questions they ask. */
+
+import { NotReachable, ask } from "../api.js";
+import { centreCaption, centreLayout, centreTraces, orbitLayout, orbitTraces } from "../charts/circle.js";
+import { panel } from "../charts/panel.js";
+import { spectrumAbsence, spectrumCaption, spectrumLayout, spectrumTraces } from "../charts/spectrum.js";
+import { element } from "../dom.js";
+import { formatFixed } from "../format.js";
+import { choice } from "../parts/choice.js";
+import { readingOf } from "../parts/reading.js";
+import { poll } from "../poll.js";
+import { NOT_CURRENT, reasonWords } from "../words.js";
+import { centreTrail, trendPanels } from "./trend_panels.js";
+
+const PERIOD_S = 5;
+
+/** Returns `{ node, draw(latest, unit, view), close() }`. */
+export function bearingCharts(unitId, bearingId) {
+  const path = ["units", unitId, "bearings", bearingId];
+  const trends = trendPanels(path);
+  const pictures = [orbitChart(path), centreChart(path, trends), spectrumChart(path)];
+  const node = element("div", { class: "charts" }, ...trends.nodes, ...pictures.map((picture) => picture.node));
+  return {
+    node,
+    draw(latest, unit, view) {
+      const { reason } = readingOf(latest, "order1_frequency_hz");
+      const notCurrent = NOT_CURRENT.has(reason) ? `${reasonWords(reason)}.` : null;
+      trends.draw(latest, view, notCurrent);
+      for (const picture of pictures) picture.draw(latest, notCurrent);
+    },
+    close() {
+      for (const part of [trends, ...pictures]) part.close();
+    },
+  };
+}
+
+/** Asks `path` again and again and hands a good answer to `show`; says why when there is none. */
+function asking(box, path, show) {
+  return poll(async (signal) => {
+    try {
+      await show(await ask(path, [], signal));
+    } catch (failure) {
+      if (signal.aborted) return;
+      if (failure instanceof NotReachable) box.trouble(`Service not reachable. ${failure.message}`);
+      else box.explain(failure.message);
+    }
+  }, () => PERIOD_S);
+}
+
+function orbitChart(path) {
+  const box = panel("Orbit", "orbit");
+  const questions = asking(box, [...path, "orbit"], (orbit) =>
+    box.show(orbitTraces(orbit), orbitLayout(orbit), orbitCaption(orbit)),
+  );
+  return { node: box.node, draw: (latest, notCurrent) => box.draw(latest.age_s, notCurrent), close: questions.stop };
+}
+
+function orbitCaption(orbit) {
+  return `Shaft relative to bearing, the last ${formatFixed(orbit.duration_s, 1)} s, mean removed. Cross: newest sample.`;
+}
+
+function spectrumChart(path) {
+  let spectrum = null;
+  const show = async () => {
+    const absence = spectrumAbsence(spectrum);
+    if (absence) box.explain(absence);
+    else await box.show(spectrumTraces(spectrum), spectrumLayout(spectrum, span.value()), spectrumCaption(spectrum));
+  };
+  const spans = [[3, "0–3 Hz"], [25, "0–25 Hz"]];
+  const span = choice("Range", spans, 3, () => spectrum && show());
+  const box = panel("Spectrum", "spectrum", span.node);
+  const questions = asking(box, [...path, "spectrum"], (answer) => {
+    spectrum = answer;
+    return show();
+  });
+  return { node: box.node, draw: (latest, notCurrent) => box.draw(latest.age_s, notCurrent), close: questions.stop };
+}
+
+/** Fed by the bearing's facts, the trends' trail and the newest reading. */
+function centreChart(path, trends) {
+  const box = panel("Shaft centre in the clearance circle", "centre");
+  let facts = null;
+  let drawn = null;
+  const questions = asking(box, path, (answer) => {
+    facts = answer;
+  });
+  return {
+    node: box.node,
+    draw(latest, notCurrent) {
+      box.draw(latest.age_s, notCurrent);
+      if (facts === null) return;
+      const current = centreNow(latest);
+      const trail = centreTrail(trends.newest());
+      const inputs = JSON.stringify([current, trail, facts.clearance_um]);
+      if (inputs === drawn) return;
+      drawn = inputs;
+      if (!current && trail.length === 0) {
+        box.explain(`No shaft centre now (${reasonWords(readingOf(latest, "shaft_centre_x_um").reason)}), and none in the chosen span.`);
+        return;
+      }
+      const layout = centreLayout(facts.clearance_um, trail, current);
+      const caption = centreCaption(facts.clearance_um, current);
+      box.show(centreTraces(trail, current), layout, caption).catch((failure) => {
+        drawn = null;
+        box.trouble(failure.message);
+      });
+    },
+    close: questions.stop,
+  };
+}
+
+function centreNow(latest) {
+  const [x, y] = ["shaft_centre_x_um", "shaft_centre_y_um"].map((name) => readingOf(latest, name).value);
+  return x === null || y === null ? null : { x, y };
+}

@@ -1,0 +1,97 @@
+/** One generating unit on the overview: its state, and a row for each bearing. */
+
+import { element, setText } from "../dom.js";
+import { formatAge } from "../format.js";
+import { levelWords, mark } from "../parts/mark.js";
+import { pairView, readingOf, readingView } from "../parts/reading.js";
+import { sourceView } from "../parts/source.js";
+import { bearingAddress } from "../route.js";
+import { reasonWords, speedSourceWords } from "../words.js";
+
+const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "") });
+const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "") });
+
+const COLUMNS = [
+  PAIR("Shaft 1×", "µm 0-pk", ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"]),
+  PAIR("Bearing 1×", "µm 0-pk", ["order1_bearing_x_um_pk", "order1_bearing_y_um_pk"], ["x", "y"]),
+  PAIR("Stiffness 1×", "GN/m", ["order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"], ["xx", "yy"]),
+  PAIR("Stiffness vortex", "GN/m", ["vortex_k_eff_xx_n_per_m", "vortex_k_eff_yy_n_per_m"], ["xx", "yy"]),
+  SINGLE("Eccentricity", "ratio", "eccentricity_ratio"),
+  SINGLE("Oil", "°C", "oil_temperature_c"),
+];
+
+const NOBODY = { readings: {}, speed_source: null };
+
+/** Returns `{ node, draw(unit) }`. */
+export function unitCard(unit) {
+  const running = runningView();
+  const source = sourceView();
+  const rows = unit.bearings.map((latest) => bearingRow(unit.id, latest.bearing));
+  const head = element("div", { class: "unit-head" }, element("h2", {}, unit.name), running.node, source.node);
+  return {
+    node: element("section", { class: "unit", "data-unit": unit.id }, head, table(unit, rows)),
+    draw(now) {
+      running.draw(now);
+      source.draw(now.source);
+      rows.forEach((row, index) => row.draw(now.bearings[index]));
+    },
+  };
+}
+
+function table(unit, rows) {
+  const heads = COLUMNS.map(({ head, unit: unitOf }) =>
+    element("th", { scope: "col", role: "columnheader" }, head, element("small", {}, unitOf)),
+  );
+  const first = element("th", { scope: "col", role: "columnheader" }, "Bearing");
+  const last = element("th", { scope: "col", role: "columnheader" }, "Quality", element("small", {}, "and data age"));
+  const headRow = element("tr", { role: "row" }, first, ...heads, last);
+  return element(
+    "table",
+    { role: "table", "aria-label": `Bearings of ${unit.name}` },
+    element("thead", { role: "rowgroup" }, headRow),
+    element("tbody", { role: "rowgroup" }, ...rows.map((row) => row.node)),
+  );
+}
+
+function bearingRow(unit, bearing) {
+  const cells = COLUMNS.map((column) => column.view());
+  const quality = mark();
+  const age = element("span", { class: "data-age" });
+  const link = element("a", { href: bearingAddress(unit, bearing) }, bearing);
+  const boxes = cells.map((cell, index) =>
+    element("td", { role: "cell", "data-head": `${COLUMNS[index].head}, ${COLUMNS[index].unit}` }, cell.node),
+  );
+  const node = element(
+    "tr",
+    { role: "row", "data-bearing": bearing },
+    element("th", { scope: "row", role: "rowheader" }, link),
+    ...boxes,
+    element("td", { role: "cell", class: "quality" }, quality.node, age),
+  );
+  return {
+    node,
+    draw(latest) {
+      const { level, reason } = latest.quality;
+      for (const cell of cells) cell.draw(latest, reason);
+      quality.draw(level, levelWords(level, reasonWords(reason)));
+      setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
+    },
+  };
+}
+
+/** Speed and power of the unit: the same for all its bearings, so the first that has them speaks. */
+function runningView() {
+  const speed = readingView("speed_rpm", "Speed");
+  const from = element("span", { class: "from" });
+  const power = readingView("power_mw", "Power");
+  return {
+    node: element("div", { class: "running" }, speed.node, from, power.node),
+    draw(unit) {
+      const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NOBODY;
+      const latest = knowing("speed_rpm");
+      speed.draw(latest);
+      setText(from, latest.speed_source ? `(${speedSourceWords(latest.speed_source)})` : "");
+      power.draw(knowing("power_mw"));
+    },
+  };
+}

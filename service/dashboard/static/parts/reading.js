@@ -1,0 +1,63 @@
+/** A reading on the page: its number while it is current, else a dash and why. */
+
+import { element, setAttribute, setText } from "../dom.js";
+import { formatQuantity, kindOf } from "../format.js";
+import { reasonWords } from "../words.js";
+import { markShape } from "./mark.js";
+
+const DASH = "—";
+const ABSENT = { value: null, level: "bad", reason: "not_measured" };
+
+/** Readings of a bearing by name; one that the service does not report is not measured. */
+export function readingOf(latest, name) {
+  return latest.readings[name] ?? ABSENT;
+}
+
+/**
+ * One number with an optional label before and a unit after it.
+ *
+ * Returns `{ node, draw(latest, saidReason) }`. A number's doubt is not repeated when `saidReason`
+ * beside it says the same; a missing number always says why.
+ */
+export function readingView(name, label, unit = kindOf(name).unit) {
+  const number = element("span", { class: "number" });
+  const why = element("span", { class: "why" });
+  const suffix = element("span", { class: "unit" }, unit);
+  const node = element("span", { class: "reading", "data-reading": name });
+  if (label) node.append(element("span", { class: "axis" }, label));
+  node.append(number, suffix, why);
+  return {
+    node,
+    draw(latest, saidReason = null) {
+      const reading = readingOf(latest, name);
+      const absent = reading.value === null;
+      setText(number, absent ? DASH : formatQuantity(name, reading.value));
+      suffix.hidden = absent || unit === "";
+      setAttribute(node, "data-level", reading.level);
+      drawReason(why, reading, saidReason);
+    },
+  };
+}
+
+function drawReason(why, reading, saidReason) {
+  const said = reading.value !== null && reading.reason === saidReason;
+  const silent = said || reading.level === "good";
+  const words = silent ? "" : reasonWords(reading.reason);
+  if (why.textContent === words) return;
+  why.replaceChildren(...(silent ? [] : [markShape(reading.level), words]));
+}
+
+/** Two readings in one cell; when both are missing for one reason, one dash stands for both. */
+export function pairView(names, labels, unit) {
+  const views = names.map((name, index) => readingView(name, labels[index], unit));
+  const node = element("span", { class: "pair" }, ...views.map((view) => view.node));
+  return {
+    node,
+    draw(latest, saidReason = null) {
+      for (const view of views) view.draw(latest, saidReason);
+      const [first, second] = names.map((name) => readingOf(latest, name));
+      const alike = first.value === null && second.value === null && first.reason === second.reason;
+      node.classList.toggle("merged", alike);
+    },
+  };
+}

@@ -1,0 +1,55 @@
+/** Codes of the API in words for people. */
+
+const REASONS = {
+  ok: ["good", "Everything needed is there."],
+  waiting_for_data: ["waiting for data", "The first full segment has not been recorded yet."],
+  not_connected: ["not connected", "The data acquisition unit does not answer."],
+  stale: ["data too old", "No new samples have arrived lately."],
+  sensor_failure: ["sensor failure", "A transducer reports a fault or its voltage is outside its OK limits."],
+  clipped: ["signal clipped", "The signal exceeds the range of the converter."],
+  not_finite: ["not a number", "The calculation gave no finite number."],
+  not_measured: ["not measured", "Nothing measures this here."],
+  out_of_range: ["out of range", "The reading lies outside its plausible range."],
+  speed_unknown: ["speed unknown", "Without the speed, the 1× frequency is not known."],
+  standstill: ["standing still", "The shaft does not turn."],
+  few_segments: ["short record", "Fewer segments than wanted have been averaged; the numbers scatter more."],
+  low_coverage: ["gaps in the record", "Samples are missing in the averaged window."],
+  insufficient_excitation: ["not enough excitation", "The motion is too small to tell stiffness from noise."],
+  service_not_reachable: ["service not reachable", "The padwatch service does not answer this browser."],
+};
+
+/** Readings with one of these reasons are absent because nothing current arrives at all. */
+export const NOT_CURRENT = new Set(["not_connected", "stale", "waiting_for_data", "service_not_reachable"]);
+
+/** A few words for a table cell. */
+export function reasonWords(reason) {
+  return REASONS[reason]?.[0] ?? reason.replaceAll("_", " ");
+}
+
+/** A sentence for the bearing page. */
+export function reasonSentence(reason) {
+  return REASONS[reason]?.[1] ?? `${reasonWords(reason)}.`;
+}
+
+const SPEED_SOURCES = {
+  slow_channel: "measured",
+  line: "from the 1× line",
+  rated: "rated value, not measured",
+};
+
+/** Where the shown speed comes from. */
+export function speedSourceWords(source) {
+  return SPEED_SOURCES[source] ?? source.replaceAll("_", " ");
+}
+
+const SOURCE_STATES = {
+  connected: { level: "good", words: "Connected" },
+  connecting: { level: "uncertain", words: "Connecting" },
+  not_connected: { level: "bad", words: "Not connected" },
+  unknown: { level: "bad", words: "State unknown" },
+};
+
+/** Level and words for the link to a unit's data acquisition. */
+export function sourceState(state) {
+  return SOURCE_STATES[state] ?? { level: "uncertain", words: state.replaceAll("_", " ") };
+}
