@@ -1,0 +1,58 @@
+"""Readings as bytes: one float64 and one quality byte for each quantity of a layout."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.quality import Reading, Reason
+
+LEVEL_SHIFT = 6
+"""A quality byte is the level in its two top bits and the number of the reason below."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which quantities a stored row holds, and what its reason numbers mean.
+
+    Rows keep the layout they were written with, so that the catalogue can grow.
+    """
+
+    quantities: tuple[str, ...]
+    reasons: tuple[str, ...]
+
+    @classmethod
+    def of(cls, quantities: tuple[str, ...]) -> "Layout":
+        """Layout that this version of padwatch writes."""
+        return cls(quantities, tuple(reason.value for reason in Reason))
+
+    def dumps(self) -> tuple[str, str]:
+        """Quantities and reasons as JSON, as they stand in the database."""
+        return json.dumps(self.quantities), json.dumps(self.reasons)
+
+    @classmethod
+    def loads(cls, quantities: str, reasons: str) -> "Layout":
+        """Invert `dumps`."""
+        return cls(tuple(json.loads(quantities)), tuple(json.loads(reasons)))
+
+    def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
+        """Values (NaN for none) and qualities, in the order of the layout."""
+        ordered = [readings[name] for name in self.quantities]
+        values = np.array([np.nan if r.value is None else r.value for r in ordered], dtype="<f8")
+        qualities = bytes(
+            r.quality.level << LEVEL_SHIFT | self.reasons.index(r.quality.reason.value)
+            for r in ordered
+        )
+        return values.tobytes(), qualities
+
+    def decode(
+        self, values: list[bytes], qualities: list[bytes]
+    ) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
+        """Values, NaN for none, and quality levels: (n_rows, n_quantities) both."""
+        shape = (len(values), len(self.quantities))
+        number = np.frombuffer(b"".join(values), dtype="<f8").reshape(shape)
+        byte = np.frombuffer(b"".join(qualities), dtype=np.uint8).reshape(shape)
+        return number.astype(np.float64), (byte >> LEVEL_SHIFT).astype(np.uint8)

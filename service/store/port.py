@@ -1,0 +1,104 @@
+"""The store as the rest of the service sees it, and what it hands out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from core.account import Gap
+from core.assessment import Assessment
+from core.quality import Level
+
+
+class StoreError(Exception):
+    """The store cannot be used: another program's, newer than this one, or damaged."""
+
+
+@dataclass(frozen=True)
+class UnitGap:
+    """A gap in the samples of one unit, to be recorded."""
+
+    unit: str
+    gap: Gap
+
+
+@dataclass(frozen=True)
+class ValueRange:
+    """Bounds, both included; None leaves a side open."""
+
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class TrendQuery:
+    """Which trends of one bearing are wanted.
+
+    Parameters
+    ----------
+    start_ns, end_ns
+        From the first, up to but not including the second.
+    max_points
+        More readings than this are gathered into buckets of equal width.
+    hole_ns
+        Neighbouring readings further apart than this have a hole between them.
+    """
+
+    unit: str
+    bearing: str
+    quantities: tuple[str, ...]
+    start_ns: int
+    end_ns: int
+    max_points: int
+    hole_ns: int
+    eccentricity_ratio: ValueRange = field(default_factory=ValueRange)
+    oil_temperature_c: ValueRange = field(default_factory=ValueRange)
+
+
+@dataclass(frozen=True)
+class TrendSeries:
+    """One quantity, a value for each bucket; None where no reading was usable."""
+
+    minimum: Sequence[float | None]
+    maximum: Sequence[float | None]
+    mean: Sequence[float | None]
+    count: Sequence[int]
+    worst_level: Sequence[Level | None]
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Trends of one bearing.
+
+    Parameters
+    ----------
+    bucket_ns
+        Width of the buckets, whose time is their start; None if every reading stands alone.
+    """
+
+    bucket_ns: int | None
+    time_ns: Sequence[int]
+    series: Mapping[str, TrendSeries]
+
+
+class Store(Protocol):
+    """Durable results. What `append` has returned from is on the disk."""
+
+    def append(self, assessments: Sequence[Assessment], gaps: Sequence[UnitGap]) -> None:
+        """Write all or nothing; the same assessment twice counts once."""
+        ...
+
+    def trend(self, query: TrendQuery) -> Trend:
+        """Read trends. Raises `QueryTooLargeError` where memory or time could run out."""
+        ...
+
+    def gaps(self, unit: str, start_ns: int, end_ns: int) -> Sequence[Gap]:
+        """Read the recorded gaps whose end lies in a range of time, oldest first."""
+        ...
+
+    def close(self) -> None:
+        """Release the files; closing twice is fine."""
+        ...
+
+
+class QueryTooLargeError(Exception):
+    """A query would read more than the store hands out at once; the message says how much."""

@@ -1,0 +1,75 @@
+"""The SQLite schema and its migrations: numbered, atomic, never edited once released."""
+
+import sqlite3
+
+from service.store.port import StoreError
+
+APPLICATION_ID = 0x5057_4454
+"""Marks the file as padwatch's (``PRAGMA application_id``)."""
+
+MIGRATIONS = (
+    """
+    CREATE TABLE layout (
+        id INTEGER PRIMARY KEY,
+        quantities TEXT NOT NULL,
+        reasons TEXT NOT NULL,
+        UNIQUE (quantities, reasons)
+    ) STRICT;
+    CREATE TABLE series (
+        id INTEGER PRIMARY KEY,
+        unit TEXT NOT NULL,
+        bearing TEXT NOT NULL,
+        UNIQUE (unit, bearing)
+    ) STRICT;
+    CREATE TABLE assessment (
+        series INTEGER NOT NULL REFERENCES series (id),
+        time_ns INTEGER NOT NULL,
+        epoch INTEGER NOT NULL,
+        first_index INTEGER NOT NULL,
+        stop_index INTEGER NOT NULL,
+        n_segments INTEGER NOT NULL,
+        coverage REAL NOT NULL,
+        speed_source TEXT NOT NULL,
+        eccentricity_ratio REAL,
+        oil_temperature_c REAL,
+        layout INTEGER NOT NULL REFERENCES layout (id),
+        reading_values BLOB NOT NULL,
+        reading_qualities BLOB NOT NULL,
+        PRIMARY KEY (series, time_ns)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE gap (
+        unit TEXT NOT NULL,
+        epoch INTEGER NOT NULL,
+        first_index INTEGER NOT NULL,
+        n_samples INTEGER NOT NULL,
+        stop_ns INTEGER NOT NULL,
+        PRIMARY KEY (unit, epoch, first_index, stop_ns)
+    ) STRICT, WITHOUT ROWID;
+    """,
+)
+"""Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
+
+
+def migrate(connection: sqlite3.Connection, name: str) -> None:
+    """Bring a database to the newest schema, one transaction a step.
+
+    Raises
+    ------
+    StoreError
+        If the file belongs to another program or to a newer padwatch.
+    """
+    version = int(connection.execute("PRAGMA user_version").fetchone()[0])
+    application = int(connection.execute("PRAGMA application_id").fetchone()[0])
+    n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+    if application not in (0, APPLICATION_ID) or (application == 0 and n_tables > 0):
+        raise StoreError(f"{name} is not a padwatch database; choose another data folder")
+    if version > len(MIGRATIONS):
+        raise StoreError(
+            f"{name} has schema {version}, this padwatch knows up to {len(MIGRATIONS)};"
+            " run the padwatch that wrote it, or restore a backup"
+        )
+    for number in range(version, len(MIGRATIONS)):
+        connection.executescript(
+            f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION_ID};"
+            f"{MIGRATIONS[number]} PRAGMA user_version = {number + 1}; COMMIT;"
+        )
