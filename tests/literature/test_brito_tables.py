@@ -1,6 +1,4 @@
-"""Brito, Machado, Chaves Neto, Martini, "Experimental Estimation of Journal Bearing Stiffness for
-Damage Detection in Large Hydrogenerators".
-"""
+"""Brito et al., "Experimental Estimation of Journal Bearing Stiffness for Damage Detection"."""
 
 import math
 
