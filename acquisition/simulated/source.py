@@ -1,0 +1,77 @@
+"""`SimulatedSource`: a simulated unit as a sample source, without a wire in between."""
+
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+
+from acquisition.calibration import UnitCalibration, calibrate
+from acquisition.clock import Clock
+from acquisition.raw import RawFeed
+from core.blocks import SampleBlock
+
+SKIP_SAMPLES = 65536
+"""Samples that are produced and thrown away before the event loop gets its turn."""
+
+
+class SimulatedSource:
+    """Calibrated blocks of a raw feed, in real time or as fast as they are taken.
+
+    In real time the feed runs from the first connection on, connected or not: what passed while
+    nobody was connected is missing, and the sample index jumps. Unpaced, a new connection goes on
+    where the last one stopped.
+
+    Parameters
+    ----------
+    block_samples
+        Samples of each channel in a block.
+
+    Raises
+    ------
+    ValueError
+        If `block_samples` is less than 1.
+    """
+
+    def __init__(
+        self,
+        feed: RawFeed,
+        calibration: UnitCalibration,
+        clock: Clock,
+        block_samples: int = 512,
+        paced: bool = True,
+    ) -> None:
+        if block_samples < 1:
+            raise ValueError(f"a block needs at least 1 sample, got {block_samples}")
+        self._feed = feed
+        self._calibration = calibration
+        self._clock = clock
+        self._block_samples = block_samples
+        self._paced = paced
+        self._start_s: float | None = None
+        self._n_taken = 0
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the link; see :class:`acquisition.source.SampleSource`."""
+        if self._start_s is None:
+            self._start_s = self._clock.monotonic_s()
+        if self._paced:
+            await self._skip_to(int(self._elapsed_s() * self._calibration.rate_hz))
+        async with aclosing(self._blocks()) as blocks:
+            yield blocks
+
+    async def _blocks(self) -> AsyncGenerator[SampleBlock]:
+        while True:
+            raw = self._feed.advance(self._block_samples)
+            self._n_taken += self._block_samples
+            due_s = self._n_taken / self._calibration.rate_hz if self._paced else 0.0
+            await self._clock.sleep(max(0.0, due_s - self._elapsed_s()))
+            yield calibrate(raw, self._calibration)
+
+    async def _skip_to(self, index: int) -> None:
+        while self._n_taken < index:
+            n_samples = min(SKIP_SAMPLES, index - self._n_taken)
+            self._feed.advance(n_samples)
+            self._n_taken += n_samples
+            await self._clock.sleep(0.0)
+
+    def _elapsed_s(self) -> float:
+        return self._clock.monotonic_s() - (self._start_s or 0.0)

@@ -1,0 +1,111 @@
+"""`SimulatedUnit`: a generating unit with its converter, read like a device."""
+
+import math
+
+import numpy as np
+
+from acquisition.calibration import UnitCalibration
+from acquisition.errors import ConfigError
+from acquisition.raw import RawBlock
+from acquisition.simulated.conditions import Conditions, between, slow_values
+from acquisition.simulated.converter import to_counts
+from acquisition.simulated.plant import CHUNK_SAMPLES, SimulatedPlant
+from acquisition.simulated.scenario import Scenario
+from acquisition.simulated.truth import UnitTruth, unit_truth
+from core.machine import Unit
+from core.units import NS_PER_S
+
+
+class SimulatedUnit:
+    """Raw feed of one simulated unit.
+
+    The same seed gives the same counts, however the samples are asked for.
+
+    Parameters
+    ----------
+    machine
+        Its bearings are called UJB, LJB and TJB; it need not have all three.
+    start_ns
+        Time of sample 0; in whole seconds it is also the epoch of the blocks.
+
+    Raises
+    ------
+    ConfigError
+        If machine, calibration and scenario do not fit together.
+    """
+
+    def __init__(
+        self,
+        machine: Unit,
+        calibration: UnitCalibration,
+        scenario: Scenario,
+        seed: int,
+        start_ns: int,
+    ) -> None:
+        _check(machine, calibration)
+        self._machine = machine
+        self._calibration = calibration
+        self._scenario = scenario
+        self._start_ns = start_ns
+        self._plant = SimulatedPlant(machine, scenario, seed)
+        self._index = 0
+        self._next_chunk()
+
+    def advance(self, n_samples: int) -> RawBlock:
+        """Produce the next samples, following directly on the previous ones.
+
+        Raises
+        ------
+        ValueError
+            If less than one sample is asked for.
+        """
+        if n_samples < 1:
+            raise ValueError(f"a block needs at least 1 sample, got {n_samples}")
+        first_index, slow = self._index, self._slow()
+        parts = []
+        while n_samples:
+            offset = self._index % CHUNK_SAMPLES
+            part = self._counts[:, offset : offset + n_samples]
+            parts.append(part)
+            n_samples -= part.shape[1]
+            self._index += part.shape[1]
+            if self._index % CHUNK_SAMPLES == 0:
+                self._next_chunk()
+        return RawBlock(
+            epoch=self._start_ns // NS_PER_S,
+            first_index=first_index,
+            start_ns=self._start_ns + round(first_index * NS_PER_S / self._machine.rate_hz),
+            rate_hz=self._machine.rate_hz,
+            counts=np.concatenate(parts, axis=1),
+            ok=(True,) * len(self._machine.channels),
+            slow=slow,
+        )
+
+    def truth(self) -> UnitTruth:
+        """Tell what is really so at the next sample."""
+        return unit_truth(self._machine, self._scenario, self._conditions())
+
+    def _next_chunk(self) -> None:
+        self._chunk = self._plant.advance()
+        self._counts = to_counts(self._chunk.readings, self._calibration)
+
+    def _conditions(self) -> Conditions:
+        fraction = self._index % CHUNK_SAMPLES / CHUNK_SAMPLES
+        return between(self._chunk.start, self._chunk.stop, fraction)
+
+    def _slow(self) -> tuple[float, ...]:
+        values = slow_values(self._machine, self._conditions())
+        return tuple(values.get(channel.id, math.nan) for channel in self._calibration.slow)
+
+
+def _check(machine: Unit, calibration: UnitCalibration) -> None:
+    if len(calibration.channels) != len(machine.channels):
+        raise ConfigError(
+            f"unit {machine.id!r} has {len(machine.channels)} channels,"
+            f" its calibration {len(calibration.channels)}"
+        )
+    if calibration.rate_hz != machine.rate_hz:
+        raise ConfigError(
+            f"unit {machine.id!r} samples at {machine.rate_hz} Hz,"
+            f" its calibration says {calibration.rate_hz} Hz"
+        )
