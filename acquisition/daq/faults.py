@@ -1,0 +1,49 @@
+"""What a faulty device does to a slot on its way into the ring."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from acquisition.modbus.profile import U32, Slot
+
+SlotFault: TypeAlias = Callable[[Slot], Slot | None]
+"""Takes the right slot, gives what is written instead; None if nothing is."""
+
+
+def dropped(slot: Slot) -> None:
+    """Never write the slot; the sequence goes on."""
+
+
+def torn(slot: Slot) -> Slot:
+    """Leave the tail of another slot behind the samples."""
+    return dataclasses.replace(slot, trailer=slot.trailer ^ 0x5A5A)
+
+
+def wrong_sequence(slot: Slot) -> Slot:
+    """Write a sequence number that does not belong into this place."""
+    sequence = (slot.sequence + 1) % U32
+    return dataclasses.replace(slot, sequence=sequence, trailer=sequence & 0xFFFF)
+
+
+def wrong_index(slot: Slot) -> Slot:
+    """Count one sample too many."""
+    return dataclasses.replace(slot, first_index=(slot.first_index + 1) % U32)
+
+
+def impossible_time(slot: Slot) -> Slot:
+    """Stamp the slot with 2106."""
+    return dataclasses.replace(slot, seconds=U32 - 1)
+
+
+class RandomLoss:
+    """Drop slots at random, the same ones for the same seed."""
+
+    def __init__(self, probability: float, seed: int) -> None:
+        self._probability = probability
+        self._random = np.random.default_rng(seed)
+
+    def __call__(self, slot: Slot) -> Slot | None:
+        """Let a slot through, or not."""
+        return None if self._random.random() < self._probability else slot

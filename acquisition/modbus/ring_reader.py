@@ -1,0 +1,78 @@
+"""Reading a block ring over an open link: header, progress and runs of slots."""
+
+from collections.abc import Iterator, Sequence
+
+from acquisition.modbus.client import RegisterLink
+from acquisition.modbus.profile import (
+    HEADER_REGISTERS,
+    PROGRESS_OFFSET,
+    PROGRESS_REGISTERS,
+    RingHeader,
+    RingLayout,
+    Slot,
+    decode_header,
+    decode_progress,
+    decode_slot,
+    decode_slow,
+)
+
+
+class RingReader:
+    """One device's ring, as it is found: nothing is judged here."""
+
+    def __init__(self, link: RegisterLink, base_address: int) -> None:
+        self._link = link
+        self._base = base_address
+
+    async def header(self) -> RingHeader:
+        """Read and decode the header alone."""
+        return decode_header(await self._link.read(self._base, HEADER_REGISTERS))
+
+    async def header_and_slow(self, n_slow: int) -> tuple[RingHeader, tuple[float, ...]]:
+        """Read the header and the slow values behind it."""
+        data = await self._link.read(self._base, HEADER_REGISTERS + 2 * n_slow)
+        return decode_header(data[: 2 * HEADER_REGISTERS]), decode_slow(
+            data[2 * HEADER_REGISTERS :]
+        )
+
+    async def progress(self) -> tuple[int, int]:
+        """Read epoch and newest sequence, in one request so that they belong together."""
+        return decode_progress(
+            await self._link.read(self._base + PROGRESS_OFFSET, PROGRESS_REGISTERS)
+        )
+
+    async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
+        """Read the places where these sequence numbers belong, whatever lies there.
+
+        Returns
+        -------
+        list
+            One slot for each sequence number asked.
+        """
+        found: list[Slot] = []
+        for address, n_slots in _runs(layout, sequences):
+            n_registers = (n_slots - 1) * layout.slot_stride + layout.slot_registers
+            data = memoryview(await self._link.read(address, n_registers))
+            found += [
+                decode_slot(data[2 * layout.slot_stride * i :], layout) for i in range(n_slots)
+            ]
+        return found
+
+
+def _runs(layout: RingLayout, sequences: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Address and number of the slots that lie side by side and without padding."""
+    start, n_slots = 0, 0
+    for sequence in sequences:
+        address = layout.slot_address(sequence)
+        if n_slots and address == start + n_slots * layout.slot_stride and _dense(layout):
+            n_slots += 1
+            continue
+        if n_slots:
+            yield start, n_slots
+        start, n_slots = address, 1
+    if n_slots:
+        yield start, n_slots
+
+
+def _dense(layout: RingLayout) -> bool:
+    return layout.slot_stride == layout.slot_registers

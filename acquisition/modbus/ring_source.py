@@ -1,0 +1,141 @@
+"""`ModbusRingSource`: a DAQ with a block ring as a sample source."""
+
+from collections.abc import AsyncGenerator, AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+
+from acquisition.calibration import UnitCalibration, calibrate
+from acquisition.clock import Clock
+from acquisition.errors import ConfigError, FrameError, LinkError
+from acquisition.modbus.client import LinkSettings, RegisterLink
+from acquisition.modbus.follower import RingFollower
+from acquisition.modbus.profile import ADDRESS_SPACE, HEADER_REGISTERS
+from acquisition.modbus.ring_reader import RingReader
+from core.blocks import SampleBlock
+
+_MIN_STALE_SLOTS = 3
+"""A device with long slots may be silent for more than a slot without being stale."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModbusRingSettings(LinkSettings):
+    """A block ring behind a Modbus TCP device.
+
+    Parameters
+    ----------
+    base_address
+        Register address of the header, counted from 0.
+    poll_period_s
+        Time between polls, above 0; the ring must hold much more than that.
+    stale_after_s
+        A device without a usable new sample for longer than this is not connected; above 0.
+    """
+
+    base_address: int = 0
+    poll_period_s: float = 0.5
+    stale_after_s: float = 5.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.base_address <= ADDRESS_SPACE - HEADER_REGISTERS:
+            raise ConfigError(
+                f"modbus: base_address is {self.base_address},"
+                f" allowed is 0 to {ADDRESS_SPACE - HEADER_REGISTERS}"
+            )
+        for name, value in (
+            ("poll_period_s", self.poll_period_s),
+            ("stale_after_s", self.stale_after_s),
+        ):
+            if not 0 < value < float("inf"):
+                raise ConfigError(f"modbus: {name} is {value}, must be above 0")
+
+
+class ModbusRingSource:
+    """Samples of one unit from a block ring; remembers where it stood when connected again."""
+
+    def __init__(
+        self, settings: ModbusRingSettings, calibration: UnitCalibration, clock: Clock
+    ) -> None:
+        self._settings = settings
+        self._calibration = calibration
+        self._clock = clock
+        self._follower = RingFollower(
+            len(calibration.channels), calibration.rate_hz, len(calibration.slow)
+        )
+        self._fresh_at_s = 0.0
+        self._stale_after_s = settings.stale_after_s
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the link and identify the device; leaving the context closes the link.
+
+        Raises
+        ------
+        LinkError
+            If the device does not answer, answers nonsense, or its data stand still.
+        ConfigError
+            If it is not a block ring, or not the configured one.
+        """
+        link = RegisterLink(self._settings)
+        try:
+            with _nonsense_drops_the_link():
+                await link.open()
+                reader = RingReader(link, self._settings.base_address)
+                await self._identify(reader)
+            blocks = self._blocks(reader)
+            try:
+                yield blocks
+            finally:
+                await blocks.aclose()
+        finally:
+            link.close()
+
+    async def _identify(self, reader: RingReader) -> None:
+        header = await reader.header()
+        self._follower.require_expected(header.layout)
+        self._stale_after_s = max(
+            self._settings.stale_after_s, _MIN_STALE_SLOTS * header.layout.slot_duration_s
+        )
+        if self._follower.newest == (header.epoch, header.newest):
+            self._require_fresh()
+        else:
+            self._fresh_at_s = self._clock.monotonic_s()
+
+    async def _blocks(self, reader: RingReader) -> AsyncGenerator[SampleBlock, None]:
+        due_s = self._clock.monotonic_s()
+        while True:
+            with _nonsense_drops_the_link():
+                raw_blocks = await self._follower.advance(reader)
+            for raw in raw_blocks:
+                yield calibrate(raw, self._calibration)
+            if raw_blocks:
+                self._fresh_at_s = self._clock.monotonic_s()
+            else:
+                self._require_fresh()
+            due_s = await self._wait(due_s + self._settings.poll_period_s)
+
+    async def _wait(self, due_s: float) -> float:
+        """Wait for the next poll; polls that are overdue are left out, never piled up."""
+        now_s = self._clock.monotonic_s()
+        due_s = max(due_s, now_s)
+        await self._clock.sleep(due_s - now_s)
+        return due_s
+
+    def _require_fresh(self) -> None:
+        standing_s = self._clock.monotonic_s() - self._fresh_at_s
+        if standing_s > self._stale_after_s and self._follower.newest is not None:
+            epoch, newest = self._follower.newest
+            raise LinkError(
+                f"{self._settings.host}:{self._settings.port}: the device answers but its data"
+                f" stand still: no usable slot for {standing_s:.1f} s,"
+                f" the newest is {newest} of epoch {epoch}"
+            )
+
+
+@contextmanager
+def _nonsense_drops_the_link() -> Iterator[None]:
+    """Turn a wrong reply into a lost link: on a stream, nothing after it can be trusted."""
+    try:
+        yield
+    except FrameError as exc:
+        raise LinkError(f"wrong reply, connection dropped: {exc}") from exc
