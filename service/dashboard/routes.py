@@ -12,7 +12,7 @@ SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
 }
-"""No script but our own files. Plotly writes style attributes, hence the inline styles."""
+"""No script but our own files. Plotly adds style elements of its own, hence the inline styles."""
 
 REVALIDATE = "no-cache"
 """A page from before an upgrade must never talk to the service from after it."""

@@ -45,5 +45,6 @@ async function decoded(response) {
 }
 
 function sentenceOf(response, body) {
-  return body?.detail || body?.title || `The service answered with status ${response.status}.`;
+  const words = body?.detail || body?.title || `The service answered with status ${response.status}`;
+  return words.charAt(0).toUpperCase() + words.slice(1).replace(/\.?$/, ".");
 }

@@ -21,6 +21,14 @@ const REASONS = {
 /** Readings with one of these reasons are absent because nothing current arrives at all. */
 export const NOT_CURRENT = new Set(["not_connected", "stale", "waiting_for_data", "service_not_reachable"]);
 
+/** Reasons for a missing number that belong to ordinary operation: nobody needs to get up for them. */
+const ORDINARY = new Set(["waiting_for_data", "not_measured", "standstill", "insufficient_excitation"]);
+
+/** How a quality looks: `good`, `uncertain`, `bad`, or a quiet `absent` for an ordinary absence. */
+export function lookOf(level, reason) {
+  return level === "bad" && ORDINARY.has(reason) ? "absent" : level;
+}
+
 /** A few words for a table cell. */
 export function reasonWords(reason) {
   return REASONS[reason]?.[0] ?? reason.replaceAll("_", " ");

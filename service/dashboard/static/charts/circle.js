@@ -79,7 +79,7 @@ function point(x, y, name) {
     type: "scatter",
     mode: "markers",
     name,
-    marker: { symbol: "cross", size: 11, color: INK, line: { color: "#ffffff", width: 1 } },
+    marker: { symbol: "cross-thin", size: 15, color: INK, line: { color: INK, width: 2.5 } },
     hovertemplate: HOVER,
   };
 }

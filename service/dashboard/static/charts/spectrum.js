@@ -23,7 +23,9 @@ export function spectrumTraces(spectrum) {
     y: spectrum.channels[id].amplitude,
     type: "scatter",
     mode: "lines",
-    name,
+    name: name.replace(/.* /, ""),
+    legendgroup: name.replace(/.* /, ""),
+    showlegend: yaxis === "y" || !present(spectrum).some(([other]) => other === id.replace("bearing", "shaft")),
     yaxis,
     line: { color: colour, width: 1.4, dash },
     hovertemplate: `${name}: %{y:.2f} µm at %{x:.3f} Hz<extra></extra>`,
@@ -41,7 +43,7 @@ export function spectrumLayout(spectrum, toHz) {
     shapes: lines.map(([, hz]) => marker(hz)),
     annotations: lines.map(([name, hz]) => label(LINE_WORDS[name] ?? name, hz)),
     hovermode: "closest",
-    margin: { l: 56, r: 12, t: 24, b: 40 },
+    margin: { l: 56, r: 12, t: 8, b: 40 },
   });
 }
 
@@ -57,7 +59,7 @@ function marker(hz) {
 }
 
 function label(words, hz) {
-  return { x: hz, y: 1, yref: "paper", yanchor: "bottom", text: words, showarrow: false };
+  return { x: hz, y: 1, yref: "paper", xanchor: "left", yanchor: "top", text: words, showarrow: false };
 }
 
 export function spectrumCaption(spectrum) {

@@ -19,7 +19,7 @@ export function baseLayout(uirevision, changes = {}) {
     plot_bgcolor: "#fafaf8",
     font: { family: "system-ui, sans-serif", size: 12, color: INK },
     margin: { l: 56, r: 12, t: 8, b: 40 },
-    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", itemsizing: "constant" },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", itemwidth: 44 },
     hoverlabel: { bgcolor: "#ffffff", font: { color: INK } },
     dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
     ...changes,

@@ -42,10 +42,10 @@ function bucketAt(series, index, timeS, scale) {
 
 const at = (bucket) => formatTime(bucket.timeS * 1000);
 
-/** Traces for one series: band, mean, and a triangle wherever the mean is to be doubted. */
+/** Traces for one series: the band and the mean. */
 export function trendTraces(pieces, name, label, axisLetter, changes = {}) {
   const look = { ...LOOKS[axisLetter], ...changes };
-  return [bandTrace(pieces, look, label), meanTrace(pieces, look, name, label), doubtTrace(pieces, label)];
+  return [bandTrace(pieces, look, label), meanTrace(pieces, look, name, label)];
 }
 
 function bandTrace(pieces, look, label) {
@@ -84,16 +84,20 @@ function meanTrace(pieces, look, name, label) {
   };
 }
 
-function doubtTrace(pieces, label) {
-  const doubted = pieces.flat().filter((bucket) => bucket.level !== "good");
+/** Triangles along the foot of the chart wherever one of the series is to be doubted. */
+export function doubtTrace(allPieces) {
+  const doubted = new Set(allPieces.flat(2).filter((bucket) => bucket.level !== "good").map(at));
+  const times = [...doubted].sort();
   return {
-    ...column(doubted.map((bucket) => [at(bucket), bucket.mean])),
+    x: times,
+    y: times.map(() => 0.015),
+    yaxis: "y2",
     type: "scatter",
     mode: "markers",
-    marker: { symbol: "triangle-up-open", size: 7, color: DOUBT_COLOUR },
+    name: "uncertain",
+    marker: { symbol: "triangle-up", size: 8, color: DOUBT_COLOUR },
     hoverinfo: "skip",
-    legendgroup: label,
-    showlegend: false,
+    showlegend: times.length > 0,
   };
 }
 
@@ -107,18 +111,16 @@ export function trendLayout(trends, title, revision) {
   return baseLayout(revision, {
     xaxis: axis("", { type: "date", range, hoverformat: "%Y-%m-%d %H:%M:%S" }),
     yaxis: axis(title, { rangemode: "tozero" }),
+    yaxis2: { overlaying: "y", range: [0, 1], visible: false, fixedrange: true },
     hovermode: "x unified",
   });
 }
 
-/** How much of the span is there and how much of it is doubtful, in one sentence. */
+/** From when to when there are data, and how to read the chart. */
 export function trendCaption(allPieces) {
-  const buckets = allPieces.flat(2);
-  const doubted = buckets.filter((bucket) => bucket.level !== "good").length;
-  const times = buckets.map((bucket) => bucket.timeS * 1000);
+  const times = allPieces.flat(2).map((bucket) => bucket.timeS * 1000);
   const span = `Data from ${formatTime(earliest(times))} to ${formatTime(latest(times))}.`;
-  const doubt = doubted ? " Triangles: uncertain." : "";
-  return `${span} Band: smallest to largest; line: mean.${doubt}`;
+  return `${span} Band: smallest to largest; line: mean.`;
 }
 
 const earliest = (times) => times.reduce((a, b) => Math.min(a, b));

@@ -4,10 +4,10 @@ import { bearingCharts } from "./bearing_charts.js";
 import { bearingNumbers } from "./bearing_numbers.js";
 import { element, setText } from "../dom.js";
 import { formatAge, formatTime } from "../format.js";
-import { levelWords, mark } from "../parts/mark.js";
+import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
 import { bearingAddress } from "../route.js";
-import { reasonSentence, reasonWords } from "../words.js";
+import { reasonSentence } from "../words.js";
 import { windowFacts } from "./window_facts.js";
 
 /** Returns `{ draw(view), close() }`. */
@@ -55,7 +55,7 @@ function headPart(unitId, bearingId) {
       drawSiblings(siblings, unit, bearingId);
       setText(title, `${unit.name}, ${bearingId}`);
       const { level, reason } = latest.quality;
-      quality.draw(level, levelWords(level, reasonWords(reason)));
+      drawQuality(quality, latest.quality);
       setText(why, level === "good" ? "" : reasonSentence(reason));
       setText(age, windowAge(latest));
       source.draw(unit.source);

@@ -2,6 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { mark } from "../parts/mark.js";
+import { lookOf } from "../words.js";
 import { unitCard } from "./unit_card.js";
 
 /** Returns `{ draw(view), close() }`. */
@@ -28,20 +29,21 @@ export function overviewPage(main) {
   };
 }
 
-const LEVEL_WORDS = { good: "good", uncertain: "uncertain", bad: "bad, no number shown" };
+const LOOK_WORDS = { bad: "bad", uncertain: "uncertain", absent: "without full result", good: "good" };
 
 function tallyView(node) {
   const words = element("span");
-  const marks = Object.fromEntries(["bad", "uncertain", "good"].map((level) => [level, mark()]));
+  const marks = Object.fromEntries(Object.keys(LOOK_WORDS).map((look) => [look, mark()]));
   node.append(words, ...Object.values(marks).map((one) => one.node));
   return {
     draw(view) {
-      const levels = view.units.flatMap((unit) => unit.bearings.map((latest) => latest.quality.level));
-      const n = (level) => levels.filter((one) => one === level).length;
-      setText(words, tallyWords(view, levels.length));
-      for (const [level, one] of Object.entries(marks)) {
-        one.node.hidden = n(level) === 0;
-        one.draw(level, `${n(level)} ${LEVEL_WORDS[level]}`);
+      const qualities = view.units.flatMap((unit) => unit.bearings.map((latest) => latest.quality));
+      const looks = qualities.map(({ level, reason }) => lookOf(level, reason));
+      const n = (look) => looks.filter((one) => one === look).length;
+      setText(words, tallyWords(view, looks.length));
+      for (const [look, one] of Object.entries(marks)) {
+        one.node.hidden = n(look) === 0;
+        one.draw(look, `${n(look)} ${LOOK_WORDS[look]}`);
       }
     },
   };

@@ -2,10 +2,12 @@
 
 import { NotReachable, ask } from "../api.js";
 import { panel } from "../charts/panel.js";
-import { piecesOf, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
+import { doubtTrace, piecesOf, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
 import { element } from "../dom.js";
 import { choice } from "../parts/choice.js";
+import { readingOf } from "../parts/reading.js";
 import { poll } from "../poll.js";
+import { reasonWords } from "../words.js";
 
 const SHORTEST_PERIOD_S = 5;
 const LONGEST_PERIOD_S = 60;
@@ -36,6 +38,7 @@ const amplitudeLines = (order) => [
 /** Returns `{ nodes, draw(latest, view, notCurrent), newest(), close() }`. */
 export function trendPanels(path) {
   let view = null;
+  let latest = null;
   let trends = null;
   const refresh = () => questions.again();
   const span = choice("Span", SPANS, 900, refresh);
@@ -48,8 +51,9 @@ export function trendPanels(path) {
     if (view?.serviceTimeMs == null) return;
     try {
       trends = await askTrends(path, order.value(), span.value(), view.serviceTimeMs, signal);
-      await showTrends(stiffness, trends, stiffnessLines(order.value()), "GN/m", view.refreshS, span);
-      await showTrends(amplitude, trends, amplitudeLines(order.value()), "µm 0-pk", view.refreshS, span);
+      const asked = { trends, refreshS: view.refreshS, span, latest };
+      await showTrends(stiffness, asked, stiffnessLines(order.value()), "GN/m");
+      await showTrends(amplitude, asked, amplitudeLines(order.value()), "µm 0-pk");
     } catch (failure) {
       if (signal.aborted) return;
       const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
@@ -58,10 +62,10 @@ export function trendPanels(path) {
   }, () => periodS(trends));
 
   return {
-    nodes: [element("div", { class: "choices" }, span.node, order.node), ...boxes.map((box) => box.node)],
-    draw(latest, now, notCurrent) {
+    nodes: [element("div", { class: "choices" }, span.node, order.node, hint()), ...boxes.map((box) => box.node)],
+    draw(newest, now, notCurrent) {
       const first = view?.serviceTimeMs == null && now.serviceTimeMs !== null;
-      view = now;
+      [latest, view] = [newest, now];
       if (first) questions.again();
       for (const box of boxes) box.draw(latest.age_s, notCurrent);
     },
@@ -69,6 +73,8 @@ export function trendPanels(path) {
     close: questions.stop,
   };
 }
+
+const hint = () => element("span", { class: "hint" }, "Drag in a chart to zoom, double-click to go back.");
 
 /** A year of trends does not change within five seconds. */
 function periodS(trends) {
@@ -83,16 +89,18 @@ function askTrends(path, order, spanS, endMs, signal) {
   return ask([...path, "trends"], query, signal);
 }
 
-async function showTrends(box, trends, lines, title, refreshS, span) {
+async function showTrends(box, { trends, refreshS, span, latest }, lines, title) {
   const all = lines.map(([name]) => piecesOf(trends, name, refreshS));
   if (all.flat().length === 0) {
-    box.explain(`No value was stored in the last ${span.words()}: nothing was measured well enough, or the service was not running.`);
+    const { value, reason } = readingOf(latest, lines[0][0]);
+    const now = value === null ? `Now: ${reasonWords(reason)}.` : "The first will appear shortly.";
+    box.explain(`No value was stored in the last ${span.words()}. ${now}`);
     return;
   }
   const traces = lines.flatMap(([name, label, letter, changes], index) =>
     trendTraces(all[index], name, label, letter, changes),
   );
-  await box.show(traces, trendLayout(trends, title, `${span.value()} ${title}`), trendCaption(all));
+  await box.show([...traces, doubtTrace(all)], trendLayout(trends, title, `${span.value()} ${title}`), trendCaption(all));
 }
 
 /** Means of the shaft centre over the chosen span, oldest first; without gaps' empty buckets. */

@@ -2,11 +2,11 @@
 
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
-import { levelWords, mark } from "../parts/mark.js";
+import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { sourceView } from "../parts/source.js";
 import { bearingAddress } from "../route.js";
-import { reasonWords, speedSourceWords } from "../words.js";
+import { speedSourceWords } from "../words.js";
 
 const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "") });
 const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "") });
@@ -29,7 +29,7 @@ export function unitCard(unit) {
   const rows = unit.bearings.map((latest) => bearingRow(unit.id, latest.bearing));
   const head = element("div", { class: "unit-head" }, element("h2", {}, unit.name), running.node, source.node);
   return {
-    node: element("section", { class: "unit", "data-unit": unit.id }, head, table(unit, rows)),
+    node: element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, rows)),
     draw(now) {
       running.draw(now);
       source.draw(now.source);
@@ -71,9 +71,8 @@ function bearingRow(unit, bearing) {
   return {
     node,
     draw(latest) {
-      const { level, reason } = latest.quality;
-      for (const cell of cells) cell.draw(latest, reason);
-      quality.draw(level, levelWords(level, reasonWords(reason)));
+      for (const cell of cells) cell.draw(latest, latest.quality.reason);
+      drawQuality(quality, latest.quality);
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
     },
   };
@@ -89,9 +88,9 @@ function runningView() {
     draw(unit) {
       const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NOBODY;
       const latest = knowing("speed_rpm");
-      speed.draw(latest);
+      speed.draw(latest, latest.quality?.reason);
       setText(from, latest.speed_source ? `(${speedSourceWords(latest.speed_source)})` : "");
-      power.draw(knowing("power_mw"));
+      power.draw(knowing("power_mw"), latest.quality?.reason);
     },
   };
 }

@@ -1,11 +1,16 @@
-/** A quality mark: shape, colour and words, each sufficient alone. */
+/** A quality mark: shape, colour and words, each sufficient alone. Looks are those of `lookOf`. */
 
 import { element, setAttribute, setText, shape } from "../dom.js";
+import { lookOf, reasonWords } from "../words.js";
 
-const WORDS = { good: "Good", uncertain: "Uncertain", bad: "Bad" };
+const WORDS = { good: "Good", absent: "No value", uncertain: "Uncertain", bad: "Bad" };
 
 const SHAPES = {
   good: () => [shape("circle", { cx: 8, cy: 8, r: 5.5 })],
+  absent: () => [
+    shape("circle", { cx: 8, cy: 8, r: 5.5 }),
+    shape("path", { d: "M4.2 11.8l7.6-7.6", class: "stroke" }),
+  ],
   uncertain: () => [
     shape("path", { d: "M8 1.5 15 14.5H1Z" }),
     shape("path", { d: "M8 6v4.2M8 11.7v1.2", class: "stroke" }),
@@ -16,29 +21,30 @@ const SHAPES = {
   ],
 };
 
-/** The shape of a level alone, hidden from screen readers: words must stand beside it. */
-export function markShape(level) {
-  return shape("svg", { class: `shape ${level}`, viewBox: "0 0 16 16", "aria-hidden": "true" }, ...SHAPES[level]());
+/** The shape alone, hidden from screen readers: words must stand beside it. */
+export function markShape(look) {
+  return shape("svg", { class: `shape ${look}`, viewBox: "0 0 16 16", "aria-hidden": "true" }, ...SHAPES[look]());
 }
 
-/** Returns `{ node, draw(level, words) }`. */
+/** Returns `{ node, draw(look, words) }`. */
 export function mark() {
   const words = element("span");
   const node = element("span", { class: "mark" }, words);
   return {
     node,
-    draw(level, text) {
-      if (node.dataset.level !== level) {
+    draw(look, text) {
+      if (node.dataset.look !== look) {
         node.querySelector("svg")?.remove();
-        node.prepend(markShape(level));
-        setAttribute(node, "data-level", level);
+        node.prepend(markShape(look));
+        setAttribute(node, "data-look", look);
       }
       setText(words, text);
     },
   };
 }
 
-/** The words beside a mark: the level, and the reason unless all is well. */
-export function levelWords(level, reason) {
-  return level === "good" ? WORDS.good : `${WORDS[level]}: ${reason}`;
+/** Draw a quality of the API on a mark: its level in a word, and the reason unless all is well. */
+export function drawQuality(one, { level, reason }) {
+  const look = lookOf(level, reason);
+  one.draw(look, look === "good" ? WORDS.good : `${WORDS[look]}: ${reasonWords(reason)}`);
 }

@@ -2,7 +2,7 @@
 
 import { element, setAttribute, setText } from "../dom.js";
 import { formatQuantity, kindOf } from "../format.js";
-import { reasonWords } from "../words.js";
+import { lookOf, reasonWords } from "../words.js";
 import { markShape } from "./mark.js";
 
 const DASH = "—";
@@ -16,13 +16,13 @@ export function readingOf(latest, name) {
 /**
  * One number with an optional label before and a unit after it.
  *
- * Returns `{ node, draw(latest, saidReason) }`. A number's doubt is not repeated when `saidReason`
- * beside it says the same; a missing number always says why.
+ * Returns `{ node, draw(latest, saidReason) }`. What `saidReason` beside it says already is not said
+ * again loudly: a doubted number stands alone, a missing one gives its reason without a shape.
  */
 export function readingView(name, label, unit = kindOf(name).unit) {
   const number = element("span", { class: "number" });
   const why = element("span", { class: "why" });
-  const suffix = element("span", { class: "unit" }, unit);
+  const suffix = element("span", { class: "suffix" }, unit);
   const node = element("span", { class: "reading", "data-reading": name });
   if (label) node.append(element("span", { class: "axis" }, label));
   node.append(number, suffix, why);
@@ -40,11 +40,13 @@ export function readingView(name, label, unit = kindOf(name).unit) {
 }
 
 function drawReason(why, reading, saidReason) {
-  const said = reading.value !== null && reading.reason === saidReason;
-  const silent = said || reading.level === "good";
+  const said = reading.reason === saidReason;
+  const silent = reading.level === "good" || (said && reading.value !== null);
   const words = silent ? "" : reasonWords(reading.reason);
-  if (why.textContent === words) return;
-  why.replaceChildren(...(silent ? [] : [markShape(reading.level), words]));
+  const look = said ? "" : lookOf(reading.level, reading.reason);
+  if (why.textContent === words && why.dataset.look === look) return;
+  why.dataset.look = look;
+  why.replaceChildren(...(silent ? [] : said ? [words] : [markShape(look), words]));
 }
 
 /** Two readings in one cell; when both are missing for one reason, one dash stands for both. */
