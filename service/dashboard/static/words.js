@@ -29,6 +29,15 @@ export function lookOf(level, reason) {
   return level === "bad" && ORDINARY.has(reason) ? "absent" : level;
 }
 
+/**
+ * The quality of a bearing as a whole, or of its first reading that is bad for no ordinary reason:
+ * a broken sensor must not hide behind a quiet absence.
+ */
+export function qualityOf({ quality, readings }) {
+  if (quality.level === "bad" && lookOf(quality.level, quality.reason) === "bad") return quality;
+  return Object.values(readings).find(({ level, reason }) => lookOf(level, reason) === "bad") ?? quality;
+}
+
 /** A few words for a table cell. */
 export function reasonWords(reason) {
   return REASONS[reason]?.[0] ?? reason.replaceAll("_", " ");
@@ -45,8 +54,9 @@ const SPEED_SOURCES = {
   rated: "rated value, not measured",
 };
 
-/** Where the shown speed comes from. */
-export function speedSourceWords(source) {
+/** Where the shown speed comes from; nothing while none is shown. */
+export function speedOrigin({ readings, speed_source: source }) {
+  if (source === null || (readings.speed_rpm?.value ?? null) === null) return "";
   return SPEED_SOURCES[source] ?? source.replaceAll("_", " ");
 }
 

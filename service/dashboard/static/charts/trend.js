@@ -16,10 +16,13 @@ const LOOKS = {
  */
 export function piecesOf(trends, name, refreshS) {
   const series = trends.series[name];
-  const widestStepS = 2.5 * Math.max(trends.bucket_s, refreshS);
+  const bucketS = trends.bucket_s ?? 0; // without buckets every reading stands alone
+  const widestStepS = 2.5 * Math.max(bucketS, refreshS);
+  const endS = Date.parse(trends.end) / 1000;
   const pieces = [];
   let piece = null;
-  trends.time.forEach((timeS, index) => {
+  trends.time.forEach((startS, index) => {
+    const timeS = Math.min(startS + bucketS / 2, endS);
     if (series.mean[index] === null) {
       if (series.count[index] > 0 || series.worst_level[index] === "bad") piece = null;
       return;

@@ -7,7 +7,7 @@ import { formatAge, formatTime } from "../format.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
 import { bearingAddress } from "../route.js";
-import { reasonSentence } from "../words.js";
+import { qualityOf, reasonSentence } from "../words.js";
 import { windowFacts } from "./window_facts.js";
 
 /** Returns `{ draw(view), close() }`. */
@@ -54,9 +54,9 @@ function headPart(unitId, bearingId) {
     draw(latest, unit) {
       drawSiblings(siblings, unit, bearingId);
       setText(title, `${unit.name}, ${bearingId}`);
-      const { level, reason } = latest.quality;
-      drawQuality(quality, latest.quality);
-      setText(why, level === "good" ? "" : reasonSentence(reason));
+      const whole = qualityOf(latest);
+      drawQuality(quality, whole);
+      setText(why, whole.level === "good" ? "" : reasonSentence(whole.reason));
       setText(age, windowAge(latest));
       source.draw(unit.source);
     },
@@ -65,7 +65,7 @@ function headPart(unitId, bearingId) {
 
 function windowAge(latest) {
   if (latest.age_s === null) return "No segment has been analysed yet.";
-  return `Newest segment ended ${formatAge(latest.age_s)} ago, ${formatTime(Date.now() - latest.age_s * 1000)}`;
+  return `Newest result ${formatAge(latest.age_s)} old, samples up to ${formatTime(Date.parse(latest.time))}`;
 }
 
 function drawSiblings(nav, unit, bearingId) {

@@ -9,7 +9,7 @@ import { formatFixed } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
 import { poll } from "../poll.js";
-import { NOT_CURRENT, reasonWords } from "../words.js";
+import { NOT_CURRENT, reasonSentence, reasonWords } from "../words.js";
 import { centreTrail, trendPanels } from "./trend_panels.js";
 
 const PERIOD_S = 5;
@@ -34,9 +34,17 @@ export function bearingCharts(unitId, bearingId) {
   };
 }
 
-/** Asks `path` again and again and hands a good answer to `show`; says why when there is none. */
-function asking(box, path, show) {
+/**
+ * Asks `path` again and again and hands a good answer to `show`; says why when there is none.
+ *
+ * Until the bearing has its first result there is nothing to ask for: `absence()` says so.
+ */
+function asking(box, path, show, absence = () => null) {
   return poll(async (signal) => {
+    if (absence() !== null) {
+      box.explain(absence());
+      return;
+    }
     try {
       await show(await ask(path, [], signal));
     } catch (failure) {
@@ -49,10 +57,30 @@ function asking(box, path, show) {
 
 function orbitChart(path) {
   const box = panel("Orbit", "orbit");
-  const questions = asking(box, [...path, "orbit"], (orbit) =>
+  return resultChart(box, [...path, "orbit"], (orbit) =>
     box.show(orbitTraces(orbit), orbitLayout(orbit), orbitCaption(orbit)),
   );
-  return { node: box.node, draw: (latest, notCurrent) => box.draw(latest.age_s, notCurrent), close: questions.stop };
+}
+
+/** A chart that one question fills, asked as soon as the bearing has a result. */
+function resultChart(box, path, show) {
+  let latest = null;
+  const questions = asking(box, path, show, () => absenceWords(latest));
+  return {
+    node: box.node,
+    draw(newest, notCurrent) {
+      const first = absenceWords(latest) !== null && absenceWords(newest) === null;
+      latest = newest;
+      if (first) questions.again();
+      box.draw(newest.age_s, notCurrent);
+    },
+    close: questions.stop,
+  };
+}
+
+function absenceWords(latest) {
+  if (latest === null) return "Waiting for the service’s first answer.";
+  return latest.time === null ? `No result yet. ${reasonSentence(latest.quality.reason)}` : null;
 }
 
 function orbitCaption(orbit) {
@@ -69,11 +97,10 @@ function spectrumChart(path) {
   const spans = [[3, "0–3 Hz"], [25, "0–25 Hz"]];
   const span = choice("Range", spans, 3, () => spectrum && show());
   const box = panel("Spectrum", "spectrum", span.node);
-  const questions = asking(box, [...path, "spectrum"], (answer) => {
+  return resultChart(box, [...path, "spectrum"], (answer) => {
     spectrum = answer;
     return show();
   });
-  return { node: box.node, draw: (latest, notCurrent) => box.draw(latest.age_s, notCurrent), close: questions.stop };
 }
 
 /** Fed by the bearing's facts, the trends' trail and the newest reading. */

@@ -2,7 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { pairView, readingView } from "../parts/reading.js";
-import { speedSourceWords } from "../words.js";
+import { qualityOf, speedOrigin } from "../words.js";
 
 const PAIRS = (order, what, axes, unit) => [axes.map((axis) => `${order}_${what.replace("*", axis)}`), axes, unit];
 const K = (order) => PAIRS(order, "k_eff_*_n_per_m", ["xx", "yy"]);
@@ -41,7 +41,7 @@ function pairTile([title, size, [names, labels]]) {
   const pair = pairView(names, labels);
   return {
     node: element("div", { class: `tile ${size}` }, element("h2", {}, title), pair.node),
-    draw: (latest) => pair.draw(latest, latest.quality.reason),
+    draw: (latest) => pair.draw(latest, qualityOf(latest).reason),
   };
 }
 
@@ -51,8 +51,8 @@ function speedTile() {
   return {
     node: element("div", { class: "tile" }, element("h2", {}, "Speed"), speed.node, from),
     draw(latest) {
-      speed.draw(latest, latest.quality.reason);
-      setText(from, latest.speed_source ? speedSourceWords(latest.speed_source) : "");
+      speed.draw(latest, qualityOf(latest).reason);
+      setText(from, speedOrigin(latest));
     },
   };
 }

@@ -2,7 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { mark } from "../parts/mark.js";
-import { lookOf } from "../words.js";
+import { lookOf, qualityOf } from "../words.js";
 import { unitCard } from "./unit_card.js";
 
 /** Returns `{ draw(view), close() }`. */
@@ -33,13 +33,16 @@ const LOOK_WORDS = { bad: "bad", uncertain: "uncertain", absent: "without full r
 
 function tallyView(node) {
   const words = element("span");
+  const store = mark();
   const marks = Object.fromEntries(Object.keys(LOOK_WORDS).map((look) => [look, mark()]));
-  node.append(words, ...Object.values(marks).map((one) => one.node));
+  node.append(words, ...Object.values(marks).map((one) => one.node), store.node);
   return {
     draw(view) {
-      const qualities = view.units.flatMap((unit) => unit.bearings.map((latest) => latest.quality));
+      const qualities = view.units.flatMap((unit) => unit.bearings.map(qualityOf));
       const looks = qualities.map(({ level, reason }) => lookOf(level, reason));
       const n = (look) => looks.filter((one) => one === look).length;
+      store.node.hidden = view.storeError === null;
+      store.draw("bad", `Results are not being stored: ${view.storeError}`);
       setText(words, tallyWords(view, looks.length));
       for (const [look, one] of Object.entries(marks)) {
         one.node.hidden = n(look) === 0;

@@ -6,7 +6,7 @@ import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { sourceView } from "../parts/source.js";
 import { bearingAddress } from "../route.js";
-import { speedSourceWords } from "../words.js";
+import { qualityOf, speedOrigin } from "../words.js";
 
 const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "") });
 const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "") });
@@ -71,8 +71,9 @@ function bearingRow(unit, bearing) {
   return {
     node,
     draw(latest) {
-      for (const cell of cells) cell.draw(latest, latest.quality.reason);
-      drawQuality(quality, latest.quality);
+      const whole = qualityOf(latest);
+      for (const cell of cells) cell.draw(latest, whole.reason);
+      drawQuality(quality, whole);
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
     },
   };
@@ -89,7 +90,7 @@ function runningView() {
       const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NOBODY;
       const latest = knowing("speed_rpm");
       speed.draw(latest, latest.quality?.reason);
-      setText(from, latest.speed_source ? `(${speedSourceWords(latest.speed_source)})` : "");
+      setText(from, speedOrigin(latest));
       power.draw(knowing("power_mw"), latest.quality?.reason);
     },
   };

@@ -35,9 +35,13 @@ export function ageWords(ageS) {
 
 function sampleWords(source) {
   const rejected = Object.values(source.rejected).reduce((sum, count) => sum + count, 0);
+  const extra = [
+    source.n_repeated ? `, ${formatCount(source.n_repeated)} repeated` : "",
+    source.n_restarts ? `; device restarted ${formatCount(source.n_restarts)}×` : "",
+  ];
   return (
     `Samples: ${formatCount(source.n_stored)} stored, ${formatCount(source.n_flagged)} flagged, ` +
-    `${formatCount(source.n_gap)} in gaps, ${formatCount(rejected)} rejected${rejectedWords(source.rejected)}`
+    `${formatCount(source.n_gap)} in gaps, ${formatCount(rejected)} rejected${rejectedWords(source.rejected)}${extra.join("")}`
   );
 }
 
