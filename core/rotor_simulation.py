@@ -1,33 +1,15 @@
-"""Exact simulation of a linear rotor in discrete time, as matrix products over blocks of steps.
+"""Simulation of a linear rotor as matrix products over blocks of steps.
 
-With forces held constant during a step the matrix exponential gives the motion at the end of it
-without error, whatever the step. Writing out many such steps at once ("lifting") turns the
-recursion into a few large matrix products: the same numbers to rounding, at a hundred times the
-speed.
+Writing out many steps at once ("lifting") turns the recursion into a few large matrix products: the
+same numbers to rounding, at a hundred times the speed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from core.arrays import FloatArray
-from core.rotor import RotorMatrices
-
-
-@dataclass(frozen=True)
-class DiscreteRotor:
-    """``s[n+1] = A s[n] + B f[n]``, ``y[n] = C s[n]`` with the state s = (x, dx/dt).
-
-    Parameters
-    ----------
-    transition, input_map, output_map
-        A (n_states, n_states), B (n_states, n_forces), C (n_outputs, n_states).
-    """
-
-    transition: FloatArray
-    input_map: FloatArray
-    output_map: FloatArray
+from core.rotor_discrete import DiscreteRotor
 
 
 @dataclass(frozen=True)
@@ -42,7 +24,7 @@ class LiftedRotor:
         (n_states, n_forces * n_steps)
     output_map, feedthrough
         (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); in both,
-        time runs fastest.
+        time runs fastest. The second maps the block's forces to its outputs.
     """
 
     n_steps: int
@@ -52,49 +34,6 @@ class LiftedRotor:
     input_map: FloatArray
     output_map: FloatArray
     feedthrough: FloatArray
-
-
-def state_matrix(matrices: RotorMatrices) -> FloatArray:
-    """Continuous state matrix of (x, dx/dt), (20, 20) (Brito et al., equation 7)."""
-    damping = matrices.damping + matrices.speed_rad_s * matrices.gyroscopic
-    n = matrices.mass.shape[0]
-    return np.block(
-        [
-            [np.zeros((n, n)), np.eye(n)],
-            [
-                -np.linalg.solve(matrices.mass, matrices.stiffness),
-                -np.linalg.solve(matrices.mass, damping),
-            ],
-        ]
-    )
-
-
-def discretize(
-    matrices: RotorMatrices, force_map: FloatArray, output_map: FloatArray, rate_hz: float
-) -> DiscreteRotor:
-    """Hold each force for one step and integrate exactly.
-
-    Parameters
-    ----------
-    force_map
-        (10, n_forces) generalized force of each input.
-    output_map
-        (n_outputs, 20) outputs from the state.
-
-    Raises
-    ------
-    ValueError
-        If the rate is not positive.
-    """
-    if not rate_hz > 0.0:
-        raise ValueError(f"sampling rate must be above 0 Hz, got {rate_hz}")
-    n_states, n_forces = output_map.shape[1], force_map.shape[1]
-    # exp of [[A, B], [0, 0]] dt holds both the transition and its integral (Van Loan, 1978)
-    augmented = np.zeros((n_states + n_forces, n_states + n_forces))
-    augmented[:n_states, :n_states] = state_matrix(matrices)
-    augmented[n_states // 2 : n_states, n_states:] = np.linalg.solve(matrices.mass, force_map)
-    step = scipy.linalg.expm(augmented / rate_hz)
-    return DiscreteRotor(step[:n_states, :n_states], step[:n_states, n_states:], output_map)
 
 
 def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
@@ -119,7 +58,7 @@ def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
         transition=powers[-1],
         input_map=driven.reshape(len(powers[0]), -1),
         output_map=observed.reshape(-1, len(powers[0])),
-        feedthrough=_feedthrough(observed, rotor.input_map),
+        feedthrough=_feedthrough(observed, rotor),
     )
 
 
@@ -131,10 +70,9 @@ def simulate(
     Parameters
     ----------
     state
-        (n_states,) at the first sample.
+        (n_states,) at the first sample, in the terms of :class:`DiscreteRotor`.
     forces
-        (n_forces, n_samples) in newtons, n_samples a multiple of the block's steps. The force of
-        sample n acts from sample n to sample n + 1.
+        (n_forces, n_samples) in newtons, n_samples a multiple of the block's steps.
 
     Returns
     -------
@@ -168,14 +106,15 @@ def _block_states(
     return states, state
 
 
-def _feedthrough(observed: FloatArray, input_map: FloatArray) -> FloatArray:
+def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
     """Outputs of a block caused by its own forces: a lower-triangular Toeplitz block matrix."""
     n_outputs, n_steps, _ = observed.shape
-    impulse = observed @ input_map
-    matrix = np.zeros((n_outputs, n_steps, input_map.shape[1], n_steps))
-    for delay in range(1, n_steps):
+    driven = (observed @ rotor.input_map).swapaxes(0, 1)
+    impulse = [rotor.feedthrough, *driven[:-1]]
+    matrix = np.zeros((n_outputs, n_steps, rotor.input_map.shape[1], n_steps))
+    for delay, response in enumerate(impulse):
         pushed = np.arange(n_steps - delay)
-        matrix[:, pushed + delay, :, pushed] = impulse[:, delay - 1]
+        matrix[:, pushed + delay, :, pushed] = response
     return matrix.reshape(n_outputs * n_steps, -1)
 
 

@@ -21,11 +21,7 @@ class Excitation(Protocol):
 
 
 class UnbalanceForce:
-    """Force that turns forward with the shaft.
-
-    It is taken in the middle of each sampling step: the rotor holds it during the step, and a held
-    force acts half a step late.
-    """
+    """Force that turns forward with the shaft."""
 
     def __init__(self, force_n: float, frequency_hz: float, rate_hz: float) -> None:
         self._force_n = force_n
@@ -34,9 +30,9 @@ class UnbalanceForce:
 
     def advance(self, n_samples: int) -> FloatArray:
         """Give the next forces (x, y) in newtons, (2, n_samples)."""
-        middle = np.arange(self._index, self._index + n_samples) + 0.5
+        turns = self._turns_per_sample * np.arange(self._index, self._index + n_samples)
         self._index += n_samples
-        angle = 2.0 * math.pi * np.fmod(middle * self._turns_per_sample, 1.0)
+        angle = 2.0 * math.pi * np.fmod(turns, 1.0)
         return _rotating(self._force_n, angle)
 
 

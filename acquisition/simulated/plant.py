@@ -12,8 +12,9 @@ from acquisition.simulated.transducers import noise_rms, output_map, standing_ga
 from core.arrays import FloatArray
 from core.machine import Unit
 from core.rotor import force_map, rotor_matrices
+from core.rotor_discrete import Hold, discretize
 from core.rotor_parameters import ForcePlane, unbalance_force_n
-from core.rotor_simulation import LiftedRotor, discretize, lift, simulate
+from core.rotor_simulation import LiftedRotor, lift, simulate
 from core.units import hz_from_rpm
 
 LIFTED_STEPS = 32
@@ -92,7 +93,8 @@ def _lifted_rotor(machine: Unit, scenario: Scenario) -> LiftedRotor:
     matrices = rotor_matrices(scenario.rotor, films, scenario.speed_rpm)
     forces = np.hstack([force_map(scenario.rotor, plane) for plane in _planes(scenario)])
     outputs = output_map(machine, scenario.rotor, matrices)
-    return lift(discretize(matrices, forces, outputs, machine.rate_hz), LIFTED_STEPS)
+    rotor = discretize(matrices, forces, outputs, machine.rate_hz, Hold.RAMP)
+    return lift(rotor, LIFTED_STEPS)
 
 
 def _planes(scenario: Scenario) -> list[ForcePlane]:

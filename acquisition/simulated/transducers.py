@@ -8,8 +8,8 @@ from acquisition.simulated.scenario import TransducerNoise
 from core.arrays import FloatArray
 from core.machine import Measurand, Unit
 from core.rotor import RotorMatrices, bracket_motion, relative_motion
+from core.rotor_discrete import state_matrix
 from core.rotor_parameters import RotorParameters
-from core.rotor_simulation import state_matrix
 
 SHAFT, BEARING = "shaft", "bearing"
 

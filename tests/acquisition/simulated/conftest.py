@@ -1,0 +1,114 @@
+"""A machine with all twelve channels of Table 3, its calibration, and time that tests own."""
+
+from collections.abc import Callable
+
+import pytest
+
+from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from acquisition.simulated.scenario import BearingScenario, Scenario
+from acquisition.simulated.unit import SimulatedUnit
+from core.film import Film
+from core.machine import Bearing, Channel, Measurand, Unit
+from core.rotor_parameters import RotorParameters
+
+RATE_HZ = 600.0
+CLEARANCE_UM = {"UJB": 200.0, "LJB": 300.0, "TJB": 200.0}
+START_NS = 1_790_000_000_000_000_000
+PROBE = ChannelCalibration(20.0, -250.0, -18.0, -2.0)
+CHARGE_AMPLIFIER = ChannelCalibration(10.0, 1.0, -10.0, 10.0)
+
+
+def build_machine(bearing_measurand: Measurand = Measurand.VELOCITY_MM_S) -> Unit:
+    channels: list[Channel] = []
+    bearings = []
+    for bracket in RotorParameters().brackets:
+        name = bracket.bearing
+        ids = [f"{name}_{what}" for what in ("ux", "uy", "vx", "vy")]
+        channels += [Channel(i, Measurand.GAP_UM, direction=-1) for i in ids[:2]]
+        channels += [Channel(i, bearing_measurand) for i in ids[2:]]
+        bearings.append(
+            Bearing(
+                name,
+                bracket.stiffness_n_per_m,
+                ids[0],
+                ids[1],
+                ids[2],
+                ids[3],
+                clearance_um=CLEARANCE_UM[name],
+                gap_reference_um=(2000.0, 2100.0),
+                oil_temperature=f"{name}_oil",
+                gap_x=f"{name}_gap_x",
+                gap_y=f"{name}_gap_y",
+            )
+        )
+    return Unit("U1", 92.3, RATE_HZ, tuple(channels), tuple(bearings), "speed", "power")
+
+
+def build_calibration(machine: Unit) -> UnitCalibration:
+    slow = ["speed", "power", "not_there"]
+    slow += [f"{b.id}_{what}" for b in machine.bearings for what in ("oil", "gap_x", "gap_y")]
+    return UnitCalibration(
+        machine.id,
+        machine.rate_hz,
+        tuple(
+            PROBE if channel.measurand is Measurand.GAP_UM else CHARGE_AMPLIFIER
+            for channel in machine.channels
+        ),
+        tuple(SlowCalibration(name, -1.0e6, 1.0e6) for name in slow),
+    )
+
+
+@pytest.fixture
+def machine() -> Unit:
+    return build_machine()
+
+
+@pytest.fixture
+def calibration(machine: Unit) -> UnitCalibration:
+    return build_calibration(machine)
+
+
+@pytest.fixture
+def machine_with() -> Callable[[Measurand], Unit]:
+    return build_machine
+
+
+@pytest.fixture
+def quiet() -> Scenario:
+    """Unbalance alone, on the paper's films of condition 2: nothing random, nothing slow."""
+    return Scenario(
+        bearings={
+            "UJB": BearingScenario(Film.proportional(3.33e9, 3.33e9), 60.0, -80.0),
+            "LJB": BearingScenario(Film.proportional(1.43e9, 1.43e9), 0.0, 90.0),
+            "TJB": BearingScenario(Film.proportional(6.67e9, 6.67e9), -20.0, 0.0),
+        }
+    )
+
+
+@pytest.fixture
+def build_unit(machine: Unit, calibration: UnitCalibration) -> Callable[..., SimulatedUnit]:
+    def build(scenario: Scenario, seed: int = 1) -> SimulatedUnit:
+        return SimulatedUnit(machine, calibration, scenario, seed, START_NS)
+
+    return build
+
+
+class ManualClock:
+    """Time that passes only while somebody sleeps, or when a test says so."""
+
+    def __init__(self) -> None:
+        self.elapsed_s = 0.0
+
+    def now_ns(self) -> int:
+        return START_NS + round(self.elapsed_s * 1e9)
+
+    def monotonic_s(self) -> float:
+        return self.elapsed_s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.elapsed_s += duration_s
+
+
+@pytest.fixture
+def clock() -> ManualClock:
+    return ManualClock()

@@ -1,0 +1,72 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from acquisition.simulated.excitation import (
+    Excitation,
+    HydraulicForce,
+    RopeForce,
+    UnbalanceForce,
+)
+
+RATE_HZ = 600.0
+
+STREAMS: dict[str, Callable[[], Excitation]] = {
+    "unbalance": lambda: UnbalanceForce(1.0, 1.538, RATE_HZ),
+    "rope": lambda: RopeForce(np.random.default_rng(1), 1.0, 0.385, 0.01, RATE_HZ),
+    "white": lambda: HydraulicForce(np.random.default_rng(2), 1.0, None, RATE_HZ),
+    "band": lambda: HydraulicForce(np.random.default_rng(3), 1.0, 20.0, RATE_HZ),
+}
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_force_joins_from_piece_to_piece_without_a_seam(name: str) -> None:
+    whole = STREAMS[name]().advance(1000)
+    stream = STREAMS[name]()
+    pieces = [stream.advance(n) for n in (1, 2, 97, 400, 500)]
+
+    assert np.array_equal(np.concatenate(pieces, axis=1), whole)
+
+
+def test_unbalance_turns_forward_once_per_revolution_with_constant_force() -> None:
+    x, y = UnbalanceForce(75.6e3, 1.5, RATE_HZ).advance(800)
+    angle = np.unwrap(np.arctan2(y, x))
+
+    assert np.hypot(x, y) == pytest.approx(75.6e3)
+    assert angle == pytest.approx(2 * np.pi * 1.5 / RATE_HZ * np.arange(800))
+
+
+@pytest.mark.parametrize("cutoff_hz", [None, 20.0, 5.0])
+def test_hydraulic_force_has_the_rms_it_is_given(cutoff_hz: float | None) -> None:
+    force = HydraulicForce(np.random.default_rng(4), 20.0e3, cutoff_hz, RATE_HZ).advance(600_000)
+
+    # 1000 s of a 5 Hz band are 10,000 independent values: 1 % scatter at most.
+    assert force[:, 6000:].std(axis=1) == pytest.approx([20.0e3] * 2, rel=0.03)
+    assert abs(np.corrcoef(force[0], force[1]).min()) < 0.05
+
+
+def test_band_limited_hydraulic_force_stays_in_its_band() -> None:
+    force = HydraulicForce(np.random.default_rng(5), 20.0e3, 20.0, RATE_HZ).advance(600_000)
+    frequency_hz, density = scipy.signal.welch(force, RATE_HZ, nperseg=8192)
+    below = density[:, (frequency_hz > 1.0) & (frequency_hz < 15.0)].mean()
+    above = density[:, frequency_hz > 60.0].mean()
+
+    assert below == pytest.approx(20.0e3**2 / 20.0, rel=0.06)
+    assert above < 1e-3 * below
+
+
+def test_the_rope_keeps_its_mean_frequency_but_no_fixed_phase_to_the_shaft() -> None:
+    width_hz, seconds = 0.01, 20_000
+    rope = RopeForce(np.random.default_rng(6), 150.0e3, 0.385, width_hz, 10.0)
+    x, y = rope.advance(seconds * 10)
+    turning = x + 1j * y
+    angle = np.unwrap(np.angle(turning))
+    wander = angle - 2 * np.pi * 0.385 * np.arange(angle.size) / 10.0
+    after_10_s = wander[100::100] - wander[:-100:100]
+
+    assert np.abs(turning) == pytest.approx(150.0e3)
+    assert angle[-1] / (2 * np.pi * seconds) == pytest.approx(0.385, abs=0.001)
+    # Random walk of a Lorentzian line: variance 2π · width · time; 2000 steps scatter by 3 %.
+    assert after_10_s.var() == pytest.approx(2 * np.pi * width_hz * 10.0, rel=0.15)

@@ -1,0 +1,92 @@
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import pytest
+
+from acquisition.calibration import UnitCalibration, calibrate
+from acquisition.clock import Clock
+from acquisition.simulated.demo import full_load
+from acquisition.simulated.source import SimulatedSource
+from acquisition.simulated.unit import SimulatedUnit
+from acquisition.source import SampleSource
+from core.blocks import SampleBlock
+
+BuildUnit = Callable[..., SimulatedUnit]
+
+
+class ManualClock(Clock, Protocol):
+    elapsed_s: float
+
+
+async def take(source: SampleSource, n_blocks: int) -> list[SampleBlock]:
+    blocks: list[SampleBlock] = []
+    async with source.connect() as stream:
+        async for block in stream:
+            blocks.append(block)
+            if len(blocks) == n_blocks:
+                break
+    return blocks
+
+
+async def test_an_unpaced_source_goes_on_where_it_was_left(
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+) -> None:
+    feed = build_unit(full_load())
+    source = SimulatedSource(feed, calibration, clock, block_samples=500, paced=False)
+
+    blocks = await take(source, 3)
+    clock.elapsed_s += 3600.0
+    blocks += await take(source, 2)
+
+    assert [block.first_index for block in blocks] == [0, 500, 1000, 1500, 2000]
+    assert clock.elapsed_s == 3600.0
+    expected = calibrate(build_unit(full_load()).advance(2500), calibration)
+    assert np.array_equal(np.concatenate([b.samples for b in blocks], axis=1), expected.samples)
+
+
+async def test_a_paced_source_delivers_samples_when_they_have_happened(
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+) -> None:
+    source = SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=300)
+
+    await take(source, 4)
+
+    assert clock.elapsed_s == pytest.approx(2.0)
+
+
+async def test_what_passed_while_nobody_was_connected_shows_as_a_jump_of_the_index(
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+) -> None:
+    source = SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=300)
+    before = await take(source, 2)
+    clock.elapsed_s += 300.0
+
+    after = await take(source, 1)
+
+    assert before[-1].stop_index == 600
+    assert after[0].first_index == 600 + 300 * 600
+    assert after[0].start_ns - before[0].start_ns == 301 * 1_000_000_000
+    assert clock.elapsed_s == pytest.approx(1.0 + 300.0 + 0.5)
+
+
+async def test_a_slow_reader_of_a_paced_source_loses_nothing(
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+) -> None:
+    source = SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=300)
+    indices = []
+    async with source.connect() as stream:
+        async for block in stream:
+            indices.append(block.first_index)
+            clock.elapsed_s += 2.0
+            if len(indices) == 5:
+                break
+
+    assert indices == [0, 300, 600, 900, 1200]
+
+
+def test_blocks_without_samples_are_refused(
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+) -> None:
+    with pytest.raises(ValueError, match="got 0"):
+        SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=0)

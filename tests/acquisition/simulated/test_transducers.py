@@ -1,0 +1,118 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.calibration import COUNTS_FULL_SCALE, UnitCalibration
+from acquisition.errors import ConfigError
+from acquisition.simulated.converter import to_counts
+from acquisition.simulated.plant import SimulatedPlant
+from acquisition.simulated.scenario import Scenario, TransducerNoise
+from core.arrays import FloatArray
+from core.machine import Bearing, Channel, Measurand, Unit
+
+MachineWith = Callable[[Measurand], Unit]
+
+
+def readings(machine: Unit, scenario: Scenario, n_chunks: int = 1) -> FloatArray:
+    plant = SimulatedPlant(machine, scenario, seed=7)
+    return np.concatenate([plant.advance().readings for _ in range(n_chunks)], axis=1)
+
+
+def test_velocity_and_acceleration_are_derivatives_of_displacement(
+    machine_with: MachineWith, quiet: Scenario
+) -> None:
+    displacement_um, velocity_mm_s, acceleration_m_s2 = (
+        readings(machine_with(measurand), quiet)[2]
+        for measurand in (
+            Measurand.DISPLACEMENT_UM,
+            Measurand.VELOCITY_MM_S,
+            Measurand.ACCELERATION_M_S2,
+        )
+    )
+    inner = slice(1, -1)
+
+    # Central differences at 1.54 Hz and 600 Hz are off by (ω dt)² / 6 = 4e-5.
+    assert np.gradient(displacement_um, 1 / 600.0)[inner] / 1e3 == pytest.approx(
+        velocity_mm_s[inner], abs=2e-4 * np.abs(velocity_mm_s).max()
+    )
+    assert np.gradient(velocity_mm_s, 1 / 600.0)[inner] / 1e3 == pytest.approx(
+        acceleration_m_s2[inner], abs=2e-4 * np.abs(acceleration_m_s2).max()
+    )
+
+
+def test_a_probe_on_the_positive_axis_sees_its_gap_shrink_as_the_shaft_comes(
+    machine: Unit, quiet: Scenario
+) -> None:
+    away = Channel("UJB_ux", Measurand.GAP_UM, direction=1)
+    turned = replace(machine, channels=(away, *machine.channels[1:]))
+    n_turn = 390  # one turn at 92.3 r/min
+
+    towards_um = readings(machine, quiet)[0, :n_turn]
+    away_um = readings(turned, quiet)[0, :n_turn]
+
+    assert towards_um.mean() == pytest.approx(2000.0 - 60.0, abs=0.1)
+    assert away_um.mean() == pytest.approx(2000.0 + 60.0, abs=0.1)
+    assert towards_um + away_um == pytest.approx(4000.0)
+
+
+def test_a_displacement_probe_without_gap_reads_the_vibration_alone(
+    machine: Unit, quiet: Scenario
+) -> None:
+    probe = Channel("UJB_ux", Measurand.DISPLACEMENT_UM)
+    bare = replace(machine, channels=(probe, *machine.channels[1:]))
+
+    vibration_um = readings(bare, quiet)[0]
+
+    assert vibration_um == pytest.approx(1940.0 - readings(machine, quiet)[0])
+    assert np.abs(vibration_um).max() == pytest.approx(9.3, rel=0.01)
+
+
+def test_each_kind_of_transducer_has_its_own_noise(machine: Unit, quiet: Scenario) -> None:
+    noisy = replace(quiet, noise=TransducerNoise(gap_um_rms=0.5, velocity_mm_s_rms=0.02))
+
+    noise = readings(machine, noisy, 20) - readings(machine, quiet, 20)
+
+    # 41,000 samples: the rms scatters by 0.35 %.
+    assert noise.std(axis=1) == pytest.approx([0.5, 0.5, 0.02, 0.02] * 3, rel=0.02)
+    assert np.abs(np.corrcoef(noise) - np.eye(12)).max() < 0.03
+
+
+def test_the_converter_rounds_to_counts_and_clips_at_its_rails(
+    calibration: UnitCalibration,
+) -> None:
+    per_count = np.array([c.unit_per_count for c in calibration.channels])
+    signal = np.array([0.0, 0.4, 0.6, -1.4, 32767.4, 4.0e4, -4.0e4])
+
+    counts = to_counts(per_count[:, np.newaxis] * signal, calibration)
+
+    rails = [COUNTS_FULL_SCALE - 1, COUNTS_FULL_SCALE - 1, -COUNTS_FULL_SCALE]
+    assert counts.dtype == np.int16
+    assert counts.tolist() == [[0, 0, 1, -1, *rails]] * 12
+
+
+def test_a_channel_of_no_bearing_is_refused(machine: Unit, quiet: Scenario) -> None:
+    stray = Channel("stator_core", Measurand.VELOCITY_MM_S)
+    with pytest.raises(ConfigError, match="'stator_core' belongs to no bearing"):
+        SimulatedPlant(replace(machine, channels=(*machine.channels, stray)), quiet, seed=1)
+
+
+@pytest.mark.parametrize(("place", "measurand"), [(0, "velocity_mm_s"), (2, "gap_um")])
+def test_a_channel_that_measures_what_its_place_does_not_have_is_refused(
+    machine: Unit, quiet: Scenario, place: int, measurand: str
+) -> None:
+    channels = list(machine.channels)
+    channels[place] = Channel(channels[place].id, Measurand(measurand))
+    with pytest.raises(ConfigError, match=f"cannot measure {measurand}"):
+        SimulatedPlant(replace(machine, channels=tuple(channels)), quiet, seed=1)
+
+
+def test_a_bearing_the_rotor_does_not_have_is_refused(machine: Unit, quiet: Scenario) -> None:
+    strange: Bearing = replace(machine.bearings[0], id="GEN-DE")
+    with pytest.raises(ConfigError, match="UJB, LJB, TJB: 'GEN-DE'"):
+        SimulatedPlant(
+            replace(machine, bearings=(strange, *machine.bearings[1:])),
+            replace(quiet, bearings={**quiet.bearings, "GEN-DE": quiet.bearings["UJB"]}),
+            seed=1,
+        )
