@@ -78,6 +78,11 @@ class SampleBlock:
         """Index of the first sample after the block."""
         return self.first_index + self.n_samples
 
+    @property
+    def stop_ns(self) -> int:
+        """Time of the first sample after the block."""
+        return self.start_ns + ns_from_s(self.n_samples / self.rate_hz)
+
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
         """Return a part of the block, counted from its own start; what was rejected stays in front.
 

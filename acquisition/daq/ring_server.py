@@ -117,10 +117,11 @@ class ModbusRingServer:
 
 
 def _listening_port(server: ModbusTcpServer) -> int:
-    listener = server.transport
-    if not isinstance(listener, asyncio.AbstractServer):
+    # asyncio's and uvloop's servers share this attribute, but no type
+    sockets = getattr(server.transport, "sockets", ())
+    if not sockets:
         raise LinkError("the server has stopped listening")
-    port: int = listener.sockets[0].getsockname()[1]  # type: ignore[attr-defined]
+    port: int = sockets[0].getsockname()[1]
     return port
 
 

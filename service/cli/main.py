@@ -1,15 +1,46 @@
 """Entry point of the `padwatch` command."""
 
+import sys
+import tempfile
+import traceback
+
 import typer
 
-app = typer.Typer(no_args_is_help=True, add_completion=False)
+from service.cli import config
+from service.cli.daq import daq
+from service.cli.demo import demo
+from service.cli.logs import set_up_logging
+from service.cli.run import run
+from service.cli.validate import validate
+
+EXIT_BUG = 70
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app.command()(run)
+app.command()(demo)
+app.command()(daq)
+app.command()(validate)
+app.add_typer(config.app, name="config")
 
 
 @app.callback()
 def padwatch() -> None:
     """Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs."""
+    set_up_logging()
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line; a bug ends it with one line and a report for its makers."""
+    try:
+        app()
+    except Exception:  # the outermost rim: users get a sentence, the report gets the traceback
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="padwatch-", suffix=".txt", delete=False
+        ) as report:
+            traceback.print_exc(file=report)
+        typer.echo(f"padwatch: stopped by an internal error; the report is {report.name}", err=True)
+        sys.exit(EXIT_BUG)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""The HTTP application: API, health and dashboard."""
+
+from importlib.metadata import version
+
+from fastapi import FastAPI
+
+from service.api.bearing_routes import bearing_router, gap_router
+from service.api.context import Context
+from service.api.health_routes import health_router
+from service.api.plant_routes import plant_router
+from service.api.problems import install_problem_handlers
+from service.dashboard.routes import dashboard_router
+
+DESCRIPTION = """
+Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs.
+
+Numbers that cannot be known are `null` with a `level` and a `reason`. Amplitudes are zero-to-peak.
+Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
+"""
+
+
+def create_app(context: Context) -> FastAPI:
+    """Put the application together."""
+    app = FastAPI(
+        title="padwatch",
+        version=version("padwatch"),
+        description=DESCRIPTION,
+        openapi_url="/api/v1/openapi.json",
+        docs_url=None,  # its pages would load scripts from elsewhere
+        redoc_url=None,
+    )
+    install_problem_handlers(app)
+    for router in (
+        health_router(context),
+        plant_router(context),
+        gap_router(context),
+        bearing_router(context),
+        dashboard_router(),
+    ):
+        app.include_router(router)
+    return app

@@ -1,0 +1,191 @@
+"""One bearing: as configured, now, over time, as spectrum and as orbit."""
+
+import asyncio
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query
+
+from core.quantities import BY_NAME
+from core.units import ns_from_s
+from service.api.context import Context
+from service.api.models import (
+    BearingModel,
+    GapModel,
+    LatestModel,
+    OrbitModel,
+    SpectrumModel,
+    TrendModel,
+)
+from service.api.problems import ProblemError, problem_responses
+from service.api.times import ns_from_datetime, rfc3339
+from service.api.views import latest_model, orbit_model, spectrum_model, trend_model
+from service.store.port import TrendQuery, ValueRange
+
+MAX_POINTS = 5000
+MAX_QUANTITIES = 40
+HOLE_HOPS = 2.5
+"""Results further apart than this many refreshes have a hole between them."""
+
+Start = Annotated[
+    datetime,
+    Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
+]
+End = Annotated[
+    datetime,
+    Query(description="Time up to which, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
+]
+Bound = Annotated[float | None, Query(allow_inf_nan=False)]
+
+
+def time_range(start: Start, end: End) -> tuple[int, int]:
+    """Check a range of time."""
+    start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
+    if start_ns >= end_ns:
+        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
+        raise ProblemError(422, "Wrong parameter", detail, "start")
+    return start_ns, end_ns
+
+
+def eccentricity_range(
+    eccentricity_min: Bound = None, eccentricity_max: Bound = None
+) -> ValueRange:
+    """Results with an eccentricity ratio within these bounds."""
+    return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
+
+
+def oil_temperature_range(
+    oil_temperature_min: Bound = None, oil_temperature_max: Bound = None
+) -> ValueRange:
+    """Results with an oil temperature, in °C, within these bounds."""
+    return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
+
+
+TimeRange = Annotated[tuple[int, int], Depends(time_range)]
+
+
+def bearing_router(context: Context) -> APIRouter:
+    """Routes about one bearing."""
+    router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
+    unknown, no_result = problem_responses(404), problem_responses(404, 409)
+
+    @router.get("", summary="All bearings of a unit", responses=unknown)
+    async def bearings(unit: str) -> list[BearingModel]:
+        """The unit's guide bearings as configured."""
+        return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
+
+    @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
+    async def one_bearing(unit: str, bearing: str) -> BearingModel:
+        """Bracket, clearance, reference and channels."""
+        return _bearing(context, unit, bearing)
+
+    @router.get("/{bearing}/latest", summary="One bearing now", responses=unknown)
+    async def latest(unit: str, bearing: str) -> LatestModel:
+        """The newest result, without numbers where they are not current."""
+        context.bearing(unit, bearing)
+        return latest_model(context.live, unit, bearing)
+
+    @router.get("/{bearing}/trends", summary="Trends", responses=problem_responses(404, 422))
+    async def trends(
+        unit: str,
+        bearing: str,
+        times: TimeRange,
+        eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
+        oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
+        quantity: Annotated[
+            list[str], Query(min_length=1, max_length=MAX_QUANTITIES, examples=[["speed_rpm"]])
+        ],
+        max_points: Annotated[int, Query(ge=2, le=MAX_POINTS)] = 1000,
+    ) -> TrendModel:
+        """Quantities over time: single readings, or buckets with min, max, mean, count, quality."""
+        context.bearing(unit, bearing)
+        query = TrendQuery(
+            unit=unit,
+            bearing=bearing,
+            quantities=_known(quantity),
+            start_ns=times[0],
+            end_ns=times[1],
+            max_points=max_points,
+            hole_ns=ns_from_s(HOLE_HOPS * context.refresh_s),
+            eccentricity_ratio=eccentricity,
+            oil_temperature_c=oil_temperature,
+        )
+        return trend_model(query, await asyncio.to_thread(context.store.trend, query))
+
+    @router.get("/{bearing}/spectrum", summary="Spectra", responses=no_result)
+    async def spectrum(unit: str, bearing: str) -> SpectrumModel:
+        """Averaged amplitude spectra of the newest result, all channels as displacement."""
+        context.bearing(unit, bearing)
+        assessment = context.live.assessment(unit, bearing)
+        if assessment is None:
+            raise _no_result(unit, bearing)
+        return spectrum_model(assessment)
+
+    @router.get("/{bearing}/orbit", summary="Orbit", responses=no_result)
+    async def orbit(unit: str, bearing: str) -> OrbitModel:
+        """The newest turns of the shaft relative to the bearing."""
+        context.bearing(unit, bearing)
+        assessment = context.live.assessment(unit, bearing)
+        if assessment is None or assessment.orbit is None:
+            raise _no_result(unit, bearing)
+        return orbit_model(assessment.orbit)
+
+    return router
+
+
+def gap_router(context: Context) -> APIRouter:
+    """Routes about holes in the samples of a unit."""
+    router = APIRouter(prefix="/api/v1/units/{unit}", tags=["plant"])
+
+    @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422))
+    async def gaps(unit: str, times: TimeRange) -> list[GapModel]:
+        """Recorded gaps in the samples of a unit that ended within a range of time."""
+        found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
+        return [
+            GapModel(
+                epoch=gap.epoch,
+                first_index=gap.first_index,
+                n_samples=gap.n_samples,
+                end=rfc3339(gap.stop_ns),
+            )
+            for gap in found
+        ]
+
+    return router
+
+
+def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
+    settings = context.bearing(unit, bearing)
+    return BearingModel(
+        unit=unit,
+        id=bearing,
+        bracket_stiffness_n_per_m=settings.bracket_stiffness_n_per_m,
+        clearance_um=settings.clearance_um,
+        gap_reference_um=list(settings.gap_reference_um),
+        channels={
+            "shaft_x": settings.shaft_x,
+            "shaft_y": settings.shaft_y,
+            "bearing_x": settings.bearing_x,
+            "bearing_y": settings.bearing_y,
+        },
+    )
+
+
+def _known(quantities: list[str]) -> tuple[str, ...]:
+    for name in quantities:
+        if name not in BY_NAME:
+            detail = f"quantity {name!r} is not in the catalogue; see /api/v1/quantities"
+            raise ProblemError(422, "Wrong parameter", detail, "quantity")
+    return tuple(dict.fromkeys(quantities))
+
+
+def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRange:
+    if low is not None and high is not None and low > high:
+        detail = f"{parameter} {low:g} must not be above its maximum {high:g}"
+        raise ProblemError(422, "Wrong parameter", detail, parameter)
+    return ValueRange(low, high)
+
+
+def _no_result(unit: str, bearing: str) -> ProblemError:
+    detail = f"unit {unit!r} bearing {bearing!r} has no result yet; the first takes one segment"
+    return ProblemError(409, "No result yet", detail)

@@ -1,0 +1,41 @@
+"""What the API's routes work with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from acquisition.clock import Clock
+from service.api.problems import ProblemError
+from service.live import LiveView
+from service.settings.units import BearingSettings, UnitSettings
+from service.store.port import Store
+
+
+@dataclass(frozen=True)
+class Context:
+    """The running service, as far as the API needs it.
+
+    Parameters
+    ----------
+    refresh_s
+        Time from one result to the next.
+    """
+
+    plant_name: str
+    units: Mapping[str, UnitSettings]
+    live: LiveView
+    store: Store
+    clock: Clock
+    refresh_s: float
+
+    def unit(self, unit: str) -> UnitSettings:
+        """Look a unit up, or answer 404."""
+        if unit not in self.units:
+            raise ProblemError(404, "Unknown unit", f"there is no unit {unit!r} in this plant")
+        return self.units[unit]
+
+    def bearing(self, unit: str, bearing: str) -> BearingSettings:
+        """Look a bearing up, or answer 404."""
+        for settings in self.unit(unit).bearing:
+            if settings.id == bearing:
+                return settings
+        raise ProblemError(404, "Unknown bearing", f"unit {unit!r} has no bearing {bearing!r}")

@@ -1,0 +1,29 @@
+"""Time at the API: RFC 3339 in UTC outside, nanoseconds inside."""
+
+from datetime import UTC, datetime, timedelta
+
+from core.units import NS_PER_S
+from service.api.problems import ProblemError
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def rfc3339(time_ns: int) -> str:
+    """Time to the millisecond; exact down to that, whatever the year."""
+    moment = EPOCH + timedelta(microseconds=time_ns // 1_000_000 * 1000)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def ns_from_datetime(moment: datetime, parameter: str) -> int:
+    """Nanoseconds since 1970.
+
+    Raises
+    ------
+    ProblemError
+        If the time carries no offset: local time would be a guess.
+    """
+    if moment.tzinfo is None:
+        detail = f"{parameter} needs an offset from UTC, such as a trailing Z"
+        raise ProblemError(422, "Wrong parameter", detail, parameter)
+    elapsed = moment - EPOCH
+    return (elapsed.days * 86_400 + elapsed.seconds) * NS_PER_S + elapsed.microseconds * 1000

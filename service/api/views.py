@@ -1,0 +1,158 @@
+"""From the program's values to the API's models."""
+
+from core.assessment import Assessment, AveragingWindow, OrbitTrace
+from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from core.quality import Level, Quality, Reading
+from core.quantities import BY_NAME
+from core.units import NS_PER_S
+from service.api.models import (
+    LatestModel,
+    LevelName,
+    OrbitModel,
+    QualityModel,
+    ReadingModel,
+    SourceModel,
+    SpectrumChannelModel,
+    SpectrumModel,
+    TrendModel,
+    TrendSeriesModel,
+    WindowModel,
+)
+from service.api.times import rfc3339
+from service.live import LiveView
+from service.store.port import Trend, TrendQuery, TrendSeries
+
+LEVEL_NAMES: dict[Level, LevelName] = {
+    Level.GOOD: "good",
+    Level.UNCERTAIN: "uncertain",
+    Level.BAD: "bad",
+}
+
+PLACES = {
+    "shaft_x": SHAFT_X,
+    "shaft_y": SHAFT_Y,
+    "bearing_x": BEARING_X,
+    "bearing_y": BEARING_Y,
+}
+
+
+def quality_model(quality: Quality) -> QualityModel:
+    """Quality by name."""
+    return QualityModel(level=LEVEL_NAMES[quality.level], reason=quality.reason.value)
+
+
+def reading_model(name: str, reading: Reading) -> ReadingModel:
+    """A reading with unit and words from the catalogue."""
+    quantity = BY_NAME[name]
+    return ReadingModel(
+        value=reading.value,
+        unit=quantity.unit,
+        label=quantity.label,
+        level=LEVEL_NAMES[reading.quality.level],
+        reason=reading.quality.reason.value,
+    )
+
+
+def latest_model(live: LiveView, unit: str, bearing: str) -> LatestModel:
+    """A bearing as it may be shown now."""
+    current = live.current(unit, bearing)
+    newest = current.assessment
+    return LatestModel(
+        unit=unit,
+        bearing=bearing,
+        time=rfc3339(newest.time_ns) if newest else None,
+        age_s=current.age_s,
+        quality=quality_model(current.quality),
+        speed_source=newest.speed_source.value if newest else None,
+        window=window_model(newest.window) if newest else None,
+        readings={name: reading_model(name, r) for name, r in current.readings.items()},
+    )
+
+
+def window_model(window: AveragingWindow) -> WindowModel:
+    """The samples of a result."""
+    return WindowModel(
+        epoch=window.epoch,
+        first_index=window.first_index,
+        last_index=window.stop_index - 1,
+        n_segments=window.n_segments,
+        n_segments_wanted=window.n_segments_wanted,
+        n_voided=window.n_voided,
+        coverage=window.coverage,
+        duration_s=window.duration_s,
+    )
+
+
+def source_model(live: LiveView, unit: str) -> SourceModel:
+    """How the samples of a unit arrive."""
+    status = live.status(unit)
+    account = status.account
+    last = status.last_sample_ns
+    return SourceModel(
+        state=status.state.value,
+        reason=status.reason,
+        since=None if status.since_ns is None else rfc3339(status.since_ns),
+        data_age_s=live.data_age_s(unit),
+        last_sample_time=None if last is None else rfc3339(last),
+        n_offered=account.n_offered,
+        n_stored=account.n_stored,
+        n_flagged=account.n_flagged,
+        n_gap=account.n_gap,
+        n_repeated=account.n_repeated,
+        n_restarts=account.n_restarts,
+        rejected=dict(account.rejected),
+    )
+
+
+def trend_model(query: TrendQuery, trend: Trend) -> TrendModel:
+    """Trends by column."""
+    return TrendModel(
+        unit=query.unit,
+        bearing=query.bearing,
+        start=rfc3339(query.start_ns),
+        end=rfc3339(query.end_ns),
+        bucket_s=None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S,
+        time=[time_ns / NS_PER_S for time_ns in trend.time_ns],
+        series={name: _series_model(name, series) for name, series in trend.series.items()},
+    )
+
+
+def spectrum_model(assessment: Assessment) -> SpectrumModel:
+    """Amplitude spectra of an assessment."""
+    spectrum, readings = assessment.spectrum, assessment.readings
+    return SpectrumModel(
+        time=rfc3339(assessment.time_ns),
+        frequency_hz=spectrum.frequency_hz.tolist(),
+        channels={
+            name: SpectrumChannelModel(
+                unit="um_pk",
+                amplitude=spectrum.amplitude_um_pk(place).tolist()
+                if spectrum.n_segments[place, place]
+                else None,
+            )
+            for name, place in PLACES.items()
+        },
+        lines={name: readings[f"{name}_frequency_hz"].value for name in ("order1", "vortex")},
+    )
+
+
+def orbit_model(orbit: OrbitTrace) -> OrbitModel:
+    """The newest turns of the shaft."""
+    return OrbitModel(
+        time=rfc3339(orbit.start_ns),
+        rate_hz=orbit.rate_hz,
+        duration_s=orbit.shaft_x_um.size / orbit.rate_hz,
+        shaft_x_um=orbit.shaft_x_um.tolist(),
+        shaft_y_um=orbit.shaft_y_um.tolist(),
+    )
+
+
+def _series_model(name: str, series: TrendSeries) -> TrendSeriesModel:
+    return TrendSeriesModel(
+        unit=BY_NAME[name].unit,
+        min=list(series.minimum),
+        max=list(series.maximum),
+        mean=list(series.mean),
+        count=list(series.count),
+        worst_level=[None if level is None else LEVEL_NAMES[level] for level in series.worst_level],
+    )

@@ -1,0 +1,43 @@
+"""`padwatch config`: check a plant file, print its schema or an example."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from service.cli.examples import EXAMPLE, example_path
+from service.cli.plant_file import PlantPath, read_plant_file
+from service.settings.schema import plant_file_schema
+
+app = typer.Typer(no_args_is_help=True, help="Check a plant file, print its schema or an example.")
+
+
+@app.command()
+def check(
+    plant_file: PlantPath,
+    json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Check a plant file; every mistake is named with its line, exit code 2."""
+    plant = read_plant_file(plant_file)
+    n_bearings = sum(len(unit.bearing) for unit in plant.unit)
+    n_channels = sum(len(unit.channel) for unit in plant.unit)
+    if json_output:
+        counts = {"units": len(plant.unit), "bearings": n_bearings, "channels": n_channels}
+        typer.echo(json.dumps({"plant": plant.plant.name, **counts}))
+        return
+    typer.echo(
+        f"{plant_file} is fine: {plant.plant.name}, {len(plant.unit)} units,"
+        f" {n_bearings} bearings, {n_channels} waveform channels"
+    )
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a plant file: meaning, limits and defaults of every key."""
+    typer.echo(json.dumps(plant_file_schema(), indent=2, ensure_ascii=False))
+
+
+@app.command()
+def example() -> None:
+    """Print a commented plant file to start from."""
+    typer.echo(example_path(EXAMPLE).read_text(encoding="utf-8"), nl=False)

@@ -1,0 +1,40 @@
+"""`padwatch run`: the service."""
+
+from typing import Annotated
+
+import structlog
+import typer
+import uvloop
+
+from acquisition.clock import SystemClock
+from acquisition.errors import AcquisitionError
+from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.program import PortInUseError, listen, run_service
+from service.settings.plant import PlantFile
+from service.store.port import StoreError
+
+log = structlog.get_logger()
+
+
+def run(
+    plant_file: PlantPath,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="HTTP port instead of the file's.")
+    ] = None,
+) -> None:
+    """Acquire, analyse, store and serve a plant until Ctrl-C or SIGTERM."""
+    plant = read_plant_file(plant_file)
+    run_plant(plant, plant.service.port if port is None else port)
+
+
+def run_plant(plant: PlantFile, port: int) -> None:
+    """Run the service on a port; ends the command with one line if it cannot."""
+    try:
+        with listen(plant.service.host, port) as listener:
+            uvloop.run(run_service(plant, listener, SystemClock(), _announce))
+    except (PortInUseError, StoreError, AcquisitionError) as error:
+        fail(f"padwatch: {error}")
+
+
+def _announce(url: str) -> None:
+    typer.echo(f"padwatch: {url}")

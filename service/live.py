@@ -1,0 +1,136 @@
+"""What is known now: the link to each unit, its newest samples and each bearing's assessment."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from acquisition.clock import Clock
+from core.account import SampleAccount
+from core.assessment import Assessment
+from core.quality import Quality, Reading, Reason, bad, missing
+from core.quantities import CATALOGUE
+
+
+class LinkState(StrEnum):
+    """Whether samples of a unit arrive."""
+
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    NOT_CONNECTED = "not_connected"
+
+
+@dataclass(frozen=True)
+class UnitStatus:
+    """How samples of a unit arrive.
+
+    Parameters
+    ----------
+    reason
+        Why it is not connected, in words.
+    since_ns
+        Since when it has been in this state.
+    last_sample_ns
+        Time of the newest sample by the device's clock.
+    received_s
+        When that arrived, on the steady clock.
+    """
+
+    state: LinkState = LinkState.CONNECTING
+    reason: str | None = None
+    since_ns: int | None = None
+    last_sample_ns: int | None = None
+    received_s: float | None = None
+    account: SampleAccount = field(default_factory=SampleAccount)
+
+
+@dataclass(frozen=True)
+class CurrentBearing:
+    """A bearing as it may be shown now: without numbers when they are not current.
+
+    Parameters
+    ----------
+    age_s
+        Since the newest result; None if there has been none.
+    """
+
+    assessment: Assessment | None
+    age_s: float | None
+    quality: Quality
+    readings: Mapping[str, Reading]
+
+
+class LiveView:
+    """The newest of everything; written by the runner, read by the API, on one event loop.
+
+    Parameters
+    ----------
+    stale_after_s
+        A result older than this is no longer current.
+    """
+
+    def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
+        self._clock = clock
+        self._stale_after_s = stale_after_s
+        self._status = {unit: UnitStatus() for unit in units}
+        self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
+        self.store_error: str | None = None
+        self.n_unstored = 0
+
+    def set_link(self, unit: str, state: LinkState, reason: str | None = None) -> bool:
+        """Note the state of a link; return whether it changed."""
+        before = self._status[unit]
+        if (before.state, before.reason) == (state, reason):
+            return False
+        since_ns = before.since_ns if before.state is state else self._clock.now_ns()
+        self._status[unit] = replace(before, state=state, reason=reason, since_ns=since_ns)
+        return before.state is not state
+
+    def set_received(self, unit: str, last_sample_ns: int, account: SampleAccount) -> None:
+        """Note the arrival of a block."""
+        self._status[unit] = replace(
+            self._status[unit],
+            last_sample_ns=last_sample_ns,
+            received_s=self._clock.monotonic_s(),
+            account=account,
+        )
+
+    def set_assessment(self, assessment: Assessment) -> None:
+        """Note a new result."""
+        key = (assessment.unit, assessment.bearing)
+        self._assessments[key] = (self._clock.monotonic_s(), assessment)
+
+    def status(self, unit: str) -> UnitStatus:
+        """How samples of a unit arrive."""
+        return self._status[unit]
+
+    def data_age_s(self, unit: str) -> float | None:
+        """Time since the newest block arrived; None if none has."""
+        received_s = self._status[unit].received_s
+        return None if received_s is None else self._clock.monotonic_s() - received_s
+
+    def assessment(self, unit: str, bearing: str) -> Assessment | None:
+        """The newest result, current or not."""
+        entry = self._assessments.get((unit, bearing))
+        return entry[1] if entry else None
+
+    def current(self, unit: str, bearing: str) -> CurrentBearing:
+        """The newest result as it may be shown: nothing old passes for current."""
+        entry = self._assessments.get((unit, bearing))
+        age_s = None if entry is None else self._clock.monotonic_s() - entry[0]
+        reason = self._why_not_current(unit, age_s)
+        if entry is None or reason is not None:
+            nothing = missing(reason or Reason.WAITING_FOR_DATA)
+            return CurrentBearing(
+                assessment=entry[1] if entry else None,
+                age_s=age_s,
+                quality=bad(nothing.quality.reason),
+                readings={quantity.name: nothing for quantity in CATALOGUE},
+            )
+        return CurrentBearing(entry[1], age_s, entry[1].quality, entry[1].readings)
+
+    def _why_not_current(self, unit: str, age_s: float | None) -> Reason | None:
+        if self._status[unit].state is not LinkState.CONNECTED:
+            return Reason.NOT_CONNECTED
+        if age_s is None:
+            return Reason.WAITING_FOR_DATA
+        return Reason.STALE if age_s > self._stale_after_s else None

@@ -1,0 +1,140 @@
+"""The running service from start to end: store, runner, HTTP server, orderly stop."""
+
+import asyncio
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import uvicorn
+
+from acquisition.clock import Clock
+from service.api.app import create_app
+from service.api.context import Context
+from service.conversion import analysis_of
+from service.live import LiveView
+from service.recorder import Recorder
+from service.runner import Runner
+from service.settings.plant import PlantFile
+from service.store.port import Store
+from service.wiring import open_store, watched_units
+
+STALE_HOPS = 2.5
+"""A result older than this many refreshes is no longer current."""
+
+STOP_S = 2
+"""What slow clients get to finish in before their connections are closed."""
+
+
+class PortInUseError(Exception):
+    """The HTTP port cannot be listened on; the message says which and why."""
+
+
+class HttpServer(uvicorn.Server):
+    """Uvicorn without its own signal handling: the program stops all its parts together."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals alone."""
+        yield
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Take the HTTP port before anything else is started.
+
+    Raises
+    ------
+    PortInUseError
+        If it cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise PortInUseError(f"cannot listen on {host} port {port}: {error.strerror}") from error
+
+
+async def run_service(
+    plant: PlantFile, listener: socket.socket, clock: Clock, announce: Callable[[str], None]
+) -> None:
+    """Run until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    listener
+        Where the HTTP server listens.
+    announce
+        Called with the URL once the server answers.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used.
+    """
+    store = open_store(plant)
+    try:
+        await _run(plant, listener, clock, store, announce)
+    finally:
+        store.close()
+
+
+async def _run(
+    plant: PlantFile,
+    listener: socket.socket,
+    clock: Clock,
+    store: Store,
+    announce: Callable[[str], None],
+) -> None:
+    refresh_s = _refresh_s(plant)
+    live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s)
+    recorder = Recorder(store, live, clock)
+    runner = Runner(watched_units(plant, clock), live, recorder, clock)
+    context = Context(
+        plant_name=plant.plant.name,
+        units={unit.id: unit for unit in plant.unit},
+        live=live,
+        store=store,
+        clock=clock,
+        refresh_s=refresh_s,
+    )
+    config = uvicorn.Config(
+        create_app(context),
+        log_level="warning",
+        access_log=False,
+        lifespan="off",
+        timeout_graceful_shutdown=STOP_S,
+    )
+    server = HttpServer(config)
+    stopped = _stop_on_signals()
+    async with asyncio.TaskGroup() as tasks:
+        running = tasks.create_task(runner.run(), name="run")
+        serving = tasks.create_task(server.serve([listener]), name="serve")
+        announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
+        await stopped.wait()
+        server.should_exit = True
+        running.cancel()
+        announcing.cancel()
+        await asyncio.wait([serving])
+    await recorder.flush()
+
+
+def _refresh_s(plant: PlantFile) -> float:
+    """Seconds from one result to the next, of the slowest unit."""
+    return analysis_of(plant.analysis).hop_samples / min(unit.rate_hz for unit in plant.unit)
+
+
+def _stop_on_signals() -> asyncio.Event:
+    stopped = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stopped.set)
+    return stopped
+
+
+async def _announce(
+    server: uvicorn.Server, listener: socket.socket, announce: Callable[[str], None]
+) -> None:
+    while not server.started:
+        await asyncio.sleep(0.01)
+    host, port = listener.getsockname()[:2]
+    announce(f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/")

@@ -1,0 +1,113 @@
+"""The program's loop: acquire, analyse, record; the only place that retries a link."""
+
+import asyncio
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import structlog
+
+from acquisition.clock import Clock
+from acquisition.errors import AcquisitionError, ConfigError
+from acquisition.source import SampleSource
+from core.blocks import SampleBlock
+from core.monitor import UnitMonitor
+from service.bus import Bus
+from service.live import LinkState, LiveView
+from service.recorder import Findings, Recorder
+from service.store.port import UnitGap
+
+log = structlog.get_logger()
+
+BUS_CAPACITY = 512
+
+FIRST_RETRY_S = 0.5
+LAST_RETRY_S = 5.0
+CONFIG_RETRY_S = 15.0
+"""A device that cannot fit the settings may be replaced or reconfigured, but not in seconds."""
+
+
+@dataclass(frozen=True)
+class WatchedUnit:
+    """A unit's source and the monitor that its blocks go to."""
+
+    source: SampleSource
+    monitor: UnitMonitor
+
+
+class Runner:
+    """Runs all units until it is cancelled. A bug in any of its tasks ends them all."""
+
+    def __init__(
+        self,
+        units: Mapping[str, WatchedUnit],
+        live: LiveView,
+        recorder: Recorder,
+        clock: Clock,
+    ) -> None:
+        self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
+        self._bus = Bus(BUS_CAPACITY)
+
+    async def run(self) -> None:
+        """Acquire and analyse; ends when every source has come to its end."""
+        async with asyncio.TaskGroup() as tasks:
+            recording = tasks.create_task(self._recorder.run(), name="record")
+            analysis = tasks.create_task(self._analyse(), name="analyse")
+            async with asyncio.TaskGroup() as sources:
+                for unit, watched in self._units.items():
+                    sources.create_task(self._acquire(unit, watched.source), name=f"acquire {unit}")
+            await self._bus.drained()
+            analysis.cancel()
+            recording.cancel()
+
+    async def _acquire(self, unit: str, source: SampleSource) -> None:
+        """Read one unit for ever, and wait ever longer between attempts at a lost link."""
+        n_failures = 0
+        while True:
+            before = self._live.status(unit).last_sample_ns
+            try:
+                await self._read(unit, source)
+            except AcquisitionError as error:
+                n_failures = n_failures + 1 if self._is_silent_since(unit, before) else 1
+                self._note_failure(unit, error)
+                await self._clock.sleep(_retry_s(error, n_failures))
+            else:
+                self._live.set_link(unit, LinkState.NOT_CONNECTED, "the source has ended")
+                return
+
+    async def _read(self, unit: str, source: SampleSource) -> None:
+        async with source.connect() as blocks:
+            async for block in blocks:
+                if self._live.set_link(unit, LinkState.CONNECTED):
+                    log.info("connected", unit=unit)
+                await self._bus.publish(block)
+
+    def _is_silent_since(self, unit: str, last_sample_ns: int | None) -> bool:
+        return self._live.status(unit).last_sample_ns == last_sample_ns
+
+    def _note_failure(self, unit: str, error: AcquisitionError) -> None:
+        if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
+            log.warning("not connected", unit=unit, reason=str(error))
+
+    async def _analyse(self) -> None:
+        async for block in self._bus.blocks():
+            self._take(block)
+            self._bus.done()
+
+    def _take(self, block: SampleBlock) -> None:
+        monitor = self._units[block.unit].monitor
+        assessments = monitor.ingest(block)
+        gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
+        for assessment in assessments:
+            self._live.set_assessment(assessment)
+        self._live.set_received(block.unit, block.stop_ns, monitor.account)
+        if assessments or gaps:
+            self._recorder.put(Findings(assessments, gaps))
+
+
+def _retry_s(error: AcquisitionError, n_failures: int) -> float:
+    if isinstance(error, ConfigError):
+        return CONFIG_RETRY_S
+    delay_s = min(FIRST_RETRY_S * 2.0 ** (n_failures - 1), LAST_RETRY_S)
+    # devices that vanish together must not be called back together
+    return delay_s * random.uniform(0.75, 1.25)  # noqa: S311  not a secret

@@ -1,0 +1,149 @@
+"""Waveform and slow channels of a unit."""
+
+from enum import StrEnum
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from core.machine import Measurand
+from core.units import STANDARD_GRAVITY_M_S2
+from service.settings.base import Identifier, Settings
+
+
+class Transducer(StrEnum):
+    """What kind of transducer feeds a waveform channel."""
+
+    PROXIMITY_PROBE = "proximity_probe"
+    DISPLACEMENT = "displacement"
+    VELOCITY = "velocity"
+    ACCELEROMETER = "accelerometer"
+
+
+class SensitivityUnit(StrEnum):
+    """In which unit a sensitivity is given; never guessed from the number."""
+
+    V_PER_MM = "V/mm"
+    MV_PER_UM = "mV/um"
+    MV_PER_MM_S = "mV/(mm/s)"
+    MV_PER_M_S2 = "mV/(m/s2)"
+    MV_PER_G = "mV/g"
+
+
+MEASURANDS = {
+    Transducer.PROXIMITY_PROBE: Measurand.GAP_UM,
+    Transducer.DISPLACEMENT: Measurand.DISPLACEMENT_UM,
+    Transducer.VELOCITY: Measurand.VELOCITY_MM_S,
+    Transducer.ACCELEROMETER: Measurand.ACCELERATION_M_S2,
+}
+
+LENGTH_UNITS = (SensitivityUnit.V_PER_MM, SensitivityUnit.MV_PER_UM)
+ALLOWED_UNITS = {
+    Transducer.PROXIMITY_PROBE: LENGTH_UNITS,
+    Transducer.DISPLACEMENT: LENGTH_UNITS,
+    Transducer.VELOCITY: (SensitivityUnit.MV_PER_MM_S,),
+    Transducer.ACCELEROMETER: (SensitivityUnit.MV_PER_G, SensitivityUnit.MV_PER_M_S2),
+}
+
+V_PER_ENGINEERING_UNIT = {
+    SensitivityUnit.V_PER_MM: 1e-3,
+    SensitivityUnit.MV_PER_UM: 1e-3,
+    SensitivityUnit.MV_PER_MM_S: 1e-3,
+    SensitivityUnit.MV_PER_M_S2: 1e-3,
+    SensitivityUnit.MV_PER_G: 1e-3 / STANDARD_GRAVITY_M_S2,
+}
+"""Volts per µm, mm/s or m/s² of a sensitivity of one."""
+
+PLAUSIBLE_V_PER_UNIT = {
+    Transducer.PROXIMITY_PROBE: (0.5e-3, 50e-3),
+    Transducer.DISPLACEMENT: (0.05e-3, 500e-3),
+    Transducer.VELOCITY: (0.5e-3, 2.0),
+    Transducer.ACCELEROMETER: (0.5e-3, 2.0),
+}
+"""Sensitivities outside these are mistakes of unit: no such transducer is sold."""
+
+
+class ChannelSettings(Settings):
+    """A waveform channel; the order of the channels is their order on the wire."""
+
+    id: Identifier
+    """Unique within the unit; example: "ujb_shaft_x"."""
+
+    transducer: Transducer
+    """"proximity_probe" (DC-coupled gap), "displacement", "velocity" or "accelerometer"."""
+
+    sensitivity: float
+    """In ``sensitivity_unit``; negative if the voltage falls as the measured quantity grows;
+    example: 4.0."""
+
+    sensitivity_unit: SensitivityUnit
+    """"V/mm" or "mV/um" for probes and displacement, "mV/(mm/s)" for velocity, "mV/g" or
+    "mV/(m/s2)" for accelerometers."""
+
+    full_scale_v: Annotated[float, Field(gt=0.0, le=100.0)]
+    """Converter input in volts that reads 32768 counts; example: 12.0."""
+
+    ok_min_v: Annotated[float, Field(ge=-100.0, le=100.0)]
+    """Lowest mean voltage of a healthy transducer (gap OK limit); example: 1.0."""
+
+    ok_max_v: Annotated[float, Field(ge=-100.0, le=100.0)]
+    """Highest mean voltage of a healthy transducer (gap OK limit); example: 11.0."""
+
+    direction: Literal[1, -1] | None = None
+    """+1 if a growing reading is motion along the positive bearing axis, -1 if against it. Default:
+    -1 for a proximity probe, which sits on the positive axis and sees its gap shrink; else +1."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        allowed = ALLOWED_UNITS[self.transducer]
+        if self.sensitivity_unit not in allowed:
+            words = " or ".join(f'"{unit}"' for unit in allowed)
+            raise ValueError(f"sensitivity_unit of a {self.transducer} must be {words}")
+        low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
+        scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
+        if not low <= abs(self.sensitivity) * scale <= high:
+            raise ValueError(
+                f"sensitivity {self.sensitivity:g} {self.sensitivity_unit} is not that of a"
+                f" {self.transducer}: {low / scale:g} to {high / scale:g} are"
+            )
+        if not self.ok_min_v < self.ok_max_v:
+            raise ValueError(f"ok_min_v {self.ok_min_v:g} must be below ok_max_v {self.ok_max_v:g}")
+        return self
+
+    @property
+    def measurand(self) -> Measurand:
+        """What the channel's samples are, in engineering units."""
+        return MEASURANDS[self.transducer]
+
+    @property
+    def unit_per_v(self) -> float:
+        """Engineering units per volt."""
+        return 1.0 / (self.sensitivity * V_PER_ENGINEERING_UNIT[self.sensitivity_unit])
+
+    @property
+    def sign(self) -> int:
+        """Direction with its default filled in."""
+        if self.direction is not None:
+            return self.direction
+        return -1 if self.transducer is Transducer.PROXIMITY_PROBE else 1
+
+
+class SlowChannelSettings(Settings):
+    """A slowly changing reading; the order of the channels is their order on the wire."""
+
+    id: Identifier
+    """Unique within the unit; example: "ujb_oil_temperature"."""
+
+    unit: Literal["r/min", "MW", "degC", "mm"]
+    """Unit in which the device gives it: "r/min", "MW", "degC" or "mm"."""
+
+    minimum: float
+    """Readings below are refused as out of range; example: -10.0."""
+
+    maximum: float
+    """Readings above are refused as out of range; example: 120.0."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.minimum < self.maximum:
+            raise ValueError(f"minimum {self.minimum:g} must be below maximum {self.maximum:g}")
+        return self

@@ -1,0 +1,115 @@
+"""The whole plant file."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from service.settings.base import Settings
+from service.settings.units import UnitSettings
+
+
+class PlantSettings(Settings):
+    """The plant as people know it."""
+
+    name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
+    """Shown on every page; example: "Itaipu"."""
+
+
+class ServiceSettings(Settings):
+    """The running program."""
+
+    host: Annotated[str, StringConstraints(min_length=1)] = "127.0.0.1"
+    """Address the HTTP server listens on. There is no login yet: keep it on loopback."""
+
+    port: Annotated[int, Field(ge=0, le=65535)] = 8080
+    """TCP port of the HTTP server; 0 takes a free one and prints it."""
+
+    data_folder: Annotated[str, StringConstraints(min_length=1)] = "var"
+    """Folder of the database, relative to where padwatch is started."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.host not in ("127.0.0.1", "::1", "localhost"):
+            raise ValueError(
+                f'host "{self.host}" is not loopback: padwatch has no login yet, use "127.0.0.1"'
+                " and a reverse proxy that authenticates"
+            )
+        return self
+
+
+class AnalysisModel(Settings):
+    """Segments and averaging; the defaults are those of Brito et al., section 3.1."""
+
+    segment_samples: Annotated[int, Field(ge=256, le=1_048_576)] = 8192
+    """Points of one Hann-tapered segment."""
+
+    overlap: Annotated[float, Field(ge=0.0, le=0.9)] = 0.125
+    """Share of a segment that the next one repeats, 0 to 0.9."""
+
+    n_segments: Annotated[int, Field(ge=1, le=1000)] = 24
+    """Segments that are averaged; 24 of 8192 points at 600 Hz are about five minutes."""
+
+    max_frequency_hz: Annotated[float, Field(gt=0.0, le=10_000.0)] = 25.0
+    """Spectra are kept up to this frequency."""
+
+    vortex_order: Annotated[float, Field(ge=0.05, le=0.9)] = 0.25
+    """Nominal frequency of the part-load vortex in multiples of the running speed."""
+
+    vortex_band: tuple[float, float] = (0.2, 0.4)
+    """Orders within which the vortex peak is looked for."""
+
+    min_segments: Annotated[int, Field(ge=2, le=1000)] = 4
+    """Fewer segments than this make a result uncertain."""
+
+    min_coherence: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.9
+    """Squared coherence of shaft and bearing motion below which no stiffness is given."""
+
+    min_line_to_floor: Annotated[float, Field(ge=1.0, le=1e6)] = 10.0
+    """Power of a line over its surroundings that counts as excitation before there are enough
+    segments for a coherence."""
+
+    min_coverage: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    """Share of the possible segments below which a result is uncertain."""
+
+    min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
+    """Share of the rated speed below which the machine counts as standing."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        low, high = self.vortex_band
+        if not 0.05 <= low < self.vortex_order < high <= 0.95:
+            raise ValueError(
+                f"vortex_band [{low:g}, {high:g}] must hold vortex_order {self.vortex_order:g} and"
+                " lie within 0.05 to 0.95"
+            )
+        return self
+
+
+class PlantFile(Settings):
+    """A plant file: the plant, the program, the analysis and the units."""
+
+    plant: PlantSettings
+    """The plant."""
+
+    service: ServiceSettings = ServiceSettings()
+    """The running program."""
+
+    analysis: AnalysisModel = AnalysisModel()
+    """Segments and averaging."""
+
+    unit: Annotated[tuple[UnitSettings, ...], Field(min_length=1, max_length=200)]
+    """Generating units."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        seen: set[str] = set()
+        for unit in self.unit:
+            if unit.id in seen:
+                raise ValueError(f'unit id "{unit.id}" is used twice; each must be unique')
+            seen.add(unit.id)
+            if self.analysis.max_frequency_hz >= unit.rate_hz / 2:
+                raise ValueError(
+                    f"analysis.max_frequency_hz {self.analysis.max_frequency_hz:g} must be below"
+                    f" half the sampling rate of unit {unit.id}, {unit.rate_hz / 2:g} Hz"
+                )
+        return self

@@ -1,0 +1,87 @@
+"""The simulated machine behind a simulated DAQ."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from service.settings.base import Settings
+
+
+class SimulatedBearingSettings(Settings):
+    """Oil film and shaft position of one simulated bearing."""
+
+    bearing: Literal["UJB", "LJB", "TJB"]
+    """Which of the rotor model's three bearings."""
+
+    k_xx_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
+    """Direct film stiffness in x, N/m; damping follows as 0.0125 s times it. Example: 0.69e9."""
+
+    k_yy_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
+    """Direct film stiffness in y, N/m."""
+
+    k_cross_n_per_m: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    """Cross-coupled film stiffness k_xy = k_yx, N/m."""
+
+    centre_x_um: Annotated[float, Field(ge=-5000.0, le=5000.0)] = 0.0
+    """Mean position of the shaft centre in x, µm."""
+
+    centre_y_um: Annotated[float, Field(ge=-5000.0, le=5000.0)] = 0.0
+    """Mean position of the shaft centre in y, µm."""
+
+    centre_wander_um_rms: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    """Slow wander of the shaft centre in each direction, µm rms."""
+
+    oil_temperature_c: Annotated[float, Field(ge=0.0, le=120.0)] = 45.0
+    """Mean oil temperature, °C."""
+
+    oil_temperature_wander_c_rms: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    """Slow wander of the oil temperature, K rms."""
+
+
+class SimulationSettings(Settings):
+    """A unit on the paper's ten-degree-of-freedom model."""
+
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
+    """The same seed gives the same samples to the last bit."""
+
+    speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
+    """Running speed, r/min."""
+
+    power_mw: Annotated[float, Field(ge=-2000.0, le=2000.0)]
+    """Active power, MW."""
+
+    power_wander_mw_rms: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
+    """Slow wander of the active power, MW rms."""
+
+    unbalance_grade_mm_s: Annotated[float, Field(ge=0.0, le=40.0)] = 4.25
+    """ISO balance grade G in mm/s; G4.25 is a rotating force of 75.6 kN at 92.3 r/min."""
+
+    hydraulic_force_n_rms: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
+    """Broadband hydraulic force on the runner, N rms in each direction."""
+
+    hydraulic_cutoff_hz: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """The hydraulic force is flat below this frequency; without it, white."""
+
+    rope_force_n: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
+    """Rotating force of the part-load vortex rope on the runner, N."""
+
+    rope_order: Annotated[float, Field(ge=0.1, le=0.9)] = 0.25
+    """Mean frequency of the rope in multiples of the running speed."""
+
+    gap_noise_um_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """White noise of the proximity probes, µm rms."""
+
+    velocity_noise_mm_s_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """White noise of velocity channels, mm/s rms."""
+
+    acceleration_noise_m_s2_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """White noise of acceleration channels, m/s² rms."""
+
+    samples_per_slot: Annotated[int, Field(ge=1, le=4096)] = 50
+    """Samples per channel in a slot of the simulated DAQ's ring."""
+
+    n_slots: Annotated[int, Field(ge=2, le=4096)] = 64
+    """Slots of the simulated DAQ's ring; with 12 channels, 64 slots of 50 samples fit."""
+
+    bearing: Annotated[tuple[SimulatedBearingSettings, ...], Field(min_length=3, max_length=3)]
+    """The three bearings UJB, LJB and TJB."""
