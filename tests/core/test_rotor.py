@@ -98,6 +98,14 @@ def test_an_excited_generator_pulls_the_shaft_further_off_centre() -> None:
     assert deflection[-0.6e9] > deflection[0.0] > 0.0
 
 
+def test_the_seals_hold_the_runner() -> None:
+    force = force_map(PARAMETERS, ForcePlane.RUNNER) @ np.array([1.0e5 + 0j, 0.0])
+    stiff = RotorParameters(seal_stiffness_n_per_m=1.0e13)
+    response = bearing_response(stiff, rotor_matrices(stiff, FILMS, 92.3), 0.0, force)
+
+    assert all(np.abs(motion).max() < 1e-7 for motion in response.values())
+
+
 def test_unbalance_force_grows_with_the_grade_and_the_square_of_speed() -> None:
     assert unbalance_force_n(4.25, 92.3) == pytest.approx(75.6e3)
     assert unbalance_force_n(8.5, 92.3) == pytest.approx(2 * 75.6e3)
