@@ -211,10 +211,10 @@ def test_the_orbit_is_the_newest_turns_of_the_shaft(monitor: UnitMonitor, blocks
     orbit = watch(monitor, list(blocks(machine_signals(14.0))))[-1].orbit
     assert orbit is not None
     assert orbit.shaft_x_um.size == round(3 * 60 / 92.3 * RATE_HZ)
-    radius = np.hypot(orbit.shaft_x_um, orbit.shaft_y_um)
-    np.testing.assert_allclose(radius, 60.0, atol=1.5)
-    angle = np.unwrap(np.arctan2(orbit.shaft_y_um, orbit.shaft_x_um))
-    assert angle[-1] - angle[0] == pytest.approx(3 * 2 * np.pi, rel=0.01)  # forward, not mirrored
+    stop = SEGMENT
+    turn = 2 * np.pi * 92.3 / 60 * np.arange(stop - orbit.shaft_x_um.size, stop) / RATE_HZ
+    np.testing.assert_allclose(orbit.shaft_x_um, 60 * np.cos(turn), atol=1.5)
+    np.testing.assert_allclose(orbit.shaft_y_um, 60 * np.sin(turn), atol=1.5)
 
 
 def test_foreign_blocks_are_refused_naming_both(monitor: UnitMonitor, blocks) -> None:
