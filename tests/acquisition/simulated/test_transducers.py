@@ -10,6 +10,7 @@ from acquisition.simulated.converter import to_counts
 from acquisition.simulated.plant import SimulatedPlant
 from acquisition.simulated.scenario import Scenario, TransducerNoise
 from core.arrays import FloatArray
+from core.film import Film
 from core.machine import Bearing, Channel, Measurand, Unit
 
 MachineWith = Callable[[Measurand], Unit]
@@ -67,6 +68,28 @@ def test_a_displacement_probe_without_gap_reads_the_vibration_alone(
 
     assert vibration_um == pytest.approx(1940.0 - readings(machine, quiet)[0])
     assert np.abs(vibration_um).max() == pytest.approx(9.3, rel=0.01)
+
+
+def test_the_machine_has_long_been_running_when_the_first_sample_is_taken(
+    machine: Unit, quiet: Scenario
+) -> None:
+    soft = {
+        name: replace(b, film=Film.proportional(0.4e9, 0.4e9)) for name, b in quiet.bearings.items()
+    }
+    signal = readings(machine, replace(quiet, speed_rpm=90.0, bearings=soft), 2)
+
+    # One turn takes exactly 400 samples.
+    assert signal[:, 400:800] == pytest.approx(signal[:, :400], abs=1e-3)
+
+
+def test_a_wandering_shaft_leaves_no_step_in_the_gap(machine: Unit, quiet: Scenario) -> None:
+    wandering = {name: replace(b, centre_wander_um_rms=30.0) for name, b in quiet.bearings.items()}
+    still = replace(quiet, unbalance_grade_mm_s=0.0, wander_time_s=20.0)
+
+    gap_um = readings(machine, replace(still, bearings=wandering), 20)[0]
+
+    assert np.ptp(gap_um) > 30.0
+    assert np.abs(np.diff(gap_um)).max() < 0.1
 
 
 def test_each_kind_of_transducer_has_its_own_noise(machine: Unit, quiet: Scenario) -> None:
