@@ -1,5 +1,6 @@
-"""What tests of every package share: a plant whose samples are their own numbers."""
+"""What tests of every package share: a plant whose samples are their own numbers, and a clock."""
 
+import asyncio
 from collections.abc import Callable
 
 import numpy as np
@@ -33,7 +34,7 @@ class CountingFeed:
         self.n_samples += n_samples
         number = np.arange(first, self.n_samples) + np.arange(self._n_channels)[:, np.newaxis]
         return RawBlock(
-            epoch=0,
+            epoch=7,
             first_index=first,
             start_ns=self._start_ns + round(first * NS_PER_S / self._rate_hz),
             rate_hz=self._rate_hz,
@@ -50,6 +51,32 @@ def calibration_in_counts(
     channel = ChannelCalibration(32768.0, 1.0, -32768.0, 32768.0)
     slow = tuple(SlowCalibration(f"slow{i}", -1e9, 1e9) for i in range(n_slow))
     return UnitCalibration("U1", rate_hz, (channel,) * n_channels, slow)
+
+
+class SteppedClock:
+    """Time that stands still unless somebody sleeps or steps it."""
+
+    def __init__(self, start_ns: int = 1_767_225_600 * NS_PER_S) -> None:
+        self._start_ns = start_ns
+        self._elapsed_s = 0.0
+
+    def now_ns(self) -> int:
+        return self._start_ns + round(self._elapsed_s * NS_PER_S)
+
+    def monotonic_s(self) -> float:
+        return self._elapsed_s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.step(max(0.0, duration_s))
+        await asyncio.sleep(0)
+
+    def step(self, duration_s: float) -> None:
+        self._elapsed_s += duration_s
+
+
+@pytest.fixture
+def stepped_clock() -> SteppedClock:
+    return SteppedClock()
 
 
 @pytest.fixture

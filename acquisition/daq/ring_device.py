@@ -31,6 +31,8 @@ class RingDeviceSettings:
         39,120.
     first_sequence, first_index
         Counters at power-up, 0 to 2**32 - 1; near the end they wrap soon.
+    slot_padding
+        Unused registers between slots.
     """
 
     base_address: int = 0
@@ -38,6 +40,7 @@ class RingDeviceSettings:
     n_slots: int = 64
     first_sequence: int = 0
     first_index: int = 0
+    slot_padding: int = 0
 
 
 class RingDevice:
@@ -56,6 +59,8 @@ class RingDevice:
         The registers.
     fault
         Applied to every slot before it is written.
+    first_sequence
+        Where a restart lets the sequence begin.
     frozen
         While set, nothing new is produced: the device answers, its data stand still.
 
@@ -78,7 +83,8 @@ class RingDevice:
         self.ledger = ledger or Ledger()
         self.fault: SlotFault | None = None
         self.frozen = False
-        self.epoch = 0
+        self.first_sequence = self._settings.first_sequence
+        self._n_restarts = 0
         first = feed.advance(self._settings.samples_per_slot)
         self.layout = self._layout(first)
         self.layout.require_possible()
@@ -99,16 +105,17 @@ class RingDevice:
         for _ in range(n_slots):
             self._write(self._feed.advance(self._settings.samples_per_slot), fault or self.fault)
 
-    def restart(self) -> None:
-        """Power off and on: ring empty, counters at their start, next epoch."""
+    def restart(self, next_epoch: bool = True) -> None:
+        """Power off and on: ring empty, counters at their start, next epoch if it tells."""
         first = self._feed.advance(self._settings.samples_per_slot)
+        self._n_restarts += next_epoch
         self.memory.clear()
         self._power_up(first)
         self._write(first, None)
 
     def _power_up(self, first: RawBlock) -> None:
-        self.epoch += 1
-        self._next_sequence = self._settings.first_sequence
+        self.epoch = (first.epoch + self._n_restarts) % U32
+        self._next_sequence = self.first_sequence
         self._index_offset = self._settings.first_index - first.first_index
 
     def _write(self, raw: RawBlock, fault: SlotFault | None) -> None:
@@ -134,7 +141,7 @@ class RingDevice:
             ring_address=self._settings.base_address + HEADER_REGISTERS + 2 * n_slow,
             slot_stride=0,
         )
-        return replace(layout, slot_stride=layout.slot_registers)
+        return replace(layout, slot_stride=layout.slot_registers + self._settings.slot_padding)
 
 
 def _slot(raw: RawBlock, sequence: int, first_index: int) -> Slot:

@@ -143,11 +143,11 @@ class RingFollower:
         """Index of the slot's first sample; None if it was never written or is gone."""
         if slot.blank:
             return None
-        if slot.torn:
-            return Refusal.TORN
         if slot.sequence != sequence:
             same_place = slot.sequence % n_slots == sequence % n_slots
             return None if same_place else Refusal.WRONG_SEQUENCE
+        if slot.torn:
+            return Refusal.TORN
         return self._timeline.place(slot)
 
     def _taken_rejections(self) -> tuple[Rejection, ...]:

@@ -1,0 +1,139 @@
+"""The simulated device on the wire: paced by a clock, read-only, honest about its port."""
+
+import asyncio
+
+import pytest
+from pymodbus.client import AsyncModbusTcpClient
+
+from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
+from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.errors import LinkError
+from acquisition.modbus.profile import decode_header
+
+
+class Turnstile:
+    """A clock that lets sleepers through only when a test turns it."""
+
+    def __init__(self) -> None:
+        self.elapsed_s = 0.0
+        self._turned = asyncio.Condition()
+        self.slept_s: list[float] = []
+
+    def now_ns(self) -> int:
+        return round(self.elapsed_s * 1e9)
+
+    def monotonic_s(self) -> float:
+        return self.elapsed_s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.slept_s.append(duration_s)
+        wake_s = self.elapsed_s + duration_s
+        async with self._turned:
+            self._turned.notify_all()
+            await self._turned.wait_for(lambda: self.elapsed_s >= wake_s)
+
+    async def turn(self, duration_s: float) -> None:
+        """Step the time, and return when the sleeper sleeps again."""
+        n_sleeps = len(self.slept_s)
+        await self.step(duration_s)
+        async with self._turned:
+            await self._turned.wait_for(lambda: len(self.slept_s) > n_sleeps)
+
+    async def step(self, duration_s: float) -> None:
+        async with self._turned:
+            self.elapsed_s += duration_s
+            self._turned.notify_all()
+
+    async def first_sleep(self) -> None:
+        async with self._turned:
+            await self._turned.wait_for(lambda: self.slept_s)
+
+
+async def test_a_paced_device_keeps_to_the_clock_however_late_it_wakes(counting_feed):
+    clock = Turnstile()
+    device = RingDevice(counting_feed())
+    slot_s = device.layout.slot_duration_s
+    async with ModbusRingServer(device, clock):
+        await clock.first_sleep()
+        for n_slots in (1.25, 0.9, 7.3, 30.05, 0.7):
+            await clock.turn(n_slots * slot_s)
+            n_passed = int(clock.elapsed_s / slot_s + 1e-9)
+            assert device.ledger.n_samples("U1") == 50 * max(1, n_passed)
+
+
+async def test_a_device_samples_on_while_nobody_serves_it(counting_feed):
+    clock = Turnstile()
+    device = RingDevice(counting_feed())
+    server = ModbusRingServer(device, clock)
+    async with server:
+        await clock.first_sleep()
+    port = server.port
+    clock.elapsed_s = 100 * device.layout.slot_duration_s + 0.001
+    clock.slept_s.clear()
+    async with server:
+        await clock.first_sleep()
+        assert server.port == port
+        assert device.ledger.n_samples("U1") == 50 * 100
+
+
+async def test_a_port_in_use_is_an_error_that_names_it(counting_feed):
+    async with ModbusRingServer(RingDevice(counting_feed())) as first:
+        with pytest.raises(LinkError, match=f"cannot listen on 127.0.0.1:{first.port}"):
+            async with ModbusRingServer(RingDevice(counting_feed()), port=first.port):
+                pass
+
+
+async def test_what_stops_the_feed_reaches_whoever_runs_the_server(counting_feed):
+    feed = counting_feed()
+    device = RingDevice(feed)
+
+    def ends(_: int):
+        raise EOFError("the recording has ended")
+
+    feed.advance = ends
+    clock = Turnstile()
+    async with ModbusRingServer(device, clock) as server:
+        await clock.first_sleep()
+        await clock.step(9.0)
+        with pytest.raises(EOFError, match="recording has ended"):
+            await server.run()
+
+
+@pytest.fixture
+async def plain_client(counting_feed):
+    """Connect pymodbus' own client to a served device: an independent reader."""
+    device = RingDevice(counting_feed(), settings=RingDeviceSettings(n_slots=4))
+    async with (
+        ModbusRingServer(device) as server,
+        AsyncModbusTcpClient("127.0.0.1", port=server.port, retries=0) as client,
+    ):
+        yield client, device, server
+
+
+async def test_another_modbus_client_reads_the_same_registers(plain_client):
+    client, device, _ = plain_client
+    device.produce(2)
+    for read in (client.read_holding_registers, client.read_input_registers):
+        reply = await read(0, count=16, device_id=1)
+        data = b"".join(word.to_bytes(2, "big") for word in reply.registers)
+        assert decode_header(data).newest == 2
+    reply = await client.read_holding_registers(device.layout.end_address, count=1)
+    assert reply.isError()
+    assert reply.exception_code == 2
+
+
+async def test_a_write_is_refused_and_changes_nothing(plain_client):
+    client, device, server = plain_client
+    before = device.memory.read(0, 16)
+    reply = await client.write_register(0, 1, device_id=1)
+    assert reply.isError()
+    assert device.memory.read(0, 16) == before
+    assert server.function_codes[6] == 1
+
+
+async def test_a_cut_drops_every_connection_and_takes_new_ones(plain_client):
+    client, _, server = plain_client
+    assert client.connected
+    server.cut()
+    async with AsyncModbusTcpClient("127.0.0.1", port=server.port, retries=0) as again:
+        assert not (await again.read_holding_registers(0, count=16)).isError()

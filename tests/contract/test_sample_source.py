@@ -1,0 +1,129 @@
+"""What every sample source promises; see `acquisition.source.SampleSource`."""
+
+import asyncio
+import itertools
+from collections.abc import AsyncIterator
+
+import numpy as np
+import pytest
+
+from acquisition.errors import LinkError
+from core.blocks import SampleBlock
+
+
+async def blocks_up_to(blocks: AsyncIterator[SampleBlock], stop_index: int) -> list[SampleBlock]:
+    taken = [await anext(blocks)]
+    while taken[-1].stop_index < stop_index:
+        taken.append(await anext(blocks))
+    return taken
+
+
+def assert_samples_are_their_own_numbers(block: SampleBlock) -> None:
+    index = np.arange(block.first_index, block.stop_index)
+    np.testing.assert_array_equal(block.samples[0], index % 2**15)
+
+
+async def test_no_sample_is_lost_repeated_or_out_of_order(rig):
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        blocks = [await anext(stream)]
+        for _ in range(5):
+            rig.run(4 * rig.step_samples)
+            blocks += await blocks_up_to(stream, blocks[-1].stop_index + 4 * rig.step_samples)
+    for before, after in itertools.pairwise(blocks):
+        assert after.first_index == before.stop_index
+        assert after.epoch == before.epoch
+        assert after.rejected == ()
+    for block in blocks:
+        assert_samples_are_their_own_numbers(block)
+
+
+async def test_time_advances_with_the_index(rig):
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        blocks = [await anext(stream)]
+        rig.run(20 * rig.step_samples)
+        blocks += await blocks_up_to(stream, blocks[-1].stop_index + 20 * rig.step_samples)
+    for block in blocks:
+        elapsed_ns = block.start_ns - blocks[0].start_ns
+        expected_ns = (block.first_index - blocks[0].first_index) / block.rate_hz * 1e9
+        assert abs(elapsed_ns - expected_ns) <= 1000
+
+
+async def test_a_block_tells_unit_units_and_the_health_of_each_channel(rig):
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        block = await anext(stream)
+    assert block.unit == "U1"
+    assert block.rate_hz == 600.0
+    assert block.samples.dtype == np.float32
+    assert len(block.channel_quality) == len(block.samples) == 2
+    assert block.slow["slow0"].value == 45.0
+    assert block.slow["slow1"].value is None
+
+
+async def test_what_passed_while_nobody_was_connected_is_an_exact_jump_of_the_index(rig):
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        before = [await anext(stream)]
+    rig.run(200 * rig.step_samples)
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        after = await anext(stream)
+    assert after.epoch == before[-1].epoch
+    assert after.first_index > before[-1].stop_index
+    assert (after.first_index - before[-1].stop_index) % rig.step_samples == 0
+    assert_samples_are_their_own_numbers(after)
+
+
+async def test_a_stream_that_was_left_has_ended_and_may_be_closed_again(rig):
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        await anext(stream)
+    await stream.aclose()
+    with pytest.raises(StopAsyncIteration):
+        await anext(stream)
+
+
+async def test_a_source_left_before_its_first_block_can_be_connected_again(rig):
+    async with rig.source.connect():
+        pass
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        assert_samples_are_their_own_numbers(await anext(stream))
+
+
+async def test_leaving_a_source_leaves_no_task_behind(rig):
+    before = asyncio.all_tasks()
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        await anext(stream)
+    own = {task for task in asyncio.all_tasks() - before if "server" not in repr(task)}
+    assert own == set()
+
+
+async def test_a_pulled_plug_is_a_lost_link(wired_rig):
+    async with wired_rig.source.connect() as stream:
+        await anext(stream)
+        await wired_rig.pull()
+        with pytest.raises(LinkError):
+            await anext(stream)
+
+
+async def test_an_absent_device_is_a_link_error_that_says_why(wired_rig):
+    await wired_rig.pull()
+    with pytest.raises(LinkError, match=r"refused|Connect call failed"):
+        async with wired_rig.source.connect():
+            pass
+
+
+async def test_a_source_goes_on_after_the_plug_is_back(wired_rig):
+    async with wired_rig.source.connect() as stream:
+        first = await anext(stream)
+        await wired_rig.pull()
+    wired_rig.run(3 * wired_rig.step_samples)
+    await wired_rig.plug_in()
+    async with wired_rig.source.connect() as stream:
+        second = await anext(stream)
+    assert second.first_index == first.stop_index
+    assert_samples_are_their_own_numbers(second)
