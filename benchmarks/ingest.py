@@ -1,0 +1,189 @@
+"""From wire to stored assessment: what a plant of twenty units costs the service.
+
+Three processes: simulated DAQs (20 units, 12 channels, 600 Hz, Modbus TCP on loopback), the whole
+service, and afterwards a bare pymodbus loop that reads as many registers from the same DAQs and
+does nothing with them. Prints a table; ends with 1 if a sample was lost or a limit was passed.
+"""
+
+import argparse
+import asyncio
+import json
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import psutil
+import uvloop
+from pymodbus.client import AsyncModbusTcpClient
+
+DEMO = Path(__file__).parents[1] / "deploy" / "demo.toml"
+CORE_LIMIT = 0.30
+MEMORY_LIMIT_MIB = 500.0
+WARM_UP_S = 20.0
+REGISTERS_PER_READ = 125
+MIB = 2**20
+SEGMENT_SAMPLES, HOP_SAMPLES = 8192, 7168
+
+
+def main() -> None:
+    """Run the benchmark and print its table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--units", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=300.0)
+    parser.add_argument("--bare-seconds", type=float, default=60.0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        plant = Path(folder) / "plant.toml"
+        plant.write_text(plant_file(options.units, Path(folder) / "data"), encoding="utf-8")
+        with daq(plant) as ports:
+            plant.write_text(
+                plant_file(options.units, Path(folder) / "data", ports), encoding="utf-8"
+            )
+            service = measure_service(plant, options.seconds)
+            bare = uvloop.run(bare_loop(list(ports.values()), options.bare_seconds))
+    sys.exit(report(options.units, service, bare))
+
+
+def plant_file(n_units: int, data_folder: Path, ports: dict[str, int] | None = None) -> str:
+    """The demo plant's second unit, many times over."""
+    text = DEMO.read_text(encoding="utf-8")
+    unit = text[text.rindex("[[unit]]") :]
+    parts = [f'[plant]\nname = "Benchmark"\n\n[service]\ndata_folder = "{data_folder}"\n\n']
+    for number in range(1, n_units + 1):
+        id_ = f"U{number}"
+        port = 0 if ports is None else ports[id_]
+        mine = unit.replace('id = "U2"', f'id = "{id_}"').replace("port = 0", f"port = {port}")
+        parts.append(mine.replace("seed = 2", f"seed = {number}") + "\n")
+    tomllib.loads("".join(parts))
+    return "".join(parts)
+
+
+@contextmanager
+def padwatch(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run the command; yield the process and the first line that it prints."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "service.cli.main", *arguments], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        yield process, process.stdout.readline() if process.stdout else ""
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+@contextmanager
+def daq(plant: Path) -> Iterator[dict[str, int]]:
+    with padwatch("daq", str(plant)) as (_, line):
+        yield json.loads(line)
+
+
+def measure_service(plant: Path, duration_s: float) -> dict[str, Any]:
+    """Let the service run and measure its process from after its start."""
+    with padwatch("run", str(plant), "--port", "0") as (process, line):
+        url = line.split()[-1]
+        watched = psutil.Process(process.pid)
+        time.sleep(WARM_UP_S)
+        before, started = watched.cpu_times(), time.monotonic()
+        peak = 0
+        while time.monotonic() - started < duration_s:
+            time.sleep(1.0)
+            peak = max(peak, watched.memory_info().rss)
+        after, elapsed = watched.cpu_times(), time.monotonic() - started
+        units = fetch(f"{url}api/v1/overview")["units"]
+        n_results = sum(n_stored_results(url, unit) for unit in units)
+    sources = [unit["source"] for unit in units]
+    return {
+        "cores": (after.user + after.system - before.user - before.system) / elapsed,
+        "peak_mib": peak / MIB,
+        "n_offered": sum(source["n_offered"] for source in sources),
+        "n_stored": sum(source["n_stored"] for source in sources),
+        "n_results": n_results,
+        "n_expected": sum(n_due_results(unit) for unit in units),
+        "elapsed_s": elapsed,
+    }
+
+
+def fetch(url: str) -> Any:
+    with urllib.request.urlopen(url) as answer:  # noqa: S310  our own service
+        return json.load(answer)
+
+
+def n_stored_results(url: str, unit: dict[str, Any]) -> int:
+    """Results of a unit that the service reads back from its disk."""
+    query = "quantity=speed_rpm&start=2020-01-01T00:00:00Z&end=2100-01-01T00:00:00Z&max_points=5000"
+    return sum(
+        sum(
+            fetch(f"{url}api/v1/units/{unit['id']}/bearings/{b['bearing']}/trends?{query}")[
+                "series"
+            ]["speed_rpm"]["count"]
+        )
+        for b in unit["bearings"]
+    )
+
+
+def n_due_results(unit: dict[str, Any]) -> int:
+    """Results that the samples of a unit allow, all bearings together."""
+    n_segments = (unit["source"]["n_stored"] - SEGMENT_SAMPLES) // HOP_SAMPLES + 1
+    return n_segments * len(unit["bearings"])
+
+
+async def bare_loop(ports: list[int], duration_s: float) -> dict[str, float]:
+    """Read as many registers a second with nothing but pymodbus, one connection a device."""
+    n_reads = 0
+    # 12 channels at 600 Hz, 50 samples a slot: 12 slots a second of 611 registers, 5 reads each,
+    # and four looks at the header, as the service does
+    reads_per_s = 12 * 5 + 4
+    process = psutil.Process()
+    started, before = time.monotonic(), process.cpu_times()
+
+    async def read(port: int) -> None:
+        nonlocal n_reads
+        client = AsyncModbusTcpClient("127.0.0.1", port=port, retries=0)
+        await client.connect()
+        due = time.monotonic()
+        while due - started < duration_s:
+            for _ in range(reads_per_s // 4):
+                await client.read_holding_registers(0, count=REGISTERS_PER_READ, device_id=1)
+                n_reads += 1
+            due += 0.25
+            await asyncio.sleep(max(0.0, due - time.monotonic()))
+        client.close()
+
+    await asyncio.gather(*(read(port) for port in ports))
+    after, elapsed = process.cpu_times(), time.monotonic() - started
+    used = after.user + after.system - before.user - before.system
+    return {"cores": used / elapsed, "reads_per_s": n_reads / elapsed}
+
+
+def report(n_units: int, service: dict[str, Any], bare: dict[str, float]) -> int:
+    """Print the table; return the exit code."""
+    lost = service["n_offered"] - service["n_stored"]
+    print(f"{n_units} units x 12 channels x 600 Hz over Modbus TCP, {service['elapsed_s']:.0f} s")
+    print(f"  samples per channel offered   {service['n_offered']:>12,}")
+    print(f"  of these not stored           {lost:>12,}   (allowed 0)")
+    print(
+        f"  results on the disk, of due   {service['n_results']:>12,}   ({service['n_expected']:,})"
+    )
+    print(f"  service, share of one core    {service['cores']:>12.1%}   (at most {CORE_LIMIT:.0%})")
+    print(f"  service, peak memory          {service['peak_mib']:>8.0f} MiB   (at most 500 MiB)")
+    print(f"  bare pymodbus loop, one core  {bare['cores']:>12.1%}")
+    print(f"  of so many reads a second     {bare['reads_per_s']:>12,.0f}")
+    print(f"  service / bare loop           {service['cores'] / bare['cores']:>12.2f}")
+    failed = (
+        lost > 0
+        or service["n_results"] < service["n_expected"]
+        or service["cores"] > CORE_LIMIT
+        or service["peak_mib"] > MEMORY_LIMIT_MIB
+    )
+    return int(failed)
+
+
+if __name__ == "__main__":
+    main()
