@@ -1,8 +1,24 @@
 """What all settings models share."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
+
+
+class MisfitError(ValueError):
+    """A value that does not fit what stands elsewhere in the file.
+
+    Parameters
+    ----------
+    at
+        Where the value stands, seen from the model that found it: keys and element numbers.
+    """
+
+    def __init__(self, message: str, *at: int | str) -> None:
+        super().__init__(message)
+        self.at = at
+
 
 Identifier = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
 """Letters, digits, dot, dash and underscore; at most 32; fit for a URL."""
@@ -14,3 +30,12 @@ class Settings(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+
+def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
+    """Refuse a value that was already given elsewhere; entries are its place, then the value."""
+    seen: set[int | str] = set()
+    for *at, value in entries:
+        if value in seen:
+            raise MisfitError("is used twice; each must be unique", *at)
+        seen.add(value)

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from core.machine import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
-from service.settings.base import Identifier, Settings
+from service.settings.base import Identifier, MisfitError, Settings
 
 
 class Transducer(StrEnum):
@@ -97,16 +97,17 @@ class ChannelSettings(Settings):
         allowed = ALLOWED_UNITS[self.transducer]
         if self.sensitivity_unit not in allowed:
             words = " or ".join(f'"{unit}"' for unit in allowed)
-            raise ValueError(f"sensitivity_unit of a {self.transducer} must be {words}")
+            raise MisfitError(f"that of a {self.transducer} is {words}", "sensitivity_unit")
         low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
         scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
         if not low <= abs(self.sensitivity) * scale <= high:
-            raise ValueError(
-                f"sensitivity {self.sensitivity:g} {self.sensitivity_unit} is not that of a"
-                f" {self.transducer}: {low / scale:g} to {high / scale:g} are"
+            raise MisfitError(
+                f"a {self.transducer} has {low / scale:g} to {high / scale:g}"
+                f" {self.sensitivity_unit}, or as much below zero",
+                "sensitivity",
             )
         if not self.ok_min_v < self.ok_max_v:
-            raise ValueError(f"ok_min_v {self.ok_min_v:g} must be below ok_max_v {self.ok_max_v:g}")
+            raise MisfitError(f"must be below ok_max_v {self.ok_max_v:g}", "ok_min_v")
         return self
 
     @property
@@ -145,5 +146,5 @@ class SlowChannelSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.minimum < self.maximum:
-            raise ValueError(f"minimum {self.minimum:g} must be below maximum {self.maximum:g}")
+            raise MisfitError(f"must be below maximum {self.maximum:g}", "minimum")
         return self

@@ -1,11 +1,20 @@
 """The whole plant file."""
 
+import math
 from typing import Annotated, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.settings.base import Settings
+from core.units import hz_from_rpm
+from service.settings.base import MisfitError, Settings, refuse_twice
 from service.settings.units import UnitSettings
+
+MIN_SEGMENT_TURNS = 8
+"""A Hann taper spreads a line over two bins to each side; the vortex is a quarter turn away from
+zero, and must lie outside that."""
+
+MIN_SPECTRUM_ORDERS = 2
+"""The spectrum must hold the 1× line with its surroundings."""
 
 
 class PlantSettings(Settings):
@@ -30,9 +39,10 @@ class ServiceSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.host not in ("127.0.0.1", "::1", "localhost"):
-            raise ValueError(
-                f'host "{self.host}" is not loopback: padwatch has no login yet, use "127.0.0.1"'
-                " and a reverse proxy that authenticates"
+            raise MisfitError(
+                'is not loopback: padwatch has no login yet, use "127.0.0.1" and a reverse proxy'
+                " that authenticates",
+                "host",
             )
         return self
 
@@ -77,10 +87,15 @@ class AnalysisModel(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         low, high = self.vortex_band
-        if not 0.05 <= low < self.vortex_order < high <= 0.95:
-            raise ValueError(
-                f"vortex_band [{low:g}, {high:g}] must hold vortex_order {self.vortex_order:g} and"
-                " lie within 0.05 to 0.95"
+        if not 0.05 <= low < high <= 0.95:
+            raise MisfitError("must be [low, high] within 0.05 to 0.95", "vortex_band")
+        if not low < self.vortex_order < high:
+            limits = f"must lie within vortex_band [{low:g}, {high:g}]"
+            raise MisfitError(limits, "vortex_order")
+        if self.min_segments > self.n_segments:
+            raise MisfitError(
+                f"must not be above n_segments {self.n_segments}, or no result is ever certain",
+                "min_segments",
             )
         return self
 
@@ -102,14 +117,24 @@ class PlantFile(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        seen: set[str] = set()
+        refuse_twice(("unit", n, "id", unit.id) for n, unit in enumerate(self.unit))
         for unit in self.unit:
-            if unit.id in seen:
-                raise ValueError(f'unit id "{unit.id}" is used twice; each must be unique')
-            seen.add(unit.id)
-            if self.analysis.max_frequency_hz >= unit.rate_hz / 2:
-                raise ValueError(
-                    f"analysis.max_frequency_hz {self.analysis.max_frequency_hz:g} must be below"
-                    f" half the sampling rate of unit {unit.id}, {unit.rate_hz / 2:g} Hz"
-                )
+            self._check_analysis(unit)
         return self
+
+    def _check_analysis(self, unit: UnitSettings) -> None:
+        turn_hz = hz_from_rpm(unit.rated_speed_rpm)
+        low, high = MIN_SPECTRUM_ORDERS * turn_hz, unit.rate_hz / 2
+        if not low <= self.analysis.max_frequency_hz < high:
+            raise MisfitError(
+                f"for unit {unit.id} must be at least {MIN_SPECTRUM_ORDERS} times the rated speed,"
+                f" {low:g} Hz, and below half the sampling rate, {high:g} Hz",
+                *("analysis", "max_frequency_hz"),
+            )
+        n_needed = math.ceil(MIN_SEGMENT_TURNS * unit.rate_hz / turn_hz)
+        if self.analysis.segment_samples < n_needed:
+            raise MisfitError(
+                f"for unit {unit.id} must hold {MIN_SEGMENT_TURNS} turns at rated speed,"
+                f" {n_needed} samples, to tell the vortex from 1×",
+                *("analysis", "segment_samples"),
+            )

@@ -1,10 +1,10 @@
 """The simulated machine behind a simulated DAQ."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from service.settings.base import Settings
+from service.settings.base import Settings, refuse_twice
 
 
 class SimulatedBearingSettings(Settings):
@@ -85,3 +85,8 @@ class SimulationSettings(Settings):
 
     bearing: Annotated[tuple[SimulatedBearingSettings, ...], Field(min_length=3, max_length=3)]
     """The three bearings UJB, LJB and TJB."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse_twice(("bearing", n, "bearing", b.bearing) for n, b in enumerate(self.bearing))
+        return self

@@ -1,17 +1,21 @@
 """A generating unit in the plant file: its bearings, channels and where its samples come from."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.settings.base import Identifier, Settings
+from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.simulation import SimulationSettings
 
 MicrometrePair = tuple[
     Annotated[float, Field(gt=0.0, le=10_000.0)], Annotated[float, Field(gt=0.0, le=10_000.0)]
 ]
+
+
+CHANNEL_KEYS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
+"""The keys of a bearing that name waveform channels."""
 
 
 class BearingSettings(Settings):
@@ -134,44 +138,54 @@ class UnitSettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _refuse_duplicates(
-            "channel id", [*(c.id for c in self.channel), *(c.id for c in self.slow_channel)]
-        )
-        _refuse_duplicates("bearing id", [b.id for b in self.bearing])
-        waveforms = [channel.id for channel in self.channel]
-        for bearing in self.bearing:
-            used = [bearing.shaft_x, bearing.shaft_y, bearing.bearing_x, bearing.bearing_y]
-            _refuse_unknown(f"bearing {bearing.id}", used, waveforms)
-            _refuse_duplicates(f"channel of bearing {bearing.id}", used)
-            self._check_slow(f"bearing {bearing.id}", bearing.oil_temperature, "degC")
-            self._check_slow(f"bearing {bearing.id}", bearing.gap_x, "mm")
-            self._check_slow(f"bearing {bearing.id}", bearing.gap_y, "mm")
-        self._check_slow("speed_channel", self.speed_channel, "r/min")
-        self._check_slow("power_channel", self.power_channel, "MW")
-        if isinstance(self.source, SimulatedSettings) and self.simulation is None:
-            raise ValueError('source kind "simulated" needs a [unit.simulation] table')
+        refuse_twice(("channel", n, "id", channel.id) for n, channel in enumerate(self.channel))
+        taken = {channel.id for channel in self.channel}
+        for n, slow in enumerate(self.slow_channel):
+            if slow.id in taken:
+                raise MisfitError("is the id of a waveform channel", "slow_channel", n, "id")
+        refuse_twice(("slow_channel", n, "id", slow.id) for n, slow in enumerate(self.slow_channel))
+        refuse_twice(("bearing", n, "id", bearing.id) for n, bearing in enumerate(self.bearing))
+        for n, bearing in enumerate(self.bearing):
+            self._check_channels(n, bearing)
+            self._check_slow(bearing.oil_temperature, "degC", "bearing", n, "oil_temperature")
+            self._check_slow(bearing.gap_x, "mm", "bearing", n, "gap_x")
+            self._check_slow(bearing.gap_y, "mm", "bearing", n, "gap_y")
+        self._check_slow(self.speed_channel, "r/min", "speed_channel")
+        self._check_slow(self.power_channel, "MW", "power_channel")
+        self._check_simulation()
         return self
 
-    def _check_slow(self, where: str, id_: str | None, unit: str) -> None:
-        if id_ is None:
-            return
+    def _check_channels(self, number: int, bearing: BearingSettings) -> None:
+        known = [channel.id for channel in self.channel]
+        used = [(key, getattr(bearing, key)) for key in CHANNEL_KEYS]
+        for key, id_ in used:
+            if id_ not in known:
+                raise MisfitError(_not_among(known), "bearing", number, key)
+        refuse_twice(("bearing", number, key, id_) for key, id_ in used)
+
+    def _check_slow(self, id_: str | None, unit: str, *at: int | str) -> None:
         units = {channel.id: channel.unit for channel in self.slow_channel}
-        _refuse_unknown(where, [id_], list(units))
-        if units[id_] != unit:
-            raise ValueError(f'{where} uses slow channel "{id_}" in {units[id_]}, needs {unit}')
+        if id_ is not None and id_ not in units:
+            raise MisfitError(_not_among(units), *at)
+        if id_ is not None and units[id_] != unit:
+            raise MisfitError(f"is a slow channel in {units[id_]}, needed is one in {unit}", *at)
+
+    def _check_simulation(self) -> None:
+        simulation = self.simulation
+        if simulation is None:
+            if isinstance(self.source, SimulatedSettings):
+                raise MisfitError("needs a [unit.simulation] table", "source", "kind")
+            return
+        names = [bearing.bearing for bearing in simulation.bearing]
+        for number, bearing in enumerate(self.bearing):
+            if bearing.id not in names:
+                allowed = " or ".join(names)
+                raise MisfitError(f"a simulated bearing is {allowed}", "bearing", number, "id")
+        cutoff_hz = simulation.hydraulic_cutoff_hz
+        if cutoff_hz is not None and cutoff_hz >= self.rate_hz / 2:
+            limit = f"must be below half the sampling rate, {self.rate_hz / 2:g} Hz"
+            raise MisfitError(limit, "simulation", "hydraulic_cutoff_hz")
 
 
-def _refuse_duplicates(what: str, ids: Iterable[str]) -> None:
-    seen: set[str] = set()
-    for id_ in ids:
-        if id_ in seen:
-            raise ValueError(f'{what} "{id_}" is used twice; each must be unique')
-        seen.add(id_)
-
-
-def _refuse_unknown(where: str, used: Sequence[str], known: Sequence[str]) -> None:
-    for id_ in used:
-        if id_ not in known:
-            raise ValueError(
-                f'{where} names channel "{id_}", which is not among {", ".join(known) or "none"}'
-            )
+def _not_among(known: Iterable[str]) -> str:
+    return f"no such channel; there are {', '.join(known) or 'none'}"

@@ -1,0 +1,271 @@
+"""A wrong plant file is refused with line, key, value and what is allowed."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from service.settings.loading import MAX_FILE_BYTES, PlantFileError, load_plant_file
+
+Changed = Callable[[str, str], tuple[str, int]]
+Mistakes = Callable[[str | bytes], list[str]]
+
+UNIT_1 = "unit[1]."
+CHANNEL_1 = "unit[1].channel[1]."
+UJB = "unit[1].bearing[1]."
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "said"),
+    [
+        ("= 1.18e9", "= 1.18", f"{UJB}bracket_stiffness_n_per_m = 1.18", "between 1e7 and 1e12"),
+        ("= 200.0\ngap", "= nan\ngap", f"{UJB}clearance_um = nan", "finite number"),
+        ("= 200.0\ngap", "= -inf\ngap", f"{UJB}clearance_um = -inf", "finite number"),
+        ("= 200.0\ngap", "= 0.2\ngap", f"{UJB}clearance_um = 0.2", "20 to 5000"),
+        ("[2000.0, 2000.0]", "[2000.0, nan]", f"{UJB}gap_reference_um[2] = nan", "finite"),
+        ("[2000.0, 2000.0]", "[2.0e3]", f"{UJB}gap_reference_um[2]", "missing"),
+        ("= 4.0\n", "= 4000.0\n", f"{CHANNEL_1}sensitivity = 4000.0", "0.5 to 50 V/mm"),
+        ("= 4.0\n", "= 0.0\n", f"{CHANNEL_1}sensitivity = 0.0", "0.5 to 50 V/mm"),
+        ('"V/mm"', '"mV/g"', f"{CHANNEL_1}sensitivity_unit = 'mV/g'", '"V/mm" or "mV/um"'),
+        ('"V/mm"', '"V/m"', f"{CHANNEL_1}sensitivity_unit = 'V/m'", "'mV/(m/s2)'"),
+        ("min_v = 1.0", "min_v = 11.0", f"{CHANNEL_1}ok_min_v = 11.0", "below ok_max_v 11"),
+        ("= 600.0", "= true", f"{UNIT_1}rate_hz = true", "valid number"),
+        ("= 600.0", '= "600"', f"{UNIT_1}rate_hz = '600'", "valid number"),
+        ("= 600.0", "= 2026-11-21", f"{UNIT_1}rate_hz = datetime.date(", "valid number"),
+        ("port = 0", "port = 70000", f"{UNIT_1}source.port = 70000", "65535"),
+        ("port = 0", "port = 502.5", f"{UNIT_1}source.port = 502.5", "integer"),
+        (
+            'kind = "modbus_ring"',
+            'kind = "opc"',
+            f"{UNIT_1}source.kind = 'opc'",
+            "'modbus_ring' or 'simulated'",
+        ),
+        ('id = "U1"', 'id = "U/1"', f"{UNIT_1}id = 'U/1'", "match"),
+        ('id = "U2"', 'id = "U1"', "unit[2].id = 'U1'", "used twice"),
+        ('id = "LJB"', 'id = "UJB"', "unit[1].bearing[2].id = 'UJB'", "used twice"),
+        (
+            'id = "ujb_shaft_y"',
+            'id = "ujb_shaft_x"',
+            "unit[1].channel[2].id = 'ujb_shaft_x'",
+            "used twice",
+        ),
+        (
+            'id = "active_power"',
+            'id = "speed"',
+            "unit[1].slow_channel[2].id = 'speed'",
+            "used twice",
+        ),
+        (
+            'id = "speed"',
+            'id = "ujb_shaft_x"',
+            "unit[1].slow_channel[1].id = 'ujb_shaft_x'",
+            "waveform channel",
+        ),
+        (
+            'shaft_x = "ujb_shaft_x"',
+            'shaft_x = "ujb_shaft_z"',
+            f"{UJB}shaft_x = 'ujb_shaft_z'",
+            "there are ujb_shaft_x, ujb_shaft_y",
+        ),
+        (
+            'bearing_x = "ujb_bearing_x"',
+            'bearing_x = "ujb_shaft_x"',
+            f"{UJB}bearing_x = 'ujb_shaft_x'",
+            "used twice",
+        ),
+        (
+            'speed_channel = "speed"',
+            'speed_channel = "rpm"',
+            f"{UNIT_1}speed_channel = 'rpm'",
+            "there are speed, active_power",
+        ),
+        (
+            'oil_temperature = "ujb_oil_temperature"',
+            'oil_temperature = "speed"',
+            f"{UJB}oil_temperature = 'speed'",
+            "needed is one in degC",
+        ),
+        ("minimum = 0.0", "minimum = 200.0", "unit[1].slow_channel[1].minimum = 200.0", "maximum"),
+        ('"127.0.0.1"', '"0.0.0.0"', "service.host = '0.0.0.0'", "not loopback"),
+        ("seed = 1\n", "seed = -1\n", "unit[1].simulation.seed = -1", "greater than or equal to 0"),
+        (
+            'bearing = "LJB"',
+            'bearing = "UJB"',
+            "unit[1].simulation.bearing[2].bearing = 'UJB'",
+            "used twice",
+        ),
+        ('id = "UJB"', 'id = "GEN"', f"{UJB}id = 'GEN'", "UJB or LJB or TJB"),
+        (
+            "cutoff_hz = 20.0",
+            "cutoff_hz = 300.0",
+            "unit[1].simulation.hydraulic_cutoff_hz = 300.0",
+            "300 Hz",
+        ),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_line_key_value_and_what_is_allowed(
+    changed: Changed, mistakes: Mistakes, old: str, new: str, key: str, said: str
+) -> None:
+    text, line = changed(old, new)
+
+    found = mistakes(text)[0]
+
+    assert found.startswith(f"{line}: {key}")
+    assert said in found
+
+
+@pytest.mark.parametrize(
+    ("settings", "key", "said"),
+    [
+        ("vortex_order = 0.45", "vortex_order = 0.45", "[0.2, 0.4]"),
+        ("vortex_band = [0.3, 0.4]", "vortex_order (by default)", "[0.3, 0.4]"),
+        ("vortex_band = [0.4, 0.2]", "vortex_band = [0.4, 0.2]", "0.05 to 0.95"),
+        ("segment_samples = 1024", "segment_samples = 1024", "8 turns at rated speed, 3121"),
+        ("max_frequency_hz = 3.0", "max_frequency_hz = 3.0", "3.07667 Hz"),
+        ("max_frequency_hz = 300", "max_frequency_hz = 300", "below half the sampling rate"),
+        ("n_segments = 3", "min_segments (by default)", "n_segments 3"),
+        ("overlap = 1.0", "overlap = 1.0", "0.9"),
+    ],
+)
+def test_an_analysis_that_cannot_tell_the_lines_apart_is_refused(
+    plant_text: str, mistakes: Mistakes, settings: str, key: str, said: str
+) -> None:
+    line = plant_text.count("\n") + 2
+    [found] = mistakes(f"{plant_text}[analysis]\n{settings}\n")
+
+    where = line if settings.startswith(key.split(" ")[0]) else line - 1
+    assert found.startswith(f"{where}: analysis.{key}")
+    assert said in found
+
+
+@pytest.mark.parametrize(
+    ("line_of_file", "key"),
+    [
+        ("bracket_stiffness_n_per_m = 1.18e9\n", f"{UJB}bracket_stiffness_n_per_m"),
+        ("rated_speed_rpm = 92.3\n", f"{UNIT_1}rated_speed_rpm"),
+        ("full_scale_v = 12.0\n", f"{CHANNEL_1}full_scale_v"),
+        ('kind = "modbus_ring"\n', f"{UNIT_1}source.kind"),
+    ],
+)
+def test_a_missing_key_is_named_at_the_table_that_lacks_it(
+    plant_text: str, changed: Changed, mistakes: Mistakes, line_of_file: str, key: str
+) -> None:
+    text, line = changed(line_of_file, "")
+    header = max(n for n, at in enumerate(plant_text.split("\n"), 1) if at[:1] == "[" and n <= line)
+
+    [found] = mistakes(text)
+
+    assert found.startswith(f"{header}: {key} is missing")
+
+
+def test_an_unknown_key_is_named_with_the_keys_that_are_known_there(
+    changed: Changed, mistakes: Mistakes
+) -> None:
+    text, line = changed("= 1.18e9", '= 1.18e9\nbracket_stiffnes = "soft"')
+
+    [found] = mistakes(text)
+
+    assert found.startswith(f"{line + 1}: {UJB}bracket_stiffnes = 'soft': unknown key")
+    assert "bracket_stiffness_n_per_m, clearance_um" in found
+
+
+def test_a_bearing_under_its_own_unknown_table_is_no_bearing(
+    changed: Changed, mistakes: Mistakes
+) -> None:
+    text, line = changed("[[unit.bearing]]", "[[unit.bearings]]")
+
+    [found] = mistakes(text)
+
+    assert found.startswith(f"{line}: unit[1].bearings = ")
+
+
+def test_several_mistakes_are_all_named_at_once(plant_text: str, mistakes: Mistakes) -> None:
+    text = plant_text.replace("= 1.18e9", "= 1.18").replace('"V/mm"', '"V/m"', 3)
+    text = text.replace('name = "Demo plant"', 'nmae = "Demo plant"')
+
+    found = mistakes(text)
+
+    assert len(found) == 2 + 3 + 2
+    assert sum("bracket_stiffness_n_per_m = 1.18:" in line for line in found) == 2
+    assert sum("sensitivity_unit = 'V/m'" in line for line in found) == 3
+    assert any("plant.name is missing" in line for line in found)
+    assert any("plant.nmae = 'Demo plant': unknown key" in line for line in found)
+
+
+def test_lines_are_counted_as_editors_count_them(plant_text: str, mistakes: Mistakes) -> None:
+    text = f"# a comment with \u2028 and \x85\r\n{plant_text.replace('= 1.18e9', '= 1.18', 1)}"
+
+    [found] = mistakes(text)
+
+    line = plant_text[: plant_text.index("= 1.18e9")].count("\n") + 2
+    assert found.startswith(f"{line}: {UJB}bracket_stiffness_n_per_m")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("= 600.0", "= = 600.0", "not TOML: Invalid value (column"),
+        ("= 600.0", "= 600.0\nrate_hz = 601.0", "not TOML: Cannot overwrite a value"),
+        ('"Unit 1, part load"', '"Unit 1', "not TOML"),
+    ],
+)
+def test_a_file_that_is_not_toml_is_refused_with_the_line(
+    changed: Changed, mistakes: Mistakes, old: str, new: str, said: str
+) -> None:
+    text, line = changed(old, new)
+
+    [found] = mistakes(text)
+
+    assert said in found
+    assert int(found.split(":")[0]) == line + new.count("\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("9" * 5000, "an integer of thousands of digits"),
+        ("9" * 400, "finite number"),
+        ("[" * 5000 + "]" * 5000, "nested too deeply"),
+        ("[" * 240 + "]" * 240, "nested too deeply"),
+    ],
+    ids=["5000 digits", "400 digits", "5000 brackets", "240 brackets"],
+)
+def test_a_monstrous_value_is_refused_in_a_short_line(
+    changed: Changed, mistakes: Mistakes, value: str, said: str
+) -> None:
+    text, _ = changed("= 600.0", f"= {value}")
+
+    [found] = mistakes(text)
+
+    assert said in found
+    assert len(found) < 300
+
+
+def test_a_file_that_is_not_utf_8_is_refused_with_the_line(
+    plant_text: str, mistakes: Mistakes
+) -> None:
+    latin_1 = plant_text.replace('"Demo plant"', '"Tucuruí"').encode("latin-1")
+
+    [found] = mistakes(latin_1)
+
+    assert found.startswith(f"{plant_text[: plant_text.index('Demo plant')].count(chr(10)) + 1}: ")
+    assert "not UTF-8" in found
+
+
+def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    for path, said in (
+        (tmp_path / "absent.toml", "No such file"),
+        (tmp_path, "Is a directory"),
+        (Path("/dev/zero"), f"larger than {MAX_FILE_BYTES} bytes"),
+    ):
+        with pytest.raises(PlantFileError, match=said) as refusal:
+            load_plant_file(path)
+        assert str(refusal.value).startswith(f"{path}: ")
+        assert "\n" not in str(refusal.value)
+
+
+def test_an_empty_file_lacks_the_plant_and_its_units(mistakes: Mistakes) -> None:
+    assert [line.split(" — ")[0] for line in mistakes("")] == [
+        "1: plant is missing",
+        "1: unit is missing",
+    ]
