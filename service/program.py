@@ -51,7 +51,9 @@ def listen(host: str, port: int) -> socket.socket:
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        raise PortInUseError(f"cannot listen on {host} port {port}: {error.strerror}") from error
+        # what Python adds in brackets repeats the address
+        why = (error.strerror or str(error)).partition(" (")[0]
+        raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
 async def run_service(

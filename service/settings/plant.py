@@ -107,7 +107,7 @@ class PlantFile(Settings):
     """The plant."""
 
     service: ServiceSettings = ServiceSettings()
-    """The running program."""
+    """HTTP server and data folder of the running program."""
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments and averaging."""

@@ -18,17 +18,17 @@ def deploy() -> Path:
 
 @pytest.fixture
 def plant_text() -> str:
-    """The example plant file."""
-    return (DEPLOY / "plant.toml").read_text(encoding="utf-8")
+    """The demonstration plant: two units, each with channels, bearings and simulation."""
+    return (DEPLOY / "demo.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture
 def changed(plant_text: str) -> Callable[[str, str], tuple[str, int]]:
-    """Changes the first occurrence of a text in the example; also tells on which line that is."""
+    """Changes the first occurrence of a text in that file; also tells on which line that is."""
 
     def change(old: str, new: str) -> tuple[str, int]:
         before, found, after = plant_text.partition(old)
-        assert found, f"the example has no {old!r}"
+        assert found, f"the file has no {old!r}"
         return before + new + after, before.count("\n") + 1
 
     return change

@@ -98,7 +98,7 @@ def test_the_shortest_segment_a_file_may_ask_for_gives_results(plant_text: str) 
 def test_no_plant_file_ever_yields_anything_but_a_plant_or_a_refusal(
     tmp_path: Path, choose: random.Random, values: list[Any]
 ) -> None:
-    data = tomllib.loads((DEPLOY / "plant.toml").read_text(encoding="utf-8"))
+    data = tomllib.loads((DEPLOY / "demo.toml").read_text(encoding="utf-8"))
     data["unit"] = data["unit"][:1]
     for value in values:
         _mutate(data, value, choose)
