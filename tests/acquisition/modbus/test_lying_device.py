@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.client import LinkSettings, RegisterLink
 
 
 def changed(position: int, delta: int):
@@ -166,3 +167,22 @@ async def test_only_reads_are_seen_on_the_wire(hostile, device, source_at):
             device.produce(9)
     assert {request[7] for request in hostile.requests} == {3, 4}
     assert all(int.from_bytes(request[10:12], "big") <= 125 for request in hostile.requests)
+
+
+async def test_a_device_that_hangs_up_is_noticed_before_the_time_out(hostile, source_at):
+    hostile.lie = closed_at_once
+    with pytest.raises(LinkError, match="the device closed the connection"):
+        async with source_at(hostile.port).connect():
+            pass
+
+
+async def test_after_a_missed_reply_the_link_is_closed_so_that_it_meets_nobody(hostile):
+    link = RegisterLink(LinkSettings(host="127.0.0.1", port=hostile.port, timeout_s=0.1))
+    await link.open()
+    hostile.lie = too_late
+    with pytest.raises(LinkError):
+        await link.read(0, 16)
+    hostile.lie = None
+    with pytest.raises(LinkError, match="closed"):
+        await link.read(0, 16)
+    assert len(hostile.requests) == 1

@@ -311,3 +311,34 @@ async def test_slots_with_padding_between_them_are_read_one_by_one(counting_feed
         device.produce(3)
         block = await anext(stream)
     np.testing.assert_array_equal(block.samples[0], np.arange(50, 200))
+
+
+async def test_more_slow_values_than_fit_one_read_arrive_in_order(
+    counting_feed, counts_calibration, source_at
+):
+    device = RingDevice(counting_feed(n_channels=3, slow=tuple(float(i) for i in range(80))))
+    async with ModbusRingServer(device) as server:
+        source = source_at(server.port, calibration=counts_calibration(n_channels=3, n_slow=80))
+        async with source.connect() as stream:
+            block = await anext(stream)
+    assert [reading.value for reading in block.slow.values()] == list(range(80))
+
+
+async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(
+    device, server, source_at, stepped_clock
+):
+    source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0)
+    polled_at_s = []
+
+    def note(address, _):
+        if address == 0:
+            polled_at_s.append(stepped_clock.monotonic_s())
+            device.produce(1)
+            if len(polled_at_s) == 4:
+                stepped_clock.step(7.3)  # a consumer or a device that takes its time
+
+    async with source.connect() as stream:
+        device.memory.before_read = note
+        for _ in range(6):
+            await anext(stream)
+    assert polled_at_s == pytest.approx([0.0, 1.0, 2.0, 3.0, 10.3, 11.3])
