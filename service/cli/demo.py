@@ -13,6 +13,7 @@ import typer
 from service.cli.examples import DEMO, example_path
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import run_plant
+from service.cli.terminal import terminal_to_itself
 from service.settings.plant import PlantFile
 from service.settings.units import ModbusRingSettings
 
@@ -31,7 +32,7 @@ def demo(
     if data_folder is not None:
         service = plant.service.model_copy(update={"data_folder": str(data_folder)})
         plant = plant.model_copy(update={"service": service})
-    with _daq(path) as ports:
+    with terminal_to_itself(), _daq(path) as ports:
         typer.echo("padwatch: simulated DAQs on loopback, ports " + _listed(ports))
         run_plant(_with_ports(plant, ports), port)
 
