@@ -6,9 +6,7 @@ import pytest
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
-from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.profile import RingHeader, encode_header, encode_slot
-from acquisition.modbus.ring_source import ModbusRingSettings
 from core.blocks import Rejection
 from core.quality import Reason
 
@@ -191,65 +189,6 @@ async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
     assert after.rejected == (Rejection("inconsistent_index", 50),)
 
 
-async def test_a_device_that_stands_still_is_not_connected(
-    device, server, source_at, stepped_clock
-):
-    source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0, stale_after_s=5.0)
-    async with source.connect() as stream:
-        await anext(stream)
-        device.frozen = True
-        with pytest.raises(LinkError, match="stand still"):
-            await anext(stream)
-    with pytest.raises(LinkError, match="stand still"):
-        async with source.connect():
-            pass
-    device.frozen = False
-    device.produce(1)
-    async with source.connect() as stream:
-        assert (await anext(stream)).first_index == 50
-
-
-async def test_a_device_that_counts_but_writes_nothing_is_not_connected(
-    device, server, source_at, stepped_clock
-):
-    source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0, stale_after_s=5.0)
-    async with source.connect() as stream:
-        await anext(stream)
-        device.memory.before_read = lambda address, _: address or device.produce(1, faults.dropped)
-        with pytest.raises(LinkError, match="no usable slot"):
-            await anext(stream)
-
-
-@pytest.mark.parametrize(
-    ("expected", "complaint"),
-    [
-        ({"n_channels": 4}, "n_channels is 3, expected 4"),
-        ({"n_channels": 3, "rate_hz": 500.0}, "rate in mHz is 600000, expected 500000"),
-        ({"n_channels": 3, "n_slow": 3}, "n_slow is 2, expected 3"),
-    ],
-)
-async def test_another_device_than_configured_is_refused_with_found_and_expected(
-    expected, complaint, server, source_at, counts_calibration
-):
-    source = source_at(server.port, calibration=counts_calibration(**expected))
-    with pytest.raises(ConfigError, match=complaint):
-        async with source.connect():
-            pass
-
-
-async def test_a_device_without_a_ring_is_refused(device, server, source_at):
-    device.memory.clear()
-    with pytest.raises(ConfigError, match="magic is 0x0000, expected 0x5057"):
-        async with source_at(server.port).connect():
-            pass
-
-
-async def test_a_wrong_base_address_is_a_config_error_and_not_a_lost_link(server, source_at):
-    with pytest.raises(ConfigError, match="illegal address"):
-        async with source_at(server.port, base_address=40000).connect():
-            pass
-
-
 async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(counting_feed, source_at):
     feed = counting_feed(n_channels=3)
     device = RingDevice(feed)
@@ -265,42 +204,6 @@ async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(counti
         Reason.SENSOR_FAILURE,
         Reason.OK,
     ]
-
-
-async def test_input_registers_and_small_reads_bring_the_same_samples(device, server, source_at):
-    source = source_at(server.port, function=4, max_registers=7)
-    async with source.connect() as stream:
-        await anext(stream)
-        device.produce(2)
-        block = await anext(stream)
-    np.testing.assert_array_equal(block.samples[0], np.arange(50, 150))
-    assert set(server.function_codes) == {4}
-
-
-async def test_only_reads_reach_the_device_whatever_it_does(device, server, source_at):
-    source = source_at(server.port)
-    for fault in (faults.torn, faults.dropped, faults.wrong_index):
-        async with source.connect() as stream:
-            device.produce(1, fault)
-            device.produce(1)
-            await anext(stream)
-    device.restart()
-    async with source.connect() as stream:
-        await anext(stream)
-    assert set(server.function_codes) == {3}
-
-
-@pytest.mark.parametrize(
-    ("wrong", "complaint"),
-    [
-        ({"base_address": 65521}, "base_address is 65521, allowed is 0 to 65520"),
-        ({"poll_period_s": 0.0}, "poll_period_s is 0.0, must be above 0"),
-        ({"stale_after_s": float("inf")}, "stale_after_s is inf"),
-    ],
-)
-def test_ring_settings_are_refused_with_value_and_limit(wrong, complaint):
-    with pytest.raises(ConfigError, match=complaint):
-        ModbusRingSettings(host="127.0.0.1", **wrong)
 
 
 async def test_slots_with_padding_between_them_are_read_one_by_one(counting_feed, source_at):
@@ -322,23 +225,3 @@ async def test_more_slow_values_than_fit_one_read_arrive_in_order(
         async with source.connect() as stream:
             block = await anext(stream)
     assert [reading.value for reading in block.slow.values()] == list(range(80))
-
-
-async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(
-    device, server, source_at, stepped_clock
-):
-    source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0)
-    polled_at_s = []
-
-    def note(address, _):
-        if address == 0:
-            polled_at_s.append(stepped_clock.monotonic_s())
-            device.produce(1)
-            if len(polled_at_s) == 4:
-                stepped_clock.step(7.3)  # a consumer or a device that takes its time
-
-    async with source.connect() as stream:
-        device.memory.before_read = note
-        for _ in range(6):
-            await anext(stream)
-    assert polled_at_s == pytest.approx([0.0, 1.0, 2.0, 3.0, 10.3, 11.3])
