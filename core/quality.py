@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from itertools import compress
 from statistics import fmean
 
 
@@ -82,9 +83,12 @@ def missing(reason: Reason) -> Reading:
     return Reading(None, bad(reason))
 
 
-def mean_reading(readings: Sequence[Reading]) -> Reading:
+def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
     """Mean of the usable readings; when the newest is not usable, nothing is."""
     if readings[-1].value is None:
         return readings[-1]
+    usable = [reading.value is not None for reading in readings]
     values = [reading.value for reading in readings if reading.value is not None]
-    return Reading(fmean(values), worst(r.quality for r in readings if r.value is not None))
+    counted = None if weights is None else list(compress(weights, usable))
+    quality = worst(reading.quality for reading in compress(readings, usable))
+    return Reading(fmean(values, counted), quality)

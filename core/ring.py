@@ -63,7 +63,10 @@ class _Stretch:
     slow: Mapping[str, Reading]
 
     def overlaps(self, first_index: int, stop_index: int) -> bool:
-        return self.first_index < stop_index and self.stop_index > first_index
+        return self.n_within(first_index, stop_index) > 0
+
+    def n_within(self, first_index: int, stop_index: int) -> int:
+        return min(self.stop_index, stop_index) - max(self.first_index, first_index)
 
 
 class Ring:
@@ -129,6 +132,7 @@ class Ring:
             raise LookupError(f"samples {first_index} to {stop_index} are not in the ring")
         where = np.arange(first_index, stop_index) % self._capacity
         stretches = [s for s in self._stretches if s.overlaps(first_index, stop_index)]
+        n_samples = [s.n_within(first_index, stop_index) for s in stretches]
         reference = stretches[0]
         offset_s = (first_index - reference.first_index) / reference.rate_hz
         return Window(
@@ -141,7 +145,10 @@ class Ring:
                 worst(qualities)
                 for qualities in zip(*(s.channel_quality for s in stretches), strict=True)
             ),
-            slow={id_: mean_reading([s.slow[id_] for s in stretches]) for id_ in reference.slow},
+            slow={
+                id_: mean_reading([s.slow[id_] for s in stretches], n_samples)
+                for id_ in reference.slow
+            },
         )
 
     def _gap_before(self, block: SampleBlock) -> Gap | None:

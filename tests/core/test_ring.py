@@ -116,6 +116,7 @@ def test_a_window_has_the_worst_quality_and_the_mean_slow_reading_of_its_time() 
     window = ring.read(10, 30)
     assert window.channel_quality == (GOOD, GOOD)
     assert window.slow["oil"].value == 45.0
+    assert ring.read(15, 30).slow["oil"].value == pytest.approx((5 * 40.0 + 10 * 50.0) / 15)
     assert ring.read(9, 30).channel_quality == (bad(Reason.CLIPPED), GOOD)
 
 
