@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from itertools import compress
-from statistics import fmean
 
 
 class Level(IntEnum):
@@ -87,8 +85,13 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
     """Mean of the usable readings; when the newest is not usable, nothing is."""
     if readings[-1].value is None:
         return readings[-1]
-    usable = [reading.value is not None for reading in readings]
-    values = [reading.value for reading in readings if reading.value is not None]
-    counted = None if weights is None else list(compress(weights, usable))
-    quality = worst(reading.quality for reading in compress(readings, usable))
-    return Reading(fmean(values, counted), quality)
+    counted = [
+        (reading.value, weight)
+        for reading, weight in zip(readings, weights or [1.0] * len(readings), strict=True)
+        if reading.value is not None
+    ]
+    quality = worst(reading.quality for reading in readings if reading.value is not None)
+    # about the newest value, so that a reading that stands still stays the same to the last bit
+    newest = counted[-1][0]
+    shift = sum(weight * (value - newest) for value, weight in counted)
+    return Reading(newest + shift / sum(weight for _, weight in counted), quality)
