@@ -181,10 +181,10 @@ class BearingResults:
         coherence = float(self._orders.coherence(shaft, bearing)[line])
         shown = missing(Reason.FEW_SEGMENTS) if few else Reading(coherence, quality)
         excited = (
-            self._stands_out(line, shaft) and self._stands_out(line, bearing)
-            if few
-            else coherence >= self._settings.min_coherence
+            self._stands_out(line, bearing) if few else coherence >= self._settings.min_coherence
         )
+        if few or line == VORTEX:  # what is no line must not be read as the vortex's
+            excited = excited and self._stands_out(line, shaft)
         ratio = float(self._orders.amplitude_ratio(bearing, shaft)[line])
         if not excited or ratio <= 0.0:
             return missing(Reason.INSUFFICIENT_EXCITATION), shown

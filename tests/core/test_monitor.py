@@ -107,6 +107,16 @@ def test_without_a_vortex_there_is_no_stiffness_there(
     assert newest.readings["order1_k_eff_xx_n_per_m"].value is not None
 
 
+def test_coherent_noise_without_a_line_is_no_vortex(monitor: UnitMonitor, blocks) -> None:
+    """Full load: hydraulic noise moves shaft and bearing together at every frequency."""
+    signals = machine_signals(200.0)
+    common = np.random.default_rng(8).normal(size=signals.shape[1])
+    signals += np.array([[-6.0], [-6.0], [2.0], [2.0]]) * common
+    newest = watch(monitor, list(blocks(signals)))[-1].readings
+    assert newest["vortex_coherence_xx"].value > 0.95
+    assert newest["vortex_k_eff_xx_n_per_m"].quality == bad(Reason.INSUFFICIENT_EXCITATION)
+
+
 def test_transducer_noise_alone_never_makes_a_stiffness(unit: Unit, blocks) -> None:
     """A standing machine whose speed channel still says 92.3: 40 seeds, no number ever."""
     for seed in range(40):
