@@ -16,6 +16,8 @@ LevelArray = npt.NDArray[np.uint8]
 NICE_WIDTHS_S = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600)
 NICE_WIDTHS_NS = tuple(width * 1_000_000_000 for width in NICE_WIDTHS_S)
 DAY_NS = 86_400_000_000_000
+MAX_DAYS = (2**63 - 1) // DAY_NS
+"""Wider than that does not fit the nanoseconds; two of them hold all time since 1970."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int) -> int:
     for width in NICE_WIDTHS_NS:
         if width >= needed:
             return width
-    return -(-needed // DAY_NS) * DAY_NS
+    return min(-(-needed // DAY_NS), MAX_DAYS) * DAY_NS
 
 
 def single_points(readings: Readings, hole_ns: int) -> Trend:
@@ -84,6 +86,9 @@ def _bucket_series(
     total = np.add.reduceat(np.where(usable, value, 0.0), starts)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
 
+    lowest, highest = np.fmin.reduceat(value, starts), np.fmax.reduceat(value, starts)
+    mean = np.clip(mean, lowest, highest)  # rounding may carry a mean past equal values
+
     def spread(per_bucket: npt.NDArray[np.float64]) -> list[float | None]:
         everywhere = np.full(n_buckets, np.nan)
         everywhere[filled] = per_bucket
@@ -94,8 +99,8 @@ def _bucket_series(
     levels = np.full(n_buckets, -1)
     levels[filled] = np.maximum.reduceat(level, starts)
     return TrendSeries(
-        minimum=spread(np.fmin.reduceat(value, starts)),
-        maximum=spread(np.fmax.reduceat(value, starts)),
+        minimum=spread(lowest),
+        maximum=spread(highest),
         mean=spread(mean),
         count=counts.tolist(),
         worst_level=_levels(levels),

@@ -28,6 +28,13 @@ MAX_ROWS = 1_000_000
 
 BUSY_TIMEOUT_S = 5.0
 
+INSERT_ASSESSMENT = """
+    INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)
+    ON CONFLICT (series, time_ns) DO NOTHING
+"""
+INSERT_GAP = "INSERT INTO gap VALUES (?,?,?,?,?) ON CONFLICT DO NOTHING"
+"""Not OR IGNORE, which would silently drop a row that breaks any other rule, too."""
+
 MATCHING = """
     FROM assessment
     WHERE series = (SELECT id FROM series WHERE unit = :unit AND bearing = :bearing)
@@ -61,18 +68,16 @@ class SqliteStore:
         self._path = path
         self._lock = Lock()
         self._layout = Layout.of(tuple(quantity.name for quantity in CATALOGUE))
-        try:
+        with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._writer = sqlite3.connect(
                 path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
             )
-            self._writer.execute("PRAGMA journal_mode = WAL")
-            self._writer.execute("PRAGMA synchronous = FULL")
-            self._writer.execute("PRAGMA foreign_keys = ON")
-            migrate(self._writer, str(path))
-            self._layout_id = self._remember_layout()
-        except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"{path}: {error}") from error
+            try:
+                self._layout_id = self._prepare()
+            except BaseException:
+                self._writer.close()
+                raise
 
     def close(self) -> None:
         """Release the file; closing twice is fine."""
@@ -87,29 +92,18 @@ class SqliteStore:
         StoreError
             If nothing was written; the message is the database's.
         """
-        with self._lock:
-            try:
-                with self._transaction():
-                    self._writer.executemany(
-                        "INSERT OR IGNORE INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)",
-                        [self._row(assessment) for assessment in assessments],
-                    )
-                    self._writer.executemany(
-                        "INSERT OR IGNORE INTO gap VALUES (?,?,?,?,?)",
-                        [
-                            (g.unit, g.gap.epoch, g.gap.first_index, g.gap.n_samples, g.gap.stop_ns)
-                            for g in gaps
-                        ],
-                    )
-            except sqlite3.Error as error:
-                raise StoreError(f"{self._path}: {error}") from error
+        with self._lock, self._renamed_errors(), self._transaction():
+            rows = [self._row(assessment) for assessment in assessments]
+            self._writer.executemany(INSERT_ASSESSMENT, rows)
+            self._writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
 
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
         readings = self._readings(query)
         if readings.time_ns.size <= query.max_points:
             return single_points(readings, query.hole_ns)
-        return bucketed(readings, bucket_width_ns(query.start_ns, query.end_ns, query.max_points))
+        start_ns, end_ns = _storable(query.start_ns), _storable(query.end_ns)
+        return bucketed(readings, bucket_width_ns(start_ns, end_ns, query.max_points))
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
         """Read the recorded gaps whose end lies in a range of time, oldest first."""
@@ -117,7 +111,7 @@ class SqliteStore:
             rows = reader.execute(
                 "SELECT epoch, first_index, n_samples, stop_ns FROM gap"
                 " WHERE unit = ? AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index",
-                (unit, start_ns, end_ns),
+                (unit, _storable(start_ns), _storable(end_ns)),
             )
             return [Gap(*row) for row in rows]
 
@@ -141,15 +135,24 @@ class SqliteStore:
 
     def _series_id(self, unit: str, bearing: str) -> int:
         key = (unit, bearing)
-        self._writer.execute("INSERT OR IGNORE INTO series (unit, bearing) VALUES (?, ?)", key)
+        self._writer.execute(
+            "INSERT INTO series (unit, bearing) VALUES (?, ?) ON CONFLICT DO NOTHING", key
+        )
         found = self._writer.execute("SELECT id FROM series WHERE unit = ? AND bearing = ?", key)
         return int(found.fetchone()[0])
+
+    def _prepare(self) -> int:
+        """Bring the file up to date; return the number of the layout that is written."""
+        migrate(self._writer, str(self._path))  # first: a file that is not ours stays as it is
+        for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+            self._writer.execute(f"PRAGMA {setting}")
+        return self._remember_layout()
 
     def _remember_layout(self) -> int:
         key = self._layout.dumps()
         with self._transaction():
             self._writer.execute(
-                "INSERT OR IGNORE INTO layout (quantities, reasons) VALUES (?, ?)", key
+                "INSERT INTO layout (quantities, reasons) VALUES (?, ?) ON CONFLICT DO NOTHING", key
             )
         found = self._writer.execute(
             "SELECT id FROM layout WHERE quantities = ? AND reasons = ?", key
@@ -176,27 +179,45 @@ class SqliteStore:
         self._writer.execute("BEGIN IMMEDIATE")
         try:
             yield
-        except BaseException:
-            self._writer.execute("ROLLBACK")
-            raise
-        self._writer.execute("COMMIT")
+            self._writer.execute("COMMIT")
+        finally:
+            # a full disk has rolled back already; a refused commit leaves the transaction open
+            if self._writer.in_transaction:
+                self._writer.execute("ROLLBACK")
 
     @contextmanager
     def _reader(self) -> Iterator[sqlite3.Connection]:
         uri = f"{self._path.absolute().as_uri()}?mode=ro"
+        with (
+            self._renamed_errors(),
+            closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader,
+        ):
+            yield reader
+
+    @contextmanager
+    def _renamed_errors(self) -> Iterator[None]:
         try:
-            with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader:
-                yield reader
-        except sqlite3.Error as error:
+            yield
+        except (OSError, sqlite3.Error) as error:
             raise StoreError(f"{self._path}: {error}") from error
+
+
+def _gap_row(found: UnitGap) -> tuple[object, ...]:
+    gap = found.gap
+    return (found.unit, gap.epoch, gap.first_index, gap.n_samples, gap.stop_ns)
+
+
+def _storable(time_ns: int) -> int:
+    """The nearest time that a row can have: from 1970 to 2262."""
+    return max(0, min(time_ns, 2**63 - 1))
 
 
 def _arguments(query: TrendQuery) -> dict[str, object]:
     return {
         "unit": query.unit,
         "bearing": query.bearing,
-        "start_ns": query.start_ns,
-        "end_ns": query.end_ns,
+        "start_ns": _storable(query.start_ns),
+        "end_ns": _storable(query.end_ns),
         "eccentricity_low": query.eccentricity_ratio.low,
         "eccentricity_high": query.eccentricity_ratio.high,
         "oil_low": query.oil_temperature_c.low,

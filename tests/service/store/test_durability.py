@@ -1,0 +1,283 @@
+"""The database file: what is foreign, newer or damaged is refused, what was appended is there."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from core.assessment import Assessment
+from service.store import schema
+from service.store.port import StoreError, TrendQuery, UnitGap
+from service.store.schema import APPLICATION_ID, MIGRATIONS
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Assessment]
+BuildGap = Callable[..., UnitGap]
+Ask = Callable[..., TrendQuery]
+At = Callable[[int], int]
+
+
+def run_sql(path: Path, script: str) -> None:
+    connection = sqlite3.connect(path)
+    connection.executescript(script)
+    connection.close()
+
+
+def n_rows(path: Path, table: str) -> int:
+    connection = sqlite3.connect(path)
+    try:
+        return int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])  # noqa: S608
+    finally:
+        connection.close()
+
+
+def test_every_append_is_written_through_to_the_disk(store: SqliteStore, path: Path) -> None:
+    synchronous_full = 2
+
+    assert store._writer.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+    assert store._writer.execute("PRAGMA synchronous").fetchone() == (synchronous_full,)
+    assert sqlite3.connect(path).execute("PRAGMA application_id").fetchone() == (APPLICATION_ID,)
+
+
+def test_what_was_appended_survives_kill_9(path: Path, query: Ask) -> None:
+    writer = subprocess.Popen(
+        [sys.executable, "-c", WRITE_AND_WAIT, str(path), str(Path(__file__).parent)],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+    )
+    assert writer.stdout is not None
+    said = writer.stdout.readline()
+    writer.send_signal(signal.SIGKILL)
+    writer.wait()
+    writer.stdout.close()
+    store = SqliteStore(path)
+    trend = store.trend(query("speed_rpm"))
+    store.close()
+
+    assert said == b"appended\n"
+    assert list(trend.series["speed_rpm"].mean) == [float(i) for i in range(100)]
+
+
+WRITE_AND_WAIT = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from conftest import HOP_NS, T0, build_assessment
+from service.store.sqlite import SqliteStore
+store = SqliteStore(Path(sys.argv[1]))
+for i in range(100):
+    store.append([build_assessment(T0 + i * HOP_NS, speed_rpm=float(i))], [])
+print("appended", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_batch_is_stored_whole_or_not_at_all(
+    store: SqliteStore, path: Path, assessment: Build, gap: BuildGap, at: At
+) -> None:
+    run_sql(
+        path,
+        "CREATE TRIGGER refuse BEFORE INSERT ON gap BEGIN SELECT RAISE(ABORT, 'no gaps'); END;",
+    )
+
+    with pytest.raises(StoreError, match=f"{path}: no gaps"):
+        store.append([assessment(at(i), speed_rpm=1.0) for i in range(3)], [gap()])
+    assert n_rows(path, "assessment") == n_rows(path, "series") == 0
+
+    run_sql(path, "DROP TRIGGER refuse")
+    store.append([assessment(at(i), speed_rpm=1.0) for i in range(3)], [gap()])
+    assert (n_rows(path, "assessment"), n_rows(path, "gap")) == (3, 1)
+
+
+def test_a_row_that_breaks_a_rule_is_never_dropped_in_silence(
+    store: SqliteStore, path: Path, gap: BuildGap
+) -> None:
+    with pytest.raises(StoreError, match="NOT NULL"):
+        store.append([], [gap(unit=None)])
+    assert n_rows(path, "gap") == 0
+
+
+def test_a_full_disk_is_an_error_and_the_store_recovers_when_there_is_room(
+    store: SqliteStore, path: Path, assessment: Build, at: At
+) -> None:
+    n_pages = store._writer.execute("PRAGMA page_count").fetchone()[0]
+    store._writer.execute(f"PRAGMA max_page_count = {n_pages}")
+
+    for _ in range(2):
+        with pytest.raises(StoreError, match="full"):
+            store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
+    store._writer.execute("PRAGMA max_page_count = 1000000")
+    store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
+
+    assert n_rows(path, "assessment") == 200
+
+
+def test_a_commit_that_is_refused_leaves_no_transaction_behind(
+    store: SqliteStore, path: Path, assessment: Build
+) -> None:
+    run_sql(
+        path,
+        "CREATE TABLE child (x REFERENCES layout (id) DEFERRABLE INITIALLY DEFERRED);"
+        "CREATE TRIGGER refuse AFTER INSERT ON assessment BEGIN INSERT INTO child VALUES (99); END",
+    )
+    for _ in range(2):
+        with pytest.raises(StoreError, match="FOREIGN KEY"):
+            store.append([assessment(speed_rpm=1.0)], [])
+    run_sql(path, "DROP TRIGGER refuse")
+
+    store.append([assessment(speed_rpm=1.0)], [])
+
+    assert n_rows(path, "assessment") == 1
+
+
+def test_trends_are_read_while_others_are_written(
+    store: SqliteStore, assessment: Build, query: Ask, at: At
+) -> None:
+    n_batches, per_batch = 60, 20
+    lengths: list[int] = []
+    first_written = threading.Event()
+
+    def write() -> None:
+        for batch in range(n_batches):
+            numbers = range(batch * per_batch, (batch + 1) * per_batch)
+            store.append([assessment(at(i), speed_rpm=float(i)) for i in numbers], [])
+            first_written.set()
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    first_written.wait(30)
+    while writer.is_alive():
+        found = store.trend(query("speed_rpm")).series["speed_rpm"].mean
+        assert list(found) == [float(i) for i in range(len(found))]
+        lengths.append(len(found))
+    writer.join()
+
+    assert len(store.trend(query("speed_rpm")).time_ns) == n_batches * per_batch
+    assert lengths == sorted(lengths)
+    assert all(length % per_batch == 0 for length in lengths)
+
+
+def test_a_long_reader_does_not_hold_up_the_writer(
+    store: SqliteStore, path: Path, assessment: Build, at: At
+) -> None:
+    store.append([assessment(at(0), speed_rpm=1.0)], [])
+    reader = sqlite3.connect(path)
+    reader.execute("BEGIN")
+    seen = reader.execute("SELECT count(*) FROM assessment").fetchone()
+
+    store.append([assessment(at(1), speed_rpm=1.0)], [])
+
+    assert seen == reader.execute("SELECT count(*) FROM assessment").fetchone() == (1,)
+    reader.close()
+    assert n_rows(path, "assessment") == 2
+
+
+def test_the_data_are_there_after_a_restart(
+    path: Path, assessment: Build, query: Ask, at: At
+) -> None:
+    for i in range(3):
+        store = SqliteStore(path)
+        store.append([assessment(at(i), speed_rpm=float(i))], [])
+        store.close()
+    store = SqliteStore(path)
+    assert list(store.trend(query()).series["speed_rpm"].mean) == [0.0, 1.0, 2.0]
+    store.close()
+
+
+def test_a_database_of_another_program_is_refused_and_left_as_it_is(path: Path) -> None:
+    path.parent.mkdir()
+    run_sql(path, "CREATE TABLE historian (x); INSERT INTO historian VALUES (1);")
+    before = path.read_bytes()
+
+    with pytest.raises(StoreError, match="is not a padwatch database"):
+        SqliteStore(path)
+
+    assert path.read_bytes() == before
+
+
+def test_a_database_marked_by_another_program_is_refused(path: Path) -> None:
+    path.parent.mkdir()
+    run_sql(path, "PRAGMA application_id = 1234; CREATE TABLE historian (x);")
+
+    with pytest.raises(StoreError, match="is not a padwatch database"):
+        SqliteStore(path)
+
+
+def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(path: Path) -> None:
+    SqliteStore(path).close()
+    run_sql(path, f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
+
+    said = f"schema {len(MIGRATIONS) + 1}, this padwatch knows up to {len(MIGRATIONS)}"
+    with pytest.raises(StoreError, match=said):
+        SqliteStore(path)
+
+
+def test_a_file_that_is_no_database_is_refused(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_bytes(b"speed;power\n92.3;700\n" * 100)
+
+    with pytest.raises(StoreError, match="file is not a database"):
+        SqliteStore(path)
+
+
+def test_a_truncated_database_is_refused(path: Path, assessment: Build, at: At) -> None:
+    store = SqliteStore(path)
+    store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
+    store.close()
+    whole = path.read_bytes()
+
+    for n_bytes in (len(whole) - 4096, len(whole) // 2, 4096, 100, 50):
+        path.write_bytes(whole[:n_bytes])
+        with pytest.raises(StoreError, match=f"{path}: "):
+            SqliteStore(path)
+
+
+def test_a_folder_in_the_place_of_the_database_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="unable to open"):
+        SqliteStore(tmp_path)
+
+
+def test_a_file_in_the_place_of_the_data_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("")
+
+    with pytest.raises(StoreError, match="File exists"):
+        SqliteStore(tmp_path / "data" / "padwatch.sqlite3")
+
+
+def test_a_migration_that_fails_leaves_the_database_as_it_was(
+    path: Path, assessment: Build, query: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = SqliteStore(path)
+    store.append([assessment(speed_rpm=92.3)], [])
+    store.close()
+    broken = "CREATE TABLE more (x); DROP TABLE assessment; CREATE TABLE more (x);"
+    with monkeypatch.context() as next_release:
+        next_release.setattr(schema, "MIGRATIONS", (*MIGRATIONS, broken))
+        with pytest.raises(StoreError, match="table more already exists"):
+            SqliteStore(path)
+
+    store = SqliteStore(path)
+
+    assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
+    store.close()
+
+
+def test_a_migration_keeps_the_data_and_is_done_once(
+    path: Path, assessment: Build, query: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = SqliteStore(path)
+    store.append([assessment(speed_rpm=92.3)], [])
+    store.close()
+    monkeypatch.setattr(schema, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE more (x);"))
+
+    for _ in range(2):
+        store = SqliteStore(path)
+        assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
+        store.close()
+    assert n_rows(path, "more") == 0

@@ -1,0 +1,225 @@
+"""What was appended is read back, to the last bit."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from core.assessment import Assessment
+from core.quality import Level, Quality, Reading, Reason, missing, uncertain
+from core.quantities import CATALOGUE
+from service.store import sqlite
+from service.store.codec import Layout
+from service.store.port import QueryTooLargeError, StoreError, TrendQuery, UnitGap, ValueRange
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Assessment]
+BuildGap = Callable[..., UnitGap]
+Ask = Callable[..., TrendQuery]
+At = Callable[[int], int]
+
+NAMES = tuple(quantity.name for quantity in CATALOGUE)
+
+
+@st.composite
+def readings(draw: st.DrawFn) -> dict[str, Reading]:
+    chosen: dict[str, Reading] = {}
+    for name in NAMES:
+        level, reason = draw(st.sampled_from(Level)), draw(st.sampled_from(Reason))
+        value = None if level is Level.BAD else draw(st.floats(allow_nan=False))
+        chosen[name] = Reading(value, Quality(level, reason))
+    return chosen
+
+
+@given(readings())
+@settings(max_examples=50, deadline=None)
+def test_a_row_decodes_to_the_readings_it_was_made_of(given_: dict[str, Reading]) -> None:
+    layout = Layout.of(NAMES)
+
+    values, qualities = layout.encode(given_)
+    number, level = layout.decode([values], [qualities])
+
+    for column, name in enumerate(NAMES):
+        value = given_[name].value
+        assert np.isnan(number[0, column]) if value is None else number[0, column] == value
+        assert level[0, column] == given_[name].quality.level
+        assert layout.reasons[qualities[column] & 0b111111] == given_[name].quality.reason
+
+
+def test_every_reason_fits_the_quality_byte() -> None:
+    assert len(Reason) <= 64
+
+
+def test_what_was_appended_is_read_back_to_the_last_bit(
+    store: SqliteStore, assessment: Build, query: Ask, at: At
+) -> None:
+    values = [0.6914e9, 0.1 + 0.2, 5e-324, 1.7976931348623157e308, -0.0]
+    store.append([assessment(at(i), speed_rpm=v) for i, v in enumerate(values)], [])
+
+    trend = store.trend(query("speed_rpm"))
+    series = trend.series["speed_rpm"]
+
+    assert trend.bucket_ns is None
+    assert list(trend.time_ns) == [at(i) for i in range(5)]
+    assert series.mean == series.minimum == series.maximum
+    assert [np.float64(v).tobytes() for v in series.mean if v is not None] == [
+        np.float64(v).tobytes() for v in values
+    ]
+    assert list(series.count) == [1] * 5
+
+
+def test_a_missing_value_stays_missing_and_a_doubtful_one_doubtful(
+    store: SqliteStore, assessment: Build, query: Ask, at: At
+) -> None:
+    doubtful = Reading(92.3, uncertain(Reason.SPEED_UNKNOWN))
+    store.append(
+        [
+            assessment(at(0), speed_rpm=92.3),
+            assessment(at(1), speed_rpm=doubtful),
+            assessment(at(2), speed_rpm=missing(Reason.STANDSTILL)),
+        ],
+        [],
+    )
+
+    series = store.trend(query("speed_rpm")).series["speed_rpm"]
+
+    assert list(series.mean) == [92.3, 92.3, None]
+    assert list(series.count) == [1, 1, 0]
+    assert list(series.worst_level) == [Level.GOOD, Level.UNCERTAIN, Level.BAD]
+
+
+def test_the_same_assessment_twice_counts_once(
+    store: SqliteStore, assessment: Build, gap: BuildGap, query: Ask, at: At
+) -> None:
+    store.append([assessment(at(0), speed_rpm=90.0), assessment(at(0), speed_rpm=91.0)], [gap()])
+    store.append([assessment(at(0), speed_rpm=92.0), assessment(at(1), speed_rpm=93.0)], [gap()])
+
+    assert list(store.trend(query("speed_rpm")).series["speed_rpm"].mean) == [90.0, 93.0]
+    assert len(store.gaps("U1", 0, 2 * at(0))) == 1
+
+
+def test_bearings_and_units_do_not_mix(
+    store: SqliteStore, assessment: Build, gap: BuildGap, query: Ask
+) -> None:
+    for number, (unit, bearing) in enumerate([("U1", "UJB"), ("U1", "LJB"), ("U2", "UJB")]):
+        store.append(
+            [assessment(unit=unit, bearing=bearing, speed_rpm=float(number))], [gap(unit=unit)]
+        )
+
+    assert list(store.trend(query(unit="U1", bearing="LJB")).series["speed_rpm"].mean) == [1.0]
+    assert list(store.trend(query(unit="U2")).series["speed_rpm"].mean) == [2.0]
+    assert list(store.trend(query(unit="U3")).time_ns) == []
+
+
+def test_a_range_of_time_holds_its_start_but_not_its_end(
+    store: SqliteStore, assessment: Build, gap: BuildGap, query: Ask, at: At
+) -> None:
+    store.append(
+        [assessment(at(i), speed_rpm=float(i)) for i in range(5)],
+        [gap(at(i), first_index=i) for i in range(5)],
+    )
+
+    found = store.trend(query(start_ns=at(1), end_ns=at(3)))
+
+    assert list(found.time_ns) == [at(1), at(2)]
+    assert [g.stop_ns for g in store.gaps("U1", at(1), at(3))] == [at(1), at(2)]
+
+
+def test_readings_are_filtered_by_eccentricity_and_oil_temperature(
+    store: SqliteStore, assessment: Build, query: Ask, at: At
+) -> None:
+    for i in range(10):
+        store.append(
+            [
+                assessment(
+                    at(i), speed_rpm=float(i), eccentricity_ratio=i / 10, oil_temperature_c=40.0 - i
+                )
+            ],
+            [],
+        )
+    store.append([assessment(at(10), speed_rpm=10.0)], [])
+
+    def speeds(**filters: ValueRange) -> list[float | None]:
+        return list(store.trend(query(**filters)).series["speed_rpm"].mean)
+
+    assert speeds(eccentricity_ratio=ValueRange(0.2, 0.4)) == [2.0, 3.0, 4.0]
+    assert speeds(eccentricity_ratio=ValueRange(low=0.8)) == [8.0, 9.0]
+    assert speeds(oil_temperature_c=ValueRange(high=32.0)) == [8.0, 9.0]
+    assert speeds(
+        eccentricity_ratio=ValueRange(0.2, 0.4), oil_temperature_c=ValueRange(37.0, 50.0)
+    ) == [2.0, 3.0]
+    assert len(speeds()) == 11
+
+
+def test_a_hole_is_marked_so_that_no_line_spans_it(
+    store: SqliteStore, assessment: Build, query: Ask, at: At
+) -> None:
+    store.append([assessment(at(i), speed_rpm=float(i)) for i in (0, 1, 5, 6)], [])
+
+    trend = store.trend(query("speed_rpm", hole_ns=at(2) - at(0)))
+    series = trend.series["speed_rpm"]
+
+    assert list(series.mean) == [0.0, 1.0, None, 5.0, 6.0]
+    assert list(series.count) == [1, 1, 0, 1, 1]
+    assert series.worst_level[2] is None
+    assert trend.time_ns == sorted(trend.time_ns)
+    assert at(1) < trend.time_ns[2] < at(5)
+
+
+def test_a_quantity_that_an_older_padwatch_did_not_know_is_null_there(
+    path: object,
+    assessment: Build,
+    query: Ask,
+    at: At,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    older = tuple(q for q in reversed(CATALOGUE) if q.name != "vortex_coherence_xx")
+    with monkeypatch.context() as at_that_time:
+        at_that_time.setattr(sqlite, "CATALOGUE", older)
+        old = SqliteStore(path)  # type: ignore[arg-type]
+        old.append([assessment(at(0), speed_rpm=92.3, vortex_coherence_xx=0.5)], [])
+        old.close()
+    new = SqliteStore(path)  # type: ignore[arg-type]
+    new.append([assessment(at(1), speed_rpm=92.4, vortex_coherence_xx=0.75)], [])
+
+    trend = new.trend(query("speed_rpm", "vortex_coherence_xx"))
+    new.close()
+
+    assert list(trend.series["speed_rpm"].mean) == [92.3, 92.4]
+    assert list(trend.series["vortex_coherence_xx"].mean) == [None, 0.75]
+    assert list(trend.series["vortex_coherence_xx"].worst_level) == [Level.BAD, Level.GOOD]
+
+
+def test_a_query_that_could_take_all_memory_is_refused_with_its_size(
+    store: SqliteStore, assessment: Build, query: Ask, at: At, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store.append([assessment(at(i), speed_rpm=92.3) for i in range(11)], [])
+    monkeypatch.setattr(sqlite, "MAX_ROWS", 10)
+
+    with pytest.raises(QueryTooLargeError, match="11 readings in this range, at most 10"):
+        store.trend(query())
+    assert len(store.trend(query(end_ns=at(10))).time_ns) == 10
+
+
+@pytest.mark.parametrize("reach", [2**63, 2**63 - 1, 10**21])
+def test_a_range_wider_than_any_date_is_everything(
+    store: SqliteStore, assessment: Build, gap: BuildGap, query: Ask, at: At, reach: int
+) -> None:
+    store.append([assessment(at(i), speed_rpm=float(i)) for i in range(4)], [gap()])
+
+    single = store.trend(query(start_ns=-reach, end_ns=reach))
+    gathered = store.trend(query(start_ns=-reach, end_ns=reach, max_points=2))
+
+    assert len(single.time_ns) == 4
+    assert sum(gathered.series["speed_rpm"].count) == 4
+    assert len(store.gaps("U1", -reach, reach)) == 1
+
+
+def test_a_closed_store_says_so(store: SqliteStore, assessment: Build) -> None:
+    store.close()
+    store.close()
+
+    with pytest.raises(StoreError, match="closed"):
+        store.append([assessment()], [])
