@@ -12,7 +12,7 @@ const REASONS = {
   out_of_range: ["out of range", "The reading lies outside its plausible range."],
   speed_unknown: ["speed unknown", "Without the speed, the 1× frequency is not known."],
   standstill: ["standing still", "The shaft does not turn."],
-  few_segments: ["short record", "Fewer segments than wanted have been averaged; the numbers scatter more."],
+  few_segments: ["short record", "Few segments have been averaged yet; the numbers scatter more."],
   low_coverage: ["gaps in the record", "Samples are missing in the averaged window."],
   insufficient_excitation: ["not enough excitation", "The motion is too small to tell stiffness from noise."],
   service_not_reachable: ["service not reachable", "The padwatch service does not answer this browser."],
@@ -22,7 +22,7 @@ const REASONS = {
 export const NOT_CURRENT = new Set(["not_connected", "stale", "waiting_for_data", "service_not_reachable"]);
 
 /** Reasons for a missing number that belong to ordinary operation: nobody needs to get up for them. */
-const ORDINARY = new Set(["waiting_for_data", "not_measured", "standstill", "insufficient_excitation"]);
+const ORDINARY = new Set(["waiting_for_data", "not_measured", "standstill", "few_segments", "insufficient_excitation"]);
 
 /** How a quality looks: `good`, `uncertain`, `bad`, or a quiet `absent` for an ordinary absence. */
 export function lookOf(level, reason) {

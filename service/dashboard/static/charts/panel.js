@@ -9,7 +9,7 @@ import { CONFIG } from "./style.js";
 /** Returns `{ node, show(traces, layout, caption), explain(sentence), trouble(sentence), draw(ageS, currentWords) }`. */
 export function panel(title, name, ...controls) {
   const chart = element("div", { class: "chart", hidden: "" });
-  const sentence = element("p", { class: "sentence" }, "Waiting for the service’s first answer.");
+  const sentence = element("p", { class: "sentence" }, "Asking the service.");
   const caption = element("span");
   const freshness = mark();
   freshness.node.hidden = true;

@@ -79,7 +79,7 @@ function resultChart(box, path, show) {
 }
 
 function absenceWords(latest) {
-  if (latest === null) return "Waiting for the service’s first answer.";
+  if (latest === null) return "Asking the service.";
   return latest.time === null ? `No result yet. ${reasonSentence(latest.quality.reason)}` : null;
 }
 
@@ -110,6 +110,7 @@ function centreChart(path, trends) {
   let drawn = null;
   const questions = asking(box, path, (answer) => {
     facts = answer;
+    drawn = null; // draw afresh, and with it forget a trouble that is over
   });
   return {
     node: box.node,
@@ -117,12 +118,14 @@ function centreChart(path, trends) {
       box.draw(latest.age_s, notCurrent);
       if (facts === null) return;
       const current = centreNow(latest);
-      const trail = centreTrail(trends.newest());
+      const asked = trends.newest();
+      const trail = centreTrail(asked);
       const inputs = JSON.stringify([current, trail, facts.clearance_um]);
       if (inputs === drawn) return;
       drawn = inputs;
       if (!current && trail.length === 0) {
-        box.explain(`No shaft centre now (${reasonWords(readingOf(latest, "shaft_centre_x_um").reason)}), and none in the chosen span.`);
+        const now = `No shaft centre now: ${reasonWords(readingOf(latest, "shaft_centre_x_um").reason)}`;
+        box.explain(asked ? `${now}; and none in the chosen span.` : `${now}.`);
         return;
       }
       const layout = centreLayout(facts.clearance_um, trail, current);

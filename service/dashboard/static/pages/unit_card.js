@@ -90,7 +90,8 @@ function runningView() {
       const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NOBODY;
       const latest = knowing("speed_rpm");
       speed.draw(latest, latest.quality?.reason);
-      setText(from, speedOrigin(latest));
+      const origin = speedOrigin(latest);
+      setText(from, origin && `(${origin})`);
       power.draw(knowing("power_mw"), latest.quality?.reason);
     },
   };

@@ -1,0 +1,193 @@
+"""A real plant and a real browser: simulated DAQ and service as processes, pages in Chromium."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, ConsoleMessage, Page, async_playwright
+
+DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
+PADWATCH = [sys.executable, "-m", "service.cli.main"]
+STOP_S = 10.0
+
+QUICK_ANALYSIS = """
+[analysis]
+segment_samples = 4096
+overlap = 0.5
+n_segments = 6
+"""
+"""The first result after seven seconds, then one every 3.4; the plant's own are 14 and 12."""
+
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+
+QUIET = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+class Plant:
+    """Unit U1 of the demo plant: its DAQ and the service that watches it."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._processes = ExitStack()
+        self._daq: subprocess.Popen[str] | None = None
+        self._service: subprocess.Popen[str] | None = None
+        self._daq_port = free_port()
+        self.url = ""
+
+    def start_daq(self) -> None:
+        self._daq = self._start("daq", str(self._plant_file()), "--until-input-ends")
+        self._daq_port = json.loads(read_line(self._daq))["U1"]
+
+    def stop_daq(self) -> None:
+        stop(self._daq)
+
+    def start_service(self) -> None:
+        """The first time on a free port, then on the same one."""
+        port = self.url.rstrip("/").rpartition(":")[2] or "0"
+        self._service = self._start("run", str(self._plant_file()), "--port", port)
+        self.url = read_line(self._service).removeprefix("padwatch: ").strip()
+
+    def stop_service(self) -> None:
+        stop(self._service)
+
+    def __enter__(self) -> "Plant":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._processes.close()
+
+    def _start(self, *arguments: str) -> "subprocess.Popen[str]":
+        log = self._processes.enter_context((self._folder / f"{arguments[0]}.log").open("a"))
+        process = subprocess.Popen(
+            [*PADWATCH, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            cwd=self._folder,
+        )
+        self._processes.callback(stop, process)
+        return process
+
+    def _plant_file(self) -> Path:
+        head, units = DEMO.read_text().split("[[unit]]", 1)
+        first_unit = units.split("[[unit]]", 1)[0].replace("port = 0", f"port = {self._daq_port}")
+        path = self._folder / "plant.toml"
+        path.write_text(f"{head}{QUICK_ANALYSIS}\n[[unit]]{first_unit}")
+        return path
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+        return port
+
+
+def read_line(process: "subprocess.Popen[str]") -> str:
+    line = process.stdout.readline() if process.stdout else ""
+    assert line, "the process ended without a word; see its log beside the plant file"
+    return line
+
+
+def stop(process: "subprocess.Popen[str] | None") -> None:
+    if process is None:
+        return
+    if process.poll() is None:
+        process.send_signal(signal.SIGTERM)
+    process.wait(STOP_S)
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            pipe.close()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """Path of an installed Chromium."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium, chromium-browser or google-chrome is installed")
+    return CHROMIUM
+
+
+@pytest.fixture
+def new_plant(chromium: str, tmp_path: Path) -> Iterator[Plant]:  # noqa: ARG001 - skip before start
+    """A plant of the test's own, nothing of it running yet."""
+    with Plant(tmp_path) as plant:
+        yield plant
+
+
+@pytest.fixture(scope="session")
+def running_plant(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:  # noqa: ARG001
+    """A plant in good health, shared by tests that leave it so."""
+    with Plant(tmp_path_factory.mktemp("plant")) as plant:
+        plant.start_daq()
+        plant.start_service()
+        yield plant
+
+
+@pytest.fixture
+async def browser(chromium: str) -> AsyncIterator[Browser]:
+    """A browser without a past."""
+    async with async_playwright() as playwright:
+        opened = await playwright.chromium.launch(executable_path=chromium, args=QUIET)
+        yield opened
+        await opened.close()
+
+
+@pytest.fixture
+async def page(browser: Browser) -> Page:
+    """A page on a control-room screen."""
+    return await browser.new_page(viewport={"width": 1280, "height": 800})
+
+
+@pytest.fixture
+async def phone_page(browser: Browser) -> Page:
+    """A page on a phone."""
+    return await browser.new_page(viewport={"width": 360, "height": 780}, has_touch=True)
+
+
+@pytest.fixture
+def complaints_of() -> Callable[[Page], list[str]]:
+    """Collects what a page's console complains of, from now on."""
+
+    def collect(page: Page) -> list[str]:
+        complaints: list[str] = []
+
+        def note(message: ConsoleMessage) -> None:
+            if message.type in ("error", "warning"):
+                complaints.append(message.text)
+
+        page.on("console", note)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        return complaints
+
+    return collect
+
+
+@pytest.fixture
+def picture_of(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[[Page, str], object]:
+    """Saves a picture of a page in PADWATCH_PICTURES, or beside the test's other files."""
+    folder = Path(os.environ.get("PADWATCH_PICTURES", tmp_path))
+
+    async def save(page: Page, name: str) -> None:
+        path = folder / f"{request.node.originalname}-{name}.png"
+        await page.screenshot(path=path, full_page=True)
+
+    return save

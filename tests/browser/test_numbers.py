@@ -1,0 +1,103 @@
+"""What a page says is what the API says, to the last digit shown; nothing else passes for it."""
+
+import json
+
+from playwright.async_api import Page, Route, expect
+
+BEARING = "#/units/U1/bearings/UJB"
+HAS_STIFFNESS_MS = 60_000
+
+DECIMALS = {
+    "_n_per_m": (1e9, 3),
+    "_um_pk": (1, 2),
+    "_um": (1, 2),
+    "_rpm": (1, 2),
+    "_mw": (1, 1),
+    "_c": (1, 1),
+    "_deg": (1, 1),
+    "_hz": (1, 4),
+    "_ratio": (1, 3),
+    "_xx": (1, 3),
+    "_yy": (1, 3),
+}
+
+
+def shown(name: str, value: float | None) -> str:
+    if value is None:
+        return "—"
+    scale, decimals = next(form for ending, form in DECIMALS.items() if name.endswith(ending))
+    return f"{value / scale:.{decimals}f}".replace("-", "−")
+
+
+async def freeze(page: Page, url: str) -> dict:
+    """Let the page hear one real answer of the service again and again."""
+    answer = await page.request.get(f"{url}api/v1/overview")
+    body = await answer.body()
+
+    async def replay(route: Route) -> None:
+        await route.fulfill(body=body, content_type="application/json")
+
+    await page.route("**/api/v1/overview", replay)
+    return json.loads(body)
+
+
+async def numbers_in(page: Page, selector: str) -> dict[str, str]:
+    return await page.eval_on_selector_all(
+        f"{selector} [data-reading]",
+        "nodes => Object.fromEntries(nodes.map("
+        "node => [node.dataset.reading, node.querySelector('.number').textContent]))",
+    )
+
+
+async def await_stiffness(page: Page) -> None:
+    number = page.locator("[data-reading=order1_k_eff_xx_n_per_m] .number").first
+    await expect(number).not_to_have_text("—", timeout=HAS_STIFFNESS_MS)
+
+
+async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(
+    running_plant, page, picture_of
+) -> None:
+    await page.goto(running_plant.url + BEARING)
+    await await_stiffness(page)
+    overview = await freeze(page, running_plant.url)
+    await page.reload()
+    readings = overview["units"][0]["bearings"][0]["readings"]
+    assert readings["order1_k_eff_xx_n_per_m"]["value"] is not None
+    stiffness = page.locator("[data-reading=order1_k_eff_xx_n_per_m] .number")
+    wanted = {name: shown(name, reading["value"]) for name, reading in readings.items()}
+    await expect(stiffness).to_have_text(wanted["order1_k_eff_xx_n_per_m"])
+    assert await numbers_in(page, ".tiles") == wanted
+    await picture_of(page, "bearing")
+
+
+async def test_the_overview_shows_the_numbers_of_every_bearing(
+    running_plant, page, picture_of
+) -> None:
+    await page.goto(running_plant.url)
+    await await_stiffness(page)
+    overview = await freeze(page, running_plant.url)
+    await page.reload()
+    for latest in overview["units"][0]["bearings"]:
+        row = f"[data-unit=U1] [data-bearing={latest['bearing']}]"
+        stiffness = latest["readings"]["order1_k_eff_yy_n_per_m"]["value"]
+        number = page.locator(f"{row} [data-reading=order1_k_eff_yy_n_per_m] .number")
+        await expect(number).to_have_text(shown("order1_k_eff_yy_n_per_m", stiffness))
+        for name, text in (await numbers_in(page, row)).items():
+            assert text == shown(name, latest["readings"][name]["value"]), name
+    await picture_of(page, "overview")
+
+
+async def test_a_number_without_value_says_why_instead_of_zero(running_plant, page) -> None:
+    await page.goto(running_plant.url)
+    await await_stiffness(page)
+    overview = await freeze(page, running_plant.url)
+    reading = overview["units"][0]["bearings"][0]["readings"]["vortex_k_eff_xx_n_per_m"]
+    reading |= {"value": None, "level": "bad", "reason": "insufficient_excitation"}
+
+    async def replay(route: Route) -> None:
+        await route.fulfill(json=overview)
+
+    await page.route("**/api/v1/overview", replay)
+    cell = page.locator("[data-bearing=UJB] [data-reading=vortex_k_eff_xx_n_per_m]")
+    await expect(cell.locator(".number")).to_have_text("—")
+    await expect(cell.locator(".why")).to_have_text("not enough excitation")
