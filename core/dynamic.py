@@ -1,0 +1,249 @@
+"""All eight coefficients of an oil film from what shakes the machine between its harmonics.
+
+The force on the rotor does not enter ``(k_b - m_b ω² + iω c_b) V = (K + iω C) U`` (the bracket's
+rows of Brito et al., equation 6), so hydraulic noise identifies the film. Runout lives on the
+harmonics of the running speed, and these are left out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.bracket import BracketDynamics
+from core.cross_spectrum import BEARING_X, CrossSpectrum
+from core.dynamic_settings import DynamicSettings
+from core.normal_equations import NormalEquations, normal_equations
+from core.probe_noise import conditional_power, probe_noise_power
+from core.quality import Reason
+from core.spectral_statistics import (
+    independent_segments,
+    neighbour_inflation,
+    phasor_power_per_density,
+)
+from core.usable_lines import between_harmonics, little_leakage
+
+
+@dataclass(frozen=True)
+class DynamicStiffness:
+    """Stiffness and damping of a film with what they rest on.
+
+    Parameters
+    ----------
+    k_n_per_m, c_n_s_per_m : (2, 2)
+        Rows are force directions, columns motion directions.
+    covariance : (2, 4, 4)
+        Random covariance of (k_i1, k_i2, c_i1, c_i2) for each row i.
+    k_per_bracket_n_per_m, c_per_bracket_n_s_per_m : (2, 2)
+        Change per relative change of the bracket's stiffness.
+    coherence : (2,)
+        Multiple coherence of each bearing channel with the shaft's motion over the used lines,
+        free of the bias of few segments; 0 to 1.
+    lack_of_fit : (2,)
+        Power left by constant coefficients over that left by any response at all; 1 if the film
+        is as constant over frequency as the model says.
+    frequency_hz : (n_used,)
+        The lines that were used.
+    probe_noise_um2_per_hz : (2,)
+        One-sided density that was taken off the shaft spectra.
+    noise_share
+        Largest share of the shaft's weighted motion, over its directions, that it amounts to.
+    """
+
+    k_n_per_m: FloatArray
+    c_n_s_per_m: FloatArray
+    covariance: FloatArray
+    k_per_bracket_n_per_m: FloatArray
+    c_per_bracket_n_s_per_m: FloatArray
+    coherence: FloatArray
+    lack_of_fit: FloatArray
+    frequency_hz: FloatArray
+    probe_noise_um2_per_hz: FloatArray
+    noise_share: float
+    n_segments: int
+
+    @property
+    def k_std_n_per_m(self) -> FloatArray:
+        """Random standard uncertainty of the stiffnesses, (2, 2)."""
+        std: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)[:, :2])
+        return std
+
+    @property
+    def c_std_n_s_per_m(self) -> FloatArray:
+        """Random standard uncertainty of the damping coefficients, (2, 2)."""
+        std: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)[:, 2:])
+        return std
+
+
+def dynamic_stiffness(
+    spectrum: CrossSpectrum,
+    bracket: BracketDynamics,
+    turn_hz: tuple[float, float],
+    settings: DynamicSettings,
+) -> DynamicStiffness | Reason:
+    """Estimate a film's coefficients, or say why that is not possible.
+
+    Parameters
+    ----------
+    spectrum
+        Of (u_x, u_y, v_x, v_y), averaged over segments in which all four were usable.
+    turn_hz
+        Lowest and highest 1× frequency measured in these segments.
+
+    Raises
+    ------
+    ValueError
+        If the channels were averaged over different segments, or the speed is not positive.
+    """
+    n_averaged = int(spectrum.n_segments.max())
+    if np.any(spectrum.n_segments != n_averaged):
+        raise ValueError(f"channels averaged over different segments: {spectrum.n_segments}")
+    if n_averaged < settings.min_segments:
+        return Reason.FEW_SEGMENTS
+    lines = _used_lines(spectrum, turn_hz, settings)
+    if np.count_nonzero(lines) < settings.min_lines:
+        return Reason.INSUFFICIENT_EXCITATION
+    n_segments = independent_segments(n_averaged, settings.overlap)
+    noise_power = _noise_power(spectrum, turn_hz, settings, n_segments)
+    index = np.flatnonzero(lines)
+    stiffness = bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[index])
+    equations = normal_equations(spectrum, index, stiffness, noise_power)
+    weight = _weights(equations, settings)
+    if weight is None:
+        return Reason.INSUFFICIENT_EXCITATION
+    found = _result(spectrum, lines, bracket, equations, weight, noise_power, n_segments)
+    return found if _convinces(found, settings) else Reason.INSUFFICIENT_EXCITATION
+
+
+def _used_lines(
+    spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
+) -> npt.NDArray[np.bool_]:
+    """Lines of the band that carry the shaft's own broadband motion and some bearing motion."""
+    power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
+    selection = settings.selection
+    return (
+        _inside(spectrum.frequency_hz, settings.band_hz)
+        & between_harmonics(spectrum.frequency_hz, turn_hz, selection.guard_bins)
+        & little_leakage(power[:, :BEARING_X], selection.max_leakage)
+        & np.all(power > 0.0, axis=1)
+    )
+
+
+def _noise_power(
+    spectrum: CrossSpectrum,
+    turn_hz: tuple[float, float],
+    settings: DynamicSettings,
+    n_segments: float,
+) -> FloatArray:
+    bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+    if settings.probe_noise_um2_per_hz is not None:
+        return phasor_power_per_density(bin_hz) * np.array(settings.probe_noise_um2_per_hz)
+    quiet = _inside(spectrum.frequency_hz, settings.quiet_band_hz)
+    guard_bins = settings.selection.guard_bins
+    quiet &= between_harmonics(spectrum.frequency_hz, turn_hz, guard_bins)
+    return probe_noise_power(spectrum, quiet, n_segments)
+
+
+def _inside(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> npt.NDArray[np.bool_]:
+    return (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
+
+
+def _signal_share(equations: NormalEquations, weight: FloatArray) -> float:
+    """Smallest share of motion in the weighted shaft spectra, over directions and rows."""
+    shares = []
+    for row_weight in weight.T:
+        whole = np.tensordot(row_weight, equations.gram[:, :2, :2], axes=1)
+        noise = np.tensordot(row_weight, equations.noise_gram[:, :2, :2], axes=1)
+        scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
+        if np.linalg.eigvalsh(whole / scale)[0] < 1e-9:
+            return 0.0
+        shares.append(1.0 - float(np.linalg.eigvals(np.linalg.solve(whole, noise)).real.max()))
+    return min(shares)
+
+
+def _weights(equations: NormalEquations, settings: DynamicSettings) -> FloatArray | None:
+    """Reciprocal residual spectra, (n_lines, 2), normalized; None if the shaft hardly moves."""
+    weight = 1.0 / equations.force_power
+    for _ in range(settings.n_iterations):
+        if _signal_share(equations, weight) < settings.min_signal_share:
+            return None
+        residual = equations.residual(equations.solve(weight, equations.force))
+        weight = 1.0 / _smoothed(residual, equations.force_power, settings.smoothing_lines)
+    return weight
+
+
+def _smoothed(residual: FloatArray, force_power: FloatArray, n_lines: int) -> FloatArray:
+    """Geometric running mean over lines: the spectra of transducer noise are steep."""
+    floor = 1e-12 * force_power  # noise-free signals leave rounding errors only
+    logarithm = np.log(np.maximum(residual, floor))
+    window = np.ones(min(n_lines, residual.shape[0]))
+    count = np.convolve(np.ones(residual.shape[0]), window, mode="same")
+    mean = [np.convolve(column, window, mode="same") / count for column in logarithm.T]
+    return np.exp(np.stack(mean, axis=1))
+
+
+def _result(
+    spectrum: CrossSpectrum,
+    lines: npt.NDArray[np.bool_],
+    bracket: BracketDynamics,
+    equations: NormalEquations,
+    weight: FloatArray,
+    noise_power: FloatArray,
+    n_segments: float,
+) -> DynamicStiffness:
+    unknowns = equations.solve(weight, equations.force)
+    per_bracket = bracket.stiffness_n_per_m * equations.solve(weight, equations.spring)
+    residual = equations.residual(unknowns)
+    inflation = neighbour_inflation(lines)[lines]
+    scale = np.array([1.0, 1.0, 1.0 / equations.omega_unit, 1.0 / equations.omega_unit])
+    covariance = equations.covariance(weight, residual, inflation, n_segments)
+    free = _free_residual(spectrum, lines, bracket, n_segments)
+    bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+    return DynamicStiffness(
+        k_n_per_m=unknowns[:, :2],
+        c_n_s_per_m=unknowns[:, 2:] / equations.omega_unit,
+        covariance=covariance * np.outer(scale, scale),
+        k_per_bracket_n_per_m=per_bracket[:, :2],
+        c_per_bracket_n_s_per_m=per_bracket[:, 2:] / equations.omega_unit,
+        coherence=np.clip(1.0 - _share(weight, free, equations.force_power), 0.0, 1.0),
+        lack_of_fit=_share(weight, residual, free),
+        frequency_hz=spectrum.frequency_hz[lines],
+        probe_noise_um2_per_hz=noise_power / phasor_power_per_density(bin_hz),
+        noise_share=1.0 - _signal_share(equations, weight),
+        n_segments=int(spectrum.n_segments.max()),
+    )
+
+
+def _free_residual(
+    spectrum: CrossSpectrum,
+    lines: npt.NDArray[np.bool_],
+    bracket: BracketDynamics,
+    n_segments: float,
+) -> FloatArray:
+    """Power of the force that no response to the shaft explains, (n_lines, 2), unbiased."""
+    matrix = spectrum.matrix[lines]
+    shaft, bearing = slice(0, BEARING_X), slice(BEARING_X, None)
+    rest = conditional_power(
+        matrix[:, bearing, bearing], matrix[:, shaft, shaft], matrix[:, bearing, shaft]
+    )
+    stiffness = np.abs(bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[lines]))
+    return rest * stiffness[:, np.newaxis] ** 2 * n_segments / (n_segments - 2.0)
+
+
+def _share(weight: FloatArray, part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Weighted part over weighted whole, (2,); 1 where the whole is nothing."""
+    below = (weight * whole).sum(axis=0)
+    above = (weight * part).sum(axis=0)
+    share: FloatArray = np.divide(above, below, out=np.ones_like(below), where=below > 0.0)
+    return share
+
+
+def _convinces(found: DynamicStiffness, settings: DynamicSettings) -> bool:
+    if 1.0 - found.noise_share < settings.min_signal_share:
+        return False
+    largest = float(np.abs(np.diag(found.k_n_per_m)).max())
+    uncertain = bool(
+        np.any(np.diag(found.k_std_n_per_m) > settings.max_relative_uncertainty * largest)
+    )
+    return not uncertain and bool(np.all(found.coherence >= settings.min_coherence))

@@ -1,0 +1,69 @@
+"""The noise floor of the shaft probes, known or read from a quiet band."""
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import ComplexArray, FloatArray
+from core.cross_spectrum import BEARING_X, CrossSpectrum
+
+N_BLOCKS = 4
+"""Parts of the quiet band; the quietest counts, in case the shaft moves unseen in the others."""
+
+
+def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
+    """Power of signals that two others do not explain, (n_lines, n).
+
+    Parameters
+    ----------
+    matrix : (n_lines, n, n)
+        Spectra of the signals.
+    given : (n_lines, 2, 2)
+        Spectra of the two others.
+    cross : (n_lines, n, 2)
+        Signals times conjugated others.
+    """
+    determinant = (given[:, 0, 0] * given[:, 1, 1]).real - np.abs(given[:, 0, 1]) ** 2
+    usable = determinant > 1e-12 * (given[:, 0, 0] * given[:, 1, 1]).real
+    adjugate = np.empty_like(given)
+    adjugate[:, 0, 0], adjugate[:, 1, 1] = given[:, 1, 1], given[:, 0, 0]
+    adjugate[:, 0, 1], adjugate[:, 1, 0] = -given[:, 0, 1], -given[:, 1, 0]
+    explained = ((cross @ adjugate) * cross.conj()).sum(axis=2).real
+    own: FloatArray = np.diagonal(matrix, axis1=1, axis2=2).real.copy()
+    own[usable] -= explained[usable] / determinant[usable, np.newaxis]
+    return np.maximum(own, 0.0)
+
+
+def probe_noise_power(
+    spectrum: CrossSpectrum, quiet: npt.NDArray[np.bool_], n_segments: float
+) -> FloatArray:
+    """Mean squared phasor of the probes' noise, (2,) in µm², from lines in a quiet band.
+
+    What shaft and bearing have in common is motion and does not count; the rest is the probes'
+    noise and, through the film, the bearing transducers'. Where those are quiet the estimate is
+    true, else it is high; never is it low.
+
+    Parameters
+    ----------
+    quiet : (n_lines,)
+        The lines of the quiet band.
+    n_segments
+        Independent segments of the average; at least 3.
+
+    Returns
+    -------
+    Zero if no line is quiet.
+    """
+    matrix = spectrum.matrix[quiet]
+    if matrix.shape[0] == 0:
+        return np.zeros(2)
+    shaft, bearing = slice(0, BEARING_X), slice(BEARING_X, None)
+    rest = conditional_power(
+        matrix[:, shaft, shaft], matrix[:, bearing, bearing], matrix[:, shaft, bearing]
+    )
+    n_blocks = min(N_BLOCKS, rest.shape[0])
+    edges = np.linspace(0, rest.shape[0], n_blocks + 1).astype(np.int64)[:-1]
+    counts = np.diff(np.append(edges, rest.shape[0]))
+    blocks = np.add.reduceat(rest, edges, axis=0) / counts[:, np.newaxis]
+    # two fitted signals take two of the segments' freedoms (Bendat and Piersol, 9.3)
+    floor: FloatArray = blocks.min(axis=0) * n_segments / (n_segments - 2.0)
+    return floor
