@@ -14,8 +14,9 @@ from core.arrays import FloatArray
 from core.bracket import BracketDynamics
 from core.cross_spectrum import BEARING_X, CrossSpectrum
 from core.dynamic_settings import DynamicSettings
+from core.film_fit import explained_share, lack_of_fit, line_weights, signal_share
 from core.normal_equations import NormalEquations, normal_equations
-from core.probe_noise import conditional_power, probe_noise_power
+from core.probe_noise import probe_noise_power
 from core.quality import Reason
 from core.spectral_statistics import (
     independent_segments,
@@ -38,11 +39,10 @@ class DynamicStiffness:
     k_per_bracket_n_per_m, c_per_bracket_n_s_per_m : (2, 2)
         Change per relative change of the bracket's stiffness.
     coherence : (2,)
-        Multiple coherence of each bearing channel with the shaft's motion over the used lines,
-        free of the bias of few segments; 0 to 1.
+        Multiple coherence of each bearing channel with the shaft's motion through the fitted film,
+        over the used lines as they are weighted; 0 to 1.
     lack_of_fit : (2,)
-        Power left by constant coefficients over that left by any response at all; 1 if the film
-        is as constant over frequency as the model says.
+        About 1 if the film is as constant over frequency as the model says, else more.
     frequency_hz : (n_used,)
         The lines that were used.
     probe_noise_um2_per_hz : (2,)
@@ -109,7 +109,9 @@ def dynamic_stiffness(
     index = np.flatnonzero(lines)
     stiffness = bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[index])
     equations = normal_equations(spectrum, index, stiffness, noise_power)
-    weight = _weights(equations, settings)
+    weight = line_weights(
+        equations, spectrum.matrix[index], settings.smoothing_lines, settings.n_iterations
+    )
     if weight is None:
         return Reason.INSUFFICIENT_EXCITATION
     found = _result(spectrum, lines, bracket, equations, weight, noise_power, n_segments)
@@ -122,12 +124,13 @@ def _used_lines(
     """Lines of the band that carry the shaft's own broadband motion and some bearing motion."""
     power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
     selection = settings.selection
-    return (
+    used: npt.NDArray[np.bool_] = (
         _inside(spectrum.frequency_hz, settings.band_hz)
         & between_harmonics(spectrum.frequency_hz, turn_hz, selection.guard_bins)
         & little_leakage(power[:, :BEARING_X], selection.max_leakage)
         & np.all(power > 0.0, axis=1)
     )
+    return used
 
 
 def _noise_power(
@@ -149,40 +152,6 @@ def _inside(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> npt.NDArr
     return (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
 
 
-def _signal_share(equations: NormalEquations, weight: FloatArray) -> float:
-    """Smallest share of motion in the weighted shaft spectra, over directions and rows."""
-    shares = []
-    for row_weight in weight.T:
-        whole = np.tensordot(row_weight, equations.gram[:, :2, :2], axes=1)
-        noise = np.tensordot(row_weight, equations.noise_gram[:, :2, :2], axes=1)
-        scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
-        if np.linalg.eigvalsh(whole / scale)[0] < 1e-9:
-            return 0.0
-        shares.append(1.0 - float(np.linalg.eigvals(np.linalg.solve(whole, noise)).real.max()))
-    return min(shares)
-
-
-def _weights(equations: NormalEquations, settings: DynamicSettings) -> FloatArray | None:
-    """Reciprocal residual spectra, (n_lines, 2), normalized; None if the shaft hardly moves."""
-    weight = 1.0 / equations.force_power
-    for _ in range(settings.n_iterations):
-        if _signal_share(equations, weight) < settings.min_signal_share:
-            return None
-        residual = equations.residual(equations.solve(weight, equations.force))
-        weight = 1.0 / _smoothed(residual, equations.force_power, settings.smoothing_lines)
-    return weight
-
-
-def _smoothed(residual: FloatArray, force_power: FloatArray, n_lines: int) -> FloatArray:
-    """Geometric running mean over lines: the spectra of transducer noise are steep."""
-    floor = 1e-12 * force_power  # noise-free signals leave rounding errors only
-    logarithm = np.log(np.maximum(residual, floor))
-    window = np.ones(min(n_lines, residual.shape[0]))
-    count = np.convolve(np.ones(residual.shape[0]), window, mode="same")
-    mean = [np.convolve(column, window, mode="same") / count for column in logarithm.T]
-    return np.exp(np.stack(mean, axis=1))
-
-
 def _result(
     spectrum: CrossSpectrum,
     lines: npt.NDArray[np.bool_],
@@ -198,7 +167,6 @@ def _result(
     inflation = neighbour_inflation(lines)[lines]
     scale = np.array([1.0, 1.0, 1.0 / equations.omega_unit, 1.0 / equations.omega_unit])
     covariance = equations.covariance(weight, residual, inflation, n_segments)
-    free = _free_residual(spectrum, lines, bracket, n_segments)
     bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
     return DynamicStiffness(
         k_n_per_m=unknowns[:, :2],
@@ -206,37 +174,13 @@ def _result(
         covariance=covariance * np.outer(scale, scale),
         k_per_bracket_n_per_m=per_bracket[:, :2],
         c_per_bracket_n_s_per_m=per_bracket[:, 2:] / equations.omega_unit,
-        coherence=np.clip(1.0 - _share(weight, free, equations.force_power), 0.0, 1.0),
-        lack_of_fit=_share(weight, residual, free),
+        coherence=explained_share(weight, residual, equations.force_power),
+        lack_of_fit=lack_of_fit(equations, unknowns, weight, n_segments),
         frequency_hz=spectrum.frequency_hz[lines],
         probe_noise_um2_per_hz=noise_power / phasor_power_per_density(bin_hz),
-        noise_share=1.0 - _signal_share(equations, weight),
+        noise_share=1.0 - signal_share(equations, weight),
         n_segments=int(spectrum.n_segments.max()),
     )
-
-
-def _free_residual(
-    spectrum: CrossSpectrum,
-    lines: npt.NDArray[np.bool_],
-    bracket: BracketDynamics,
-    n_segments: float,
-) -> FloatArray:
-    """Power of the force that no response to the shaft explains, (n_lines, 2), unbiased."""
-    matrix = spectrum.matrix[lines]
-    shaft, bearing = slice(0, BEARING_X), slice(BEARING_X, None)
-    rest = conditional_power(
-        matrix[:, bearing, bearing], matrix[:, shaft, shaft], matrix[:, bearing, shaft]
-    )
-    stiffness = np.abs(bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[lines]))
-    return rest * stiffness[:, np.newaxis] ** 2 * n_segments / (n_segments - 2.0)
-
-
-def _share(weight: FloatArray, part: FloatArray, whole: FloatArray) -> FloatArray:
-    """Weighted part over weighted whole, (2,); 1 where the whole is nothing."""
-    below = (weight * whole).sum(axis=0)
-    above = (weight * part).sum(axis=0)
-    share: FloatArray = np.divide(above, below, out=np.ones_like(below), where=below > 0.0)
-    return share
 
 
 def _convinces(found: DynamicStiffness, settings: DynamicSettings) -> bool:

@@ -1,0 +1,100 @@
+"""Fitting a film to spectra: weights from the residual, evidence, and whether the model holds."""
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from core.arrays import ComplexArray, FloatArray
+from core.cross_spectrum import BEARING_X
+from core.normal_equations import NormalEquations
+from core.probe_noise import conditional_power
+
+LEAST_SHARE = 0.05
+"""Below this share of motion in the shaft spectra their noise-free part may not be invertible."""
+
+ROUNDING = 1e-12
+"""Relative power that signals without noise leave over."""
+
+
+def line_weights(
+    equations: NormalEquations, matrix: ComplexArray, smoothing_lines: int, n_iterations: int
+) -> FloatArray | None:
+    """Reciprocal residual spectra, (n_lines, 2), fitted in turn with the film.
+
+    The fit starts from what any response to the shaft would leave, weighted by coherence.
+
+    Parameters
+    ----------
+    matrix : (n_lines, 4, 4)
+        The cross-spectra of the lines.
+
+    Returns
+    -------
+    None if the shaft hardly moves.
+    """
+    shaft, bearing = slice(0, BEARING_X), slice(BEARING_X, None)
+    power = np.diagonal(matrix, axis1=1, axis2=2).real[:, bearing]
+    rest = conditional_power(
+        matrix[:, bearing, bearing], matrix[:, shaft, shaft], matrix[:, bearing, shaft]
+    )
+    coherence = 1.0 - rest / power
+    residual = equations.force_power * (1.0 - coherence)
+    weight = coherence / smoothed(residual, equations.force_power, smoothing_lines)
+    for _ in range(n_iterations):
+        if signal_share(equations, weight) < LEAST_SHARE:
+            return None
+        residual = equations.residual(equations.solve(weight, equations.force))
+        weight = 1.0 / smoothed(residual, equations.force_power, smoothing_lines)
+    return weight if signal_share(equations, weight) >= LEAST_SHARE else None
+
+
+def signal_share(equations: NormalEquations, weight: FloatArray) -> float:
+    """Smallest share of motion in the weighted shaft spectra, over directions and rows."""
+    shares = []
+    for row_weight in weight.T:
+        whole = np.tensordot(row_weight, equations.gram[:, :2, :2], axes=1)
+        noise = np.tensordot(row_weight, equations.noise_gram[:, :2, :2], axes=1)
+        scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
+        if scale.min() <= 0.0 or np.linalg.eigvalsh(whole / scale)[0] < ROUNDING:
+            return 0.0
+        shares.append(1.0 - float(np.linalg.eigvals(np.linalg.solve(whole, noise)).real.max()))
+    return min(shares)
+
+
+def smoothed(residual: FloatArray, force_power: FloatArray, n_lines: int) -> FloatArray:
+    """Running straight line through the logarithm, (n_lines, 2): transducer noise is steep."""
+    logarithm = np.log(np.maximum(residual, ROUNDING * force_power))
+    length = min(n_lines, residual.shape[0])
+    if length < 3:
+        return np.exp(logarithm)
+    smooth = savgol_filter(logarithm, length - 1 + length % 2, polyorder=1, axis=0)
+    return np.exp(np.asarray(smooth, dtype=np.float64))
+
+
+def explained_share(
+    weight: FloatArray, residual: FloatArray, force_power: FloatArray
+) -> FloatArray:
+    """Share of each bearing channel's weighted power that the film explains, (2,), 0 to 1."""
+    whole = (weight * force_power).sum(axis=0)
+    share: FloatArray = 1.0 - (weight * residual).sum(axis=0) / whole
+    return np.minimum(np.maximum(share, 0.0), 1.0)
+
+
+def lack_of_fit(
+    equations: NormalEquations, unknowns: FloatArray, weight: FloatArray, n_segments: float
+) -> FloatArray:
+    """How much the residual still has in common with the shaft's motion, (2,).
+
+    Its mean is 1 if stiffness and damping are constant over the lines: the residual is then as
+    little correlated with the shaft as `n_segments` independent segments let it be.
+    """
+    # moments of the residual with (u_1, u_2, iω u_1, iω u_2): real part, then ratio × imaginary
+    left = equations.force - np.einsum("lab,rb->lra", equations.true_gram, unknowns)
+    residual = equations.residual(unknowns)
+    ratio = np.sqrt(equations.gram[:, 2, 2] / equations.gram[:, 0, 0])
+    common = left[..., :2] + 1j * left[..., 2:] / ratio[:, np.newaxis, np.newaxis]
+    shaft = equations.gram[:, :2, :2] + 1j * equations.gram[:, :2, 2:] / ratio[:, None, None]
+    scaled = np.linalg.solve(shaft.transpose(0, 2, 1), common.transpose(0, 2, 1))
+    power = (common.transpose(0, 2, 1).conj() * scaled).sum(axis=1).real
+    whole = (weight * residual).sum(axis=0)
+    found: FloatArray = n_segments * (weight * power).sum(axis=0) / (2.0 * whole)
+    return found
