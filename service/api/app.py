@@ -2,13 +2,17 @@
 
 from importlib.metadata import version
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
 from service.api.health_routes import health_router
 from service.api.plant_routes import plant_router
-from service.api.problems import install_problem_handlers
+from service.api.problems import (
+    any_other_problem,
+    install_problem_handlers,
+    refuse_unknown_parameters,
+)
 from service.dashboard.routes import dashboard_router
 
 DESCRIPTION = """
@@ -28,6 +32,7 @@ def create_app(context: Context) -> FastAPI:
         openapi_url="/api/v1/openapi.json",
         docs_url=None,  # its pages would load scripts from elsewhere
         redoc_url=None,
+        responses=any_other_problem(),
     )
     install_problem_handlers(app)
     for router in (
@@ -35,7 +40,7 @@ def create_app(context: Context) -> FastAPI:
         plant_router(context),
         gap_router(context),
         bearing_router(context),
-        dashboard_router(),
     ):
-        app.include_router(router)
+        app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
+    app.include_router(dashboard_router())
     return app

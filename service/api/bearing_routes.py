@@ -2,13 +2,14 @@
 
 import asyncio
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
+from pydantic import BeforeValidator
 
 from core.quantities import BY_NAME
 from core.units import ns_from_s
-from service.api.context import Context
+from service.api.context import BearingId, Context, UnitId
 from service.api.models import (
     BearingModel,
     GapModel,
@@ -18,7 +19,7 @@ from service.api.models import (
     TrendModel,
 )
 from service.api.problems import ProblemError, problem_responses
-from service.api.times import ns_from_datetime, rfc3339
+from service.api.times import ns_from_datetime, rfc3339, written_as_date
 from service.api.views import latest_model, orbit_model, spectrum_model, trend_model
 from service.store.port import TrendQuery, ValueRange
 
@@ -27,15 +28,19 @@ MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
 """Results further apart than this many refreshes have a hole between them."""
 
+Moment = Annotated[datetime, BeforeValidator(written_as_date)]
 Start = Annotated[
-    datetime,
+    Moment,
     Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
 ]
 End = Annotated[
-    datetime,
+    Moment,
     Query(description="Time up to which, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
 ]
-Bound = Annotated[float | None, Query(allow_inf_nan=False)]
+
+
+def _bound(words: str, example: float) -> Any:
+    return Query(allow_inf_nan=False, description=words, examples=[example])
 
 
 def time_range(start: Start, end: End) -> tuple[int, int]:
@@ -48,14 +53,16 @@ def time_range(start: Start, end: End) -> tuple[int, int]:
 
 
 def eccentricity_range(
-    eccentricity_min: Bound = None, eccentricity_max: Bound = None
+    eccentricity_min: Annotated[float | None, _bound("Lowest eccentricity ratio.", 0.2)] = None,
+    eccentricity_max: Annotated[float | None, _bound("Highest eccentricity ratio.", 0.4)] = None,
 ) -> ValueRange:
     """Results with an eccentricity ratio within these bounds."""
     return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
 
 
 def oil_temperature_range(
-    oil_temperature_min: Bound = None, oil_temperature_max: Bound = None
+    oil_temperature_min: Annotated[float | None, _bound("Lowest, °C.", 40.0)] = None,
+    oil_temperature_max: Annotated[float | None, _bound("Highest, °C.", 50.0)] = None,
 ) -> ValueRange:
     """Results with an oil temperature, in °C, within these bounds."""
     return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
@@ -68,34 +75,44 @@ def bearing_router(context: Context) -> APIRouter:
     """Routes about one bearing."""
     router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
     unknown, no_result = problem_responses(404), problem_responses(404, 409)
+    reading = problem_responses(404, 422, 503)
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
-    async def bearings(unit: str) -> list[BearingModel]:
+    async def bearings(unit: UnitId) -> list[BearingModel]:
         """The unit's guide bearings as configured."""
         return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
 
     @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
-    async def one_bearing(unit: str, bearing: str) -> BearingModel:
+    async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
         """Bracket, clearance, reference and channels."""
         return _bearing(context, unit, bearing)
 
     @router.get("/{bearing}/latest", summary="One bearing now", responses=unknown)
-    async def latest(unit: str, bearing: str) -> LatestModel:
+    async def latest(unit: UnitId, bearing: BearingId) -> LatestModel:
         """The newest result, without numbers where they are not current."""
         context.bearing(unit, bearing)
         return latest_model(context.live, unit, bearing)
 
-    @router.get("/{bearing}/trends", summary="Trends", responses=problem_responses(404, 422))
+    @router.get("/{bearing}/trends", summary="Trends", responses=reading)
     async def trends(
-        unit: str,
-        bearing: str,
+        unit: UnitId,
+        bearing: BearingId,
         times: TimeRange,
         eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
         oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
         quantity: Annotated[
-            list[str], Query(min_length=1, max_length=MAX_QUANTITIES, examples=[["speed_rpm"]])
+            list[str],
+            Query(
+                min_length=1,
+                max_length=MAX_QUANTITIES,
+                description="Names from the catalogue; may be repeated.",
+                examples=[["order1_k_eff_xx_n_per_m", "speed_rpm"]],
+            ),
         ],
-        max_points: Annotated[int, Query(ge=2, le=MAX_POINTS)] = 1000,
+        max_points: Annotated[
+            int,
+            Query(ge=2, le=MAX_POINTS, description="More readings are gathered into buckets."),
+        ] = 1000,
     ) -> TrendModel:
         """Quantities over time: single readings, or buckets with min, max, mean, count, quality."""
         context.bearing(unit, bearing)
@@ -113,7 +130,7 @@ def bearing_router(context: Context) -> APIRouter:
         return trend_model(query, await asyncio.to_thread(context.store.trend, query))
 
     @router.get("/{bearing}/spectrum", summary="Spectra", responses=no_result)
-    async def spectrum(unit: str, bearing: str) -> SpectrumModel:
+    async def spectrum(unit: UnitId, bearing: BearingId) -> SpectrumModel:
         """Averaged amplitude spectra of the newest result, all channels as displacement."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
@@ -122,7 +139,7 @@ def bearing_router(context: Context) -> APIRouter:
         return spectrum_model(assessment)
 
     @router.get("/{bearing}/orbit", summary="Orbit", responses=no_result)
-    async def orbit(unit: str, bearing: str) -> OrbitModel:
+    async def orbit(unit: UnitId, bearing: BearingId) -> OrbitModel:
         """The newest turns of the shaft relative to the bearing."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
@@ -137,8 +154,8 @@ def gap_router(context: Context) -> APIRouter:
     """Routes about holes in the samples of a unit."""
     router = APIRouter(prefix="/api/v1/units/{unit}", tags=["plant"])
 
-    @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422))
-    async def gaps(unit: str, times: TimeRange) -> list[GapModel]:
+    @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
+    async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
         """Recorded gaps in the samples of a unit that ended within a range of time."""
         found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
         return [

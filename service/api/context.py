@@ -2,12 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Path
 
 from acquisition.clock import Clock
 from service.api.problems import ProblemError
 from service.live import LiveView
 from service.settings.units import BearingSettings, UnitSettings
 from service.store.port import Store
+
+UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
+BearingId = Annotated[str, Path(description="Identifier of a bearing.", examples=["UJB"])]
 
 
 @dataclass(frozen=True)

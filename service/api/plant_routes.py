@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from core.quantities import CATALOGUE
-from service.api.context import Context
+from service.api.context import Context, UnitId
 from service.api.models import (
     OverviewModel,
     PlantModel,
@@ -38,7 +38,7 @@ def plant_router(context: Context) -> APIRouter:
         return [_unit(context, unit) for unit in context.units]
 
     @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
-    async def one_unit(unit: str) -> UnitModel:
+    async def one_unit(unit: UnitId) -> UnitModel:
         """A unit and how its samples arrive."""
         return _unit(context, context.unit(unit).id)
 

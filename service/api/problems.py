@@ -1,6 +1,6 @@
 """Every error as a problem document (RFC 9457), whoever raised it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import structlog
@@ -14,25 +14,36 @@ from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"
 
+WORDS = {
+    404: "Unknown unit or bearing",
+    409: "No result yet",
+    422: "A wrong parameter",
+    503: "The store cannot be read",
+}
+
 log = structlog.get_logger()
 
 
 class Mistake(BaseModel):
     """One wrong parameter of a request."""
 
-    parameter: str = Field(examples=["max_points"])
-    detail: str = Field(examples=["Input should be less than or equal to 5000"])
+    parameter: str = Field(description="Its name.", examples=["max_points"])
+    detail: str = Field(
+        description="What is allowed.", examples=["Input should be less than or equal to 5000"]
+    )
 
 
 class Problem(BaseModel):
     """A problem document (RFC 9457)."""
 
-    type: str = Field(default="about:blank", examples=["about:blank"])
-    title: str = Field(examples=["Unknown unit"])
-    status: int = Field(examples=[404])
-    detail: str = Field(examples=["there is no unit 'U9' in this plant"])
-    instance: str = Field(examples=["/api/v1/units/U9"])
-    errors: list[Mistake] = Field(default_factory=list)
+    type: str = Field(default="about:blank", description="Always this.", examples=["about:blank"])
+    title: str = Field(description="Kind of problem.", examples=["Unknown unit"])
+    status: int = Field(description="HTTP status.", examples=[404])
+    detail: str = Field(
+        description="This problem.", examples=["there is no unit 'U9' in this plant"]
+    )
+    instance: str = Field(description="Path of the request.", examples=["/api/v1/units/U9"])
+    errors: list[Mistake] = Field(description="Each wrong parameter.", default_factory=list)
 
 
 class ProblemError(Exception):
@@ -46,9 +57,34 @@ class ProblemError(Exception):
 
 def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """OpenAPI entries for the problems that an operation may answer with."""
-    content = {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}
-    words = {404: "Unknown unit or bearing", 409: "No result yet", 422: "A wrong parameter"}
-    return {status: {"description": words[status], "content": content} for status in statuses}
+    return {status: _documented(WORDS[status]) for status in statuses}
+
+
+def any_other_problem() -> dict[int | str, dict[str, Any]]:
+    """OpenAPI entry for what may happen to every operation."""
+    return {"default": _documented("Any other problem")}
+
+
+def refuse_unknown_parameters(request: Request) -> None:
+    """Answer 422 to a misspelt parameter, which would otherwise seem to have been obeyed.
+
+    Raises
+    ------
+    ProblemError
+        Naming the first such parameter and those that there are.
+    """
+    operation = request.app.openapi()["paths"][request.scope["route"].path][request.method.lower()]
+    known = [p["name"] for p in operation.get("parameters", ()) if p["in"] == "query"]
+    for name in request.query_params:
+        if name not in known:
+            detail = f"there is no parameter {name!r} here; known: {', '.join(known) or 'none'}"
+            raise ProblemError(422, "Wrong parameter", detail, name)
+
+
+def _documented(words: str) -> dict[str, Any]:
+    schema = Problem.model_json_schema()
+    schema["properties"]["errors"]["items"] = schema.pop("$defs")["Mistake"]
+    return {"description": words, "content": {MEDIA_TYPE: {"schema": schema}}}
 
 
 def install_problem_handlers(app: FastAPI) -> None:
@@ -60,7 +96,8 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> JSONResponse:
-        return _render(request, error.status_code, str(error.detail), str(error.detail))
+        said = str(error.detail)
+        return _render(request, error.status_code, said, said, headers=error.headers)
 
     @app.exception_handler(RequestValidationError)
     async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
@@ -83,7 +120,12 @@ def install_problem_handlers(app: FastAPI) -> None:
 
 
 def _render(
-    request: Request, status: int, title: str, detail: str, errors: Sequence[Mistake] = ()
+    request: Request,
+    status: int,
+    title: str,
+    detail: str,
+    errors: Sequence[Mistake] = (),
+    headers: Mapping[str, str] | None = None,
 ) -> JSONResponse:
     problem = Problem(
         title=title,
@@ -92,4 +134,4 @@ def _render(
         instance=request.url.path,
         errors=list(errors),
     )
-    return JSONResponse(problem.model_dump(), status, media_type=MEDIA_TYPE)
+    return JSONResponse(problem.model_dump(), status, headers, media_type=MEDIA_TYPE)

@@ -6,6 +6,7 @@ from core.units import NS_PER_S
 from service.api.problems import ProblemError
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 
 
 def rfc3339(time_ns: int) -> str:
@@ -14,8 +15,21 @@ def rfc3339(time_ns: int) -> str:
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
+def written_as_date(text: object) -> object:
+    """Refuse a bare number, which could be a year as well as seconds since 1970.
+
+    Raises
+    ------
+    ValueError
+        Saying how a time is written.
+    """
+    if isinstance(text, str) and "-" not in text[1:]:
+        raise ValueError("a time is written like 2026-11-21T08:00:00Z")
+    return text
+
+
 def ns_from_datetime(moment: datetime, parameter: str) -> int:
-    """Nanoseconds since 1970.
+    """Nanoseconds since 1970; what an offset carries out of the years 1 to 9999 is cut off there.
 
     Raises
     ------
@@ -25,5 +39,5 @@ def ns_from_datetime(moment: datetime, parameter: str) -> int:
     if moment.tzinfo is None:
         detail = f"{parameter} needs an offset from UTC, such as a trailing Z"
         raise ProblemError(422, "Wrong parameter", detail, parameter)
-    elapsed = moment - EPOCH
+    elapsed = min(max(moment, FIRST), LAST) - EPOCH
     return (elapsed.days * 86_400 + elapsed.seconds) * NS_PER_S + elapsed.microseconds * 1000

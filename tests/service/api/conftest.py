@@ -1,0 +1,139 @@
+"""The API over a real store and a real monitor, fed by the simulated plant, asked in process."""
+
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from acquisition.calibration import calibrate
+from core.assessment import Assessment
+from core.monitor import UnitMonitor
+from service.api.app import create_app
+from service.api.context import Context
+from service.conversion import analysis_of, calibration_of, machine_of
+from service.live import LinkState, LiveView
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.store.sqlite import SqliteStore
+from service.wiring import simulated_feed
+
+DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
+
+N_RESULTS = 6
+STALE_AFTER_S = 30.0
+
+
+class SetClock:
+    """Time that tests set."""
+
+    def __init__(self) -> None:
+        self.ns = 1_767_225_600_000_000_000
+        self.s = 0.0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def monotonic_s(self) -> float:
+        return self.s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.s += duration_s
+
+
+@pytest.fixture(scope="session")
+def plant() -> PlantFile:
+    """The demonstration plant: U1 at part load, U2 at full load."""
+    return load_plant_file(DEMO)
+
+
+@pytest.fixture(scope="session")
+def assessments(plant: PlantFile) -> list[Assessment]:
+    """What a monitor of unit U1 finds in the first minutes, oldest first."""
+    unit = plant.unit[0]
+    feed = simulated_feed(unit, SetClock())
+    settings = analysis_of(plant.analysis)
+    monitor = UnitMonitor(machine_of(unit), settings)
+    n_samples = settings.segment_samples + (N_RESULTS - 1) * settings.hop_samples
+    return monitor.ingest(calibrate(feed.advance(n_samples), calibration_of(unit)))
+
+
+@dataclass
+class Service:
+    """Everything behind the API, for tests to change."""
+
+    live: LiveView
+    store: SqliteStore
+    clock: SetClock
+    client: httpx2.AsyncClient
+    document: dict[str, Any]
+
+    async def get(self, path: str, **parameters: object) -> httpx2.Response:
+        return await self.client.get(path, params=parameters)
+
+    async def json(self, path: str, **parameters: object) -> Any:
+        response = await self.get(path, **parameters)
+        assert response.status_code == 200, response.text
+        assert response.headers["content-type"] == "application/json"
+        return response.json()
+
+    async def problem(self, path: str, status: int, **parameters: object) -> dict[str, Any]:
+        response = await self.get(path, **parameters)
+        assert response.status_code == status, response.text
+        return problem_of(response)
+
+
+def problem_of(response: httpx2.Response) -> dict[str, Any]:
+    """The problem document of a response, checked."""
+    assert response.headers["content-type"] == "application/problem+json"
+    body: dict[str, Any] = response.json()
+    assert set(body) == {"type", "title", "status", "detail", "instance", "errors"}
+    assert body["status"] == response.status_code
+    assert body["instance"] == response.url.path
+    assert body["title"]
+    assert body["detail"]
+    return body
+
+
+@pytest.fixture
+def as_problem() -> Callable[[httpx2.Response], dict[str, Any]]:
+    return problem_of
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[SqliteStore]:
+    opened = SqliteStore(tmp_path / "padwatch.sqlite3")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service]:
+    """A service that has just started: nothing is connected, nothing stored."""
+    clock = SetClock()
+    live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
+    context = Context(
+        plant_name=plant.plant.name,
+        units={unit.id: unit for unit in plant.unit},
+        live=live,
+        store=store,
+        clock=clock,
+        refresh_s=11.95,
+    )
+    app = create_app(context)
+    transport = httpx2.ASGITransport(app)
+    async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
+        yield Service(live, store, clock, client, app.openapi())
+
+
+@pytest.fixture
+def running(service: Service, assessments: list[Assessment]) -> Service:
+    """U1 connected, its results shown and stored; U2 never connected."""
+    service.live.set_link("U1", LinkState.CONNECTED)
+    service.live.set_link("U2", LinkState.NOT_CONNECTED, "127.0.0.1:502: Connection refused")
+    for assessment in assessments:
+        service.live.set_assessment(assessment)
+    service.store.append(assessments, [])
+    return service

@@ -1,0 +1,304 @@
+"""What the API says of a bearing is what the monitor found, to the last bit."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.account import Gap, SampleAccount
+from core.assessment import Assessment
+from core.quantities import CATALOGUE
+from service.api.times import rfc3339
+from service.live import LinkState
+from service.store.port import UnitGap
+
+UJB = "/api/v1/units/U1/bearings/UJB"
+K = "order1_k_eff_xx_n_per_m"
+
+
+@pytest.fixture
+def found(assessments: list[Assessment]) -> list[Assessment]:
+    """Results of the upper bearing, oldest first."""
+    return [a for a in assessments if a.bearing == "UJB"]
+
+
+async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
+    running: Any, found: list[Assessment]
+) -> None:
+    body = await running.json(f"{UJB}/latest")
+
+    newest = found[-1]
+    assert set(body["readings"]) == {quantity.name for quantity in CATALOGUE}
+    for quantity in CATALOGUE:
+        shown, reading = body["readings"][quantity.name], newest.readings[quantity.name]
+        assert shown["value"] == reading.value
+        assert shown["level"] == reading.quality.level.name.lower()
+        assert shown["reason"] == reading.quality.reason.value
+        assert (shown["unit"], shown["label"]) == (quantity.unit, quantity.label)
+    assert body["readings"][K]["value"] == pytest.approx(0.69e9, rel=0.1)
+    assert body["quality"] == {"level": "good", "reason": "ok"}
+    assert body["time"] == rfc3339(newest.time_ns)
+    assert body["speed_source"] == "slow_channel"
+    assert body["window"] == {
+        "epoch": newest.window.epoch,
+        "first_index": newest.window.first_index,
+        "last_index": newest.window.stop_index - 1,
+        "n_segments": 6,
+        "n_segments_wanted": 24,
+        "n_voided": 0,
+        "coverage": 1.0,
+        "duration_s": newest.window.duration_s,
+    }
+
+
+async def test_the_age_of_a_result_grows_until_it_is_no_longer_current(running: Any) -> None:
+    running.clock.s += 29.5
+    ageing = await running.json(f"{UJB}/latest")
+    running.clock.s += 1.0
+    stale = await running.json(f"{UJB}/latest")
+
+    assert ageing["age_s"] == 29.5
+    assert ageing["readings"][K]["value"] is not None
+    assert stale["age_s"] == 30.5
+    assert stale["quality"] == {"level": "bad", "reason": "stale"}
+    assert {r["value"] for r in stale["readings"].values()} == {None}
+    assert {r["reason"] for r in stale["readings"].values()} == {"stale"}
+    assert stale["time"] == ageing["time"]
+
+
+async def test_a_unit_that_is_not_connected_shows_no_number(running: Any) -> None:
+    running.live.set_link("U1", LinkState.NOT_CONNECTED, "10.0.0.7:502: timed out")
+
+    for unit in ("U1", "U2"):
+        body = await running.json(f"/api/v1/units/{unit}/bearings/UJB/latest")
+        assert body["quality"] == {"level": "bad", "reason": "not_connected"}
+        assert {r["value"] for r in body["readings"].values()} == {None}
+        assert {r["level"] for r in body["readings"].values()} == {"bad"}
+        assert {r["reason"] for r in body["readings"].values()} == {"not_connected"}
+    assert body["time"] is None
+    assert body["window"] is None
+
+
+async def test_before_the_first_segment_a_bearing_waits_for_data(service: Any) -> None:
+    service.live.set_link("U1", LinkState.CONNECTED)
+
+    body = await service.json(f"{UJB}/latest")
+
+    assert body["quality"] == {"level": "bad", "reason": "waiting_for_data"}
+    assert {r["value"] for r in body["readings"].values()} == {None}
+    assert body["age_s"] is None
+    assert body["speed_source"] is None
+
+
+async def test_a_bearing_is_described_as_configured(running: Any) -> None:
+    one = await running.json(UJB)
+    all_of_them = await running.json("/api/v1/units/U1/bearings")
+
+    assert one == {
+        "unit": "U1",
+        "id": "UJB",
+        "bracket_stiffness_n_per_m": 1.18e9,
+        "clearance_um": 200.0,
+        "gap_reference_um": [2000.0, 2000.0],
+        "channels": {
+            "shaft_x": "ujb_shaft_x",
+            "shaft_y": "ujb_shaft_y",
+            "bearing_x": "ujb_bearing_x",
+            "bearing_y": "ujb_bearing_y",
+        },
+    }
+    assert [bearing["id"] for bearing in all_of_them] == ["UJB", "LJB", "TJB"]
+    assert all_of_them[0] == one
+
+
+async def test_trends_are_the_stored_readings_to_the_last_bit(
+    running: Any, found: list[Assessment]
+) -> None:
+    body = await running.json(
+        f"{UJB}/trends",
+        start="2026-01-01T00:00:00Z",
+        end="2026-01-02T01:00:00+01:00",
+        quantity=["speed_rpm", K],
+    )
+
+    assert body["bucket_s"] is None
+    assert body["time"] == [a.time_ns / 1_000_000_000 for a in found]
+    assert (body["start"], body["end"]) == ("2026-01-01T00:00:00.000Z", "2026-01-02T00:00:00.000Z")
+    assert list(body["series"]) == ["speed_rpm", K]
+    series = body["series"][K]
+    assert series["mean"] == series["min"] == series["max"]
+    assert series["mean"] == [a.readings[K].value for a in found]
+    assert series["count"] == [1] * len(found)
+    assert series["worst_level"] == [a.readings[K].quality.level.name.lower() for a in found]
+    assert series["unit"] == "N/m"
+
+
+async def test_many_readings_are_gathered_into_buckets(
+    running: Any, found: list[Assessment]
+) -> None:
+    body = await running.json(
+        f"{UJB}/trends",
+        start="2026-01-01T00:00:00Z",
+        end="2026-01-01T00:02:00Z",
+        quantity=K,
+        max_points=3,
+    )
+
+    values = [a.readings[K].value for a in found]
+    assert body["bucket_s"] == 60.0
+    assert body["time"] == [1_767_225_600.0, 1_767_225_660.0]
+    assert sum(body["series"][K]["count"]) == len(values) == 6
+    assert min(body["series"][K]["min"]) == min(v for v in values if v)
+    assert max(body["series"][K]["max"]) == max(v for v in values if v)
+
+
+async def test_trends_are_filtered_by_condition(running: Any, found: list[Assessment]) -> None:
+    eccentricity = sorted(a.readings["eccentricity_ratio"].value or 0.0 for a in found)
+    whole = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z", "quantity": K}
+
+    above = await running.json(f"{UJB}/trends", **whole, eccentricity_min=repr(eccentricity[2]))
+    between = await running.json(
+        f"{UJB}/trends",
+        **whole,
+        eccentricity_min=repr(eccentricity[1]),
+        eccentricity_max=repr(eccentricity[3]),
+    )
+    hot = await running.json(f"{UJB}/trends", **whole, oil_temperature_min=90)
+
+    def n(body: Any) -> int:
+        return sum(body["series"][K]["count"])
+
+    assert (n(above), n(between), n(hot)) == (4, 3, 0)
+
+
+async def test_a_hole_in_the_trend_is_a_point_without_a_value(
+    running: Any, found: list[Assessment]
+) -> None:
+    from dataclasses import replace
+
+    late = replace(found[-1], time_ns=found[-1].time_ns + 600_000_000_000)
+    running.store.append([late], [])
+
+    body = await running.json(
+        f"{UJB}/trends", start="2026-01-01T00:00:00Z", end="2026-01-02T00:00:00Z", quantity=K
+    )
+
+    assert body["series"][K]["mean"][-2] is None
+    assert body["series"][K]["worst_level"][-2] is None
+    assert body["series"][K]["count"][-2:] == [0, 1]
+
+
+async def test_the_spectrum_shows_the_lines_where_the_readings_say(
+    running: Any, found: list[Assessment]
+) -> None:
+    body = await running.json(f"{UJB}/spectrum")
+
+    newest = found[-1]
+    frequency = np.array(body["frequency_hz"])
+    shaft = np.array(body["channels"]["shaft_x"]["amplitude"])
+    assert set(body["channels"]) == {"shaft_x", "shaft_y", "bearing_x", "bearing_y"}
+    assert body["lines"]["order1"] == newest.readings["order1_frequency_hz"].value
+    assert body["lines"]["vortex"] == newest.readings["vortex_frequency_hz"].value
+    for line in body["lines"].values():
+        near = np.abs(frequency - line) <= 2 * frequency[0]
+        assert shaft[near].max() > 10 * np.median(shaft)
+    assert shaft.tolist() == newest.spectrum.amplitude_um_pk(0).tolist()
+
+
+async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[Assessment]) -> None:
+    from dataclasses import replace
+
+    n_segments = found[-1].spectrum.n_segments.copy()
+    n_segments[2, :] = n_segments[:, 2] = 0
+    spectrum = replace(found[-1].spectrum, n_segments=n_segments)
+    running.live.set_assessment(replace(found[-1], spectrum=spectrum))
+
+    channels = (await running.json(f"{UJB}/spectrum"))["channels"]
+
+    assert channels["bearing_x"]["amplitude"] is None
+    assert len(channels["bearing_y"]["amplitude"]) > 100
+
+
+async def test_the_orbit_is_the_newest_three_turns(running: Any, found: list[Assessment]) -> None:
+    body = await running.json(f"{UJB}/orbit")
+
+    orbit = found[-1].orbit
+    assert orbit is not None
+    assert body["shaft_x_um"] == orbit.shaft_x_um.tolist()
+    assert body["shaft_y_um"] == orbit.shaft_y_um.tolist()
+    assert body["time"] == rfc3339(orbit.start_ns)
+    assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)
+
+
+@pytest.mark.parametrize("what", ["spectrum", "orbit"])
+async def test_without_a_result_there_is_no_spectrum_and_no_orbit(service: Any, what: str) -> None:
+    problem = await service.problem(f"{UJB}/{what}", 409)
+
+    assert "no result yet" in problem["detail"]
+
+
+async def test_gaps_are_listed_with_their_exact_length(running: Any) -> None:
+    stop_ns = 1_767_225_700_500_000_000
+    running.store.append([], [UnitGap("U1", Gap(1, 60_000, 450, stop_ns))])
+    running.store.append([], [UnitGap("U2", Gap(1, 0, 1, stop_ns))])
+    whole = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
+
+    assert await running.json("/api/v1/units/U1/gaps", **whole) == [
+        {
+            "epoch": 1,
+            "first_index": 60_000,
+            "n_samples": 450,
+            "end": "2026-01-01T00:01:40.500Z",
+        }
+    ]
+    later = {"start": "2026-01-01T00:01:41Z", "end": "2026-01-02T00:00:00Z"}
+    assert await running.json("/api/v1/units/U1/gaps", **later) == []
+
+
+async def test_units_say_how_their_samples_arrive(running: Any) -> None:
+    account = SampleAccount(8000, 100, 50, 7, 1, {"torn": 25})
+    running.live.set_received("U1", 1_767_225_613_000_000_000, account)
+    running.clock.s += 4.0
+
+    one = await running.json("/api/v1/units/U1")
+    both = await running.json("/api/v1/units")
+
+    assert one["source"] == {
+        "state": "connected",
+        "reason": None,
+        "since": "2026-01-01T00:00:00.000Z",
+        "data_age_s": 4.0,
+        "last_sample_time": "2026-01-01T00:00:13.000Z",
+        "n_offered": 8175,
+        "n_stored": 8000,
+        "n_flagged": 100,
+        "n_gap": 50,
+        "n_repeated": 7,
+        "n_restarts": 1,
+        "rejected": {"torn": 25},
+    }
+    assert both[0] == one
+    assert one["bearing_ids"] == ["UJB", "LJB", "TJB"]
+    assert both[1]["source"]["state"] == "not_connected"
+    assert both[1]["source"]["reason"] == "127.0.0.1:502: Connection refused"
+    assert both[1]["source"]["data_age_s"] is None
+
+
+async def test_the_overview_shows_what_each_bearing_shows(running: Any) -> None:
+    overview = await running.json("/api/v1/overview")
+
+    assert overview["plant"] == {"name": "Demo plant"}
+    assert overview["time"] == "2026-01-01T00:00:00.000Z"
+    assert overview["refresh_s"] == 11.95
+    assert overview["store"] == {"error": None, "n_unstored": 0}
+    for unit in overview["units"]:
+        assert unit["source"] == (await running.json(f"/api/v1/units/{unit['id']}"))["source"]
+        for bearing in unit["bearings"]:
+            path = f"/api/v1/units/{unit['id']}/bearings/{bearing['bearing']}/latest"
+            assert await running.json(path) == bearing
+
+
+async def test_the_catalogue_names_every_quantity(running: Any) -> None:
+    assert await running.json("/api/v1/quantities") == [
+        {"name": q.name, "unit": q.unit, "label": q.label} for q in CATALOGUE
+    ]

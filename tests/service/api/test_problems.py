@@ -1,0 +1,204 @@
+"""Every error is a problem document that names what is wrong."""
+
+import sqlite3
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+import pytest
+
+from core.assessment import Assessment
+from service.store import sqlite
+
+AsProblem = Callable[[httpx2.Response], dict[str, Any]]
+
+TRENDS = "/api/v1/units/U1/bearings/UJB/trends"
+WHOLE = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
+GOOD = {**WHOLE, "quantity": "speed_rpm"}
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/api/v1/units/U9",
+        "/api/v1/units/U9/bearings",
+        "/api/v1/units/U9/bearings/UJB",
+        "/api/v1/units/U9/bearings/UJB/latest",
+        "/api/v1/units/U9/bearings/UJB/spectrum",
+        "/api/v1/units/U9/bearings/UJB/orbit",
+        "/api/v1/units/u1",
+        "/api/v1/units/%00",
+        "/api/v1/units/'; DROP TABLE assessment; --",
+    ],
+)
+async def test_an_unknown_unit_is_not_found(running: Any, path: str) -> None:
+    problem = await running.problem(path, 404)
+
+    assert problem["title"] == "Unknown unit"
+    assert "there is no unit" in problem["detail"]
+
+
+@pytest.mark.parametrize("what", ["", "/latest", "/spectrum", "/orbit"])
+async def test_an_unknown_bearing_is_not_found(running: Any, what: str) -> None:
+    problem = await running.problem(f"/api/v1/units/U1/bearings/XJB{what}", 404)
+
+    assert problem["detail"] == "unit 'U1' has no bearing 'XJB'"
+
+
+async def test_trends_and_gaps_of_nobody_are_not_found(running: Any) -> None:
+    await running.problem("/api/v1/units/U9/bearings/UJB/trends", 404, **GOOD)
+    await running.problem("/api/v1/units/U1/bearings/XJB/trends", 404, **GOOD)
+    await running.problem("/api/v1/units/U9/gaps", 404, **WHOLE)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "said"),
+    [
+        ("max_points", 0, "greater than or equal to 2"),
+        ("max_points", -5, "greater than or equal to 2"),
+        ("max_points", 1_000_000_000, "less than or equal to 5000"),
+        ("max_points", "9" * 5000, ""),
+        ("max_points", "many", "valid integer"),
+        ("max_points", "", "valid integer"),
+        ("max_points", "2.5", "valid integer"),
+        ("start", "2026-01-03T00:00:00Z", "must be before end"),
+        ("start", "2026-01-02T00:00:00Z", "must be before end"),
+        ("start", "2026-01-01T00:00:00", "offset from UTC"),
+        ("start", "2026-01-01", "offset from UTC"),
+        ("start", "yesterday", "written like 2026-11-21T08:00:00Z"),
+        ("start", "2026", "written like 2026-11-21T08:00:00Z"),
+        ("start", "1767225600", "written like 2026-11-21T08:00:00Z"),
+        ("start", "-1767225600", "written like"),
+        ("start", "1e-5", ""),
+        ("start", "2026-02-30T00:00:00Z", "day value is outside expected range"),
+        ("start", "2026-01-01T25:00:00Z", "valid datetime"),
+        ("start", "+10000-01-01T00:00:00Z", ""),
+        ("end", "2025-01-01T00:00:00Z", "must be before end"),
+        ("end", "", "written like"),
+        ("end", "2026-01-02T00:00:00", "offset from UTC"),
+        ("eccentricity_min", "nan", "finite number"),
+        ("eccentricity_max", "inf", "finite number"),
+        ("oil_temperature_min", "-inf", "finite number"),
+        ("oil_temperature_max", "NaN", "finite number"),
+        ("oil_temperature_max", "warm", "valid number"),
+        ("quantity", "stiffness", "not in the catalogue"),
+        ("quantity", "", "not in the catalogue"),
+        ("quantity", ["speed_rpm", "speed"], "not in the catalogue"),
+        ("quantity", ["speed_rpm"] * 41, "at most 40"),
+        ("max_point", 10, "there is no parameter 'max_point' here; known: quantity, max_points"),
+        ("eccentricity_mn", 0.2, "there is no parameter"),
+    ],
+)
+async def test_a_wrong_query_is_answered_with_the_parameter_and_what_is_allowed(
+    running: Any, parameter: str, value: object, said: str
+) -> None:
+    problem = await running.problem(TRENDS, 422, **{**GOOD, parameter: value})
+
+    wrong = "start" if "before end" in said else parameter
+    assert [error["parameter"].split(".")[0] for error in problem["errors"]] == [wrong]
+    assert said in problem["errors"][0]["detail"]
+    assert said in problem["detail"]
+
+
+@pytest.mark.parametrize("quantity", ["eccentricity", "oil_temperature"])
+async def test_a_lowest_value_above_the_highest_is_refused(running: Any, quantity: str) -> None:
+    bounds = {f"{quantity}_min": 2.5, f"{quantity}_max": 1.5}
+
+    problem = await running.problem(TRENDS, 422, **GOOD, **bounds)
+
+    assert problem["errors"][0]["parameter"] == f"{quantity}_min"
+    assert problem["detail"] == f"{quantity}_min 2.5 must not be above its maximum 1.5"
+
+
+@pytest.mark.parametrize("parameter", ["start", "end", "quantity"])
+async def test_a_missing_parameter_is_named(running: Any, parameter: str) -> None:
+    query = {name: value for name, value in GOOD.items() if name != parameter}
+
+    problem = await running.problem(TRENDS, 422, **query)
+
+    assert [error["parameter"] for error in problem["errors"]] == [parameter]
+    assert "required" in problem["detail"].lower()
+
+
+async def test_all_wrong_parameters_are_named_at_once(running: Any) -> None:
+    query = {"start": "soon", "end": "later", "quantity": "speed_rpm", "max_points": 0}
+
+    problem = await running.problem(TRENDS, 422, **query)
+
+    assert {error["parameter"] for error in problem["errors"]} == {"start", "end", "max_points"}
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/livez", "/readyz", "/api/v1/overview", "/api/v1/units/U1", "/api/v1/quantities"],
+)
+async def test_a_parameter_that_nobody_knows_is_refused_everywhere(running: Any, path: str) -> None:
+    problem = await running.problem(path, 422, verbose=1)
+
+    assert problem["errors"][0]["parameter"] == "verbose"
+    assert problem["detail"] == "there is no parameter 'verbose' here; known: none"
+
+
+async def test_gaps_check_their_range_too(running: Any) -> None:
+    problem = await running.problem(
+        "/api/v1/units/U1/gaps", 422, start="2026-01-02T00:00:00Z", end="2026-01-01T00:00:00Z"
+    )
+
+    assert problem["errors"][0]["parameter"] == "start"
+
+
+@pytest.mark.parametrize("path", ["/api/v1/nothing", "/api/v2/units", "/nowhere", "/static/no.js"])
+async def test_an_unknown_path_is_a_problem_too(running: Any, path: str) -> None:
+    await running.problem(path, 404)
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE"])
+async def test_nothing_can_be_written(running: Any, as_problem: AsProblem, method: str) -> None:
+    response = await running.client.request(method, "/api/v1/units")
+
+    assert response.status_code == 405
+    assert response.headers["allow"] == "GET"
+    as_problem(response)
+
+
+async def test_a_range_that_could_take_all_memory_is_refused(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqlite, "MAX_ROWS", 3)
+
+    problem = await running.problem(TRENDS, 422, **GOOD)
+
+    assert {error["parameter"] for error in problem["errors"]} == {"start", "end"}
+    assert problem["detail"] == "6 readings in this range, at most 3 are read at once"
+
+
+async def test_a_store_that_cannot_be_read_is_503_without_its_innards(
+    running: Any, assessments: list[Assessment]
+) -> None:
+    assert assessments
+    connection = sqlite3.connect(running.store._path)
+    connection.executescript("DROP TABLE gap; ALTER TABLE assessment RENAME TO gone")
+    connection.close()
+
+    for path, query in ((TRENDS, GOOD), ("/api/v1/units/U1/gaps", WHOLE)):
+        problem = await running.problem(path, 503, **query)
+        assert problem["detail"] == "the store cannot be read just now"
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [
+        ("0001-01-01T00:00:00Z", "9999-12-31T23:59:59.999999Z"),
+        ("0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-14:00"),
+        ("1969-12-31T23:59:59Z", "2300-01-01T00:00:00Z"),
+    ],
+)
+@pytest.mark.parametrize("max_points", [2, 5000])
+async def test_far_years_are_no_error(running: Any, start: str, end: str, max_points: int) -> None:
+    query = {"start": start, "end": end, "quantity": "speed_rpm", "max_points": max_points}
+
+    body = await running.json(TRENDS, **query)
+
+    assert sum(body["series"]["speed_rpm"]["count"]) == 6
+    assert len(body["time"]) <= max_points
+    assert await running.json("/api/v1/units/U1/gaps", start=start, end=end) == []
