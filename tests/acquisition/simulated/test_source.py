@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.calibration import UnitCalibration, calibrate
 from acquisition.clock import Clock
-from acquisition.simulated.demo import full_load
+from acquisition.simulated.scenario import Scenario
 from acquisition.simulated.source import SimulatedSource
 from acquisition.simulated.unit import SimulatedUnit
 from acquisition.source import SampleSource
@@ -30,9 +30,9 @@ async def take(source: SampleSource, n_blocks: int) -> list[SampleBlock]:
 
 
 async def test_an_unpaced_source_goes_on_where_it_was_left(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    feed = build_unit(full_load())
+    feed = build_unit(full_load)
     source = SimulatedSource(feed, calibration, clock, block_samples=500, paced=False)
 
     blocks = await take(source, 3)
@@ -41,14 +41,14 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
 
     assert [block.first_index for block in blocks] == [0, 500, 1000, 1500, 2000]
     assert clock.elapsed_s == 3600.0
-    expected = calibrate(build_unit(full_load()).advance(2500), calibration)
+    expected = calibrate(build_unit(full_load).advance(2500), calibration)
     assert np.array_equal(np.concatenate([b.samples for b in blocks], axis=1), expected.samples)
 
 
 async def test_a_paced_source_delivers_samples_when_they_have_happened(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    source = SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=300)
+    source = SimulatedSource(build_unit(full_load), calibration, clock, block_samples=300)
 
     await take(source, 4)
 
@@ -56,9 +56,9 @@ async def test_a_paced_source_delivers_samples_when_they_have_happened(
 
 
 async def test_what_passed_while_nobody_was_connected_shows_as_a_jump_of_the_index(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    source = SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=300)
+    source = SimulatedSource(build_unit(full_load), calibration, clock, block_samples=300)
     before = await take(source, 2)
     clock.elapsed_s += 300.0
 
@@ -71,9 +71,9 @@ async def test_what_passed_while_nobody_was_connected_shows_as_a_jump_of_the_ind
 
 
 async def test_a_slow_reader_of_a_paced_source_loses_nothing(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    source = SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=300)
+    source = SimulatedSource(build_unit(full_load), calibration, clock, block_samples=300)
     indices = []
     async with source.connect() as stream:
         async for block in stream:
@@ -86,7 +86,7 @@ async def test_a_slow_reader_of_a_paced_source_loses_nothing(
 
 
 def test_blocks_without_samples_are_refused(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock
+    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
     with pytest.raises(ValueError, match="got 0"):
-        SimulatedSource(build_unit(full_load()), calibration, clock, block_samples=0)
+        SimulatedSource(build_unit(full_load), calibration, clock, block_samples=0)

@@ -1,4 +1,5 @@
 import math
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -8,7 +9,6 @@ import pytest
 from acquisition.calibration import UnitCalibration, calibrate
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
-from acquisition.simulated.demo import full_load, part_load
 from acquisition.simulated.plant import CHUNK_SAMPLES
 from acquisition.simulated.scenario import Scenario
 from acquisition.simulated.unit import SimulatedUnit
@@ -24,19 +24,29 @@ def joined(blocks: list[RawBlock]) -> list[list[int]]:
     return counts
 
 
-@pytest.mark.parametrize("scenario", [full_load(), part_load()], ids=["full_load", "part_load"])
 def test_counts_do_not_depend_on_the_pieces_they_are_asked_for_in(
-    build_unit: BuildUnit, scenario: Scenario
+    build_unit: BuildUnit, full_load: Scenario, part_load: Scenario
 ) -> None:
-    whole = build_unit(scenario).advance(sum(PIECES))
-    unit = build_unit(scenario)
-    blocks = [unit.advance(n) for n in PIECES]
+    for scenario in (full_load, part_load):
+        whole = build_unit(scenario).advance(sum(PIECES))
+        unit = build_unit(scenario)
+        blocks = [unit.advance(n) for n in PIECES]
 
-    assert joined(blocks) == whole.counts.tolist()
+        assert joined(blocks) == whole.counts.tolist()
 
 
-def test_slow_readings_depend_on_the_sample_and_not_on_the_pieces(build_unit: BuildUnit) -> None:
-    one, other = build_unit(part_load()), build_unit(part_load())
+def test_an_ordinary_day_is_the_same_in_every_version(
+    build_unit: BuildUnit, full_load: Scenario, part_load: Scenario
+) -> None:
+    sums = [zlib.crc32(build_unit(s).advance(180_000).counts) for s in (full_load, part_load)]
+
+    assert sums == [3341452830, 3235138598]
+
+
+def test_slow_readings_depend_on_the_sample_and_not_on_the_pieces(
+    build_unit: BuildUnit, part_load: Scenario
+) -> None:
+    one, other = build_unit(part_load), build_unit(part_load)
     for n in (5000, 3000, 500):
         one.advance(n)
     other.advance(8500)
@@ -45,16 +55,18 @@ def test_slow_readings_depend_on_the_sample_and_not_on_the_pieces(build_unit: Bu
 
 
 def test_the_same_seed_gives_the_same_counts_and_another_gives_others(
-    build_unit: BuildUnit,
+    build_unit: BuildUnit, full_load: Scenario
 ) -> None:
-    first, second, other = (build_unit(full_load(), seed).advance(3000) for seed in (1, 1, 2))
+    first, second, other = (build_unit(full_load, seed).advance(3000) for seed in (1, 1, 2))
 
     assert np.array_equal(first.counts, second.counts)
     assert not np.array_equal(first.counts, other.counts)
 
 
-def test_blocks_follow_on_each_other_in_index_and_time(build_unit: BuildUnit) -> None:
-    unit = build_unit(full_load())
+def test_blocks_follow_on_each_other_in_index_and_time(
+    build_unit: BuildUnit, full_load: Scenario
+) -> None:
+    unit = build_unit(full_load)
     start_ns = unit.advance(700).start_ns
 
     block = unit.advance(1)
@@ -66,18 +78,18 @@ def test_blocks_follow_on_each_other_in_index_and_time(build_unit: BuildUnit) ->
 
 
 def test_a_healthy_unit_is_read_without_a_flag(
-    build_unit: BuildUnit, calibration: UnitCalibration
+    build_unit: BuildUnit, calibration: UnitCalibration, full_load: Scenario, part_load: Scenario
 ) -> None:
-    for scenario in (full_load(), part_load()):
+    for scenario in (full_load, part_load):
         block = calibrate(build_unit(scenario).advance(60 * 600), calibration)
 
         assert all(quality.level is Level.GOOD for quality in block.channel_quality)
 
 
 def test_slow_channels_agree_with_the_waveforms_and_the_truth(
-    build_unit: BuildUnit, calibration: UnitCalibration
+    build_unit: BuildUnit, calibration: UnitCalibration, full_load: Scenario
 ) -> None:
-    unit = build_unit(full_load())
+    unit = build_unit(full_load)
     truth = unit.truth()
     block = calibrate(unit.advance(390), calibration)
     slow = {name: reading.value for name, reading in block.slow.items()}
