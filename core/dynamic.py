@@ -14,7 +14,7 @@ from core.arrays import FloatArray
 from core.bracket import BracketDynamics
 from core.cross_spectrum import BEARING_X, CrossSpectrum
 from core.dynamic_settings import DynamicSettings
-from core.film_fit import explained_share, lack_of_fit, line_weights, signal_share
+from core.film_fit import explained_share, lack_of_fit, line_weights, signal_share, smoother
 from core.normal_equations import NormalEquations, normal_equations
 from core.probe_noise import probe_noise_power
 from core.quality import Reason
@@ -109,9 +109,8 @@ def dynamic_stiffness(
     index = np.flatnonzero(lines)
     stiffness = bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[index])
     equations = normal_equations(spectrum, index, stiffness, noise_power)
-    weight = line_weights(
-        equations, spectrum.matrix[index], settings.smoothing_lines, settings.n_iterations
-    )
+    smoothing = smoother(index, settings.smoothing_reach_bins)
+    weight = line_weights(equations, spectrum.matrix[index], smoothing, settings.n_iterations)
     if weight is None:
         return Reason.INSUFFICIENT_EXCITATION
     found = _result(spectrum, lines, bracket, equations, weight, noise_power, n_segments)

@@ -20,8 +20,8 @@ class DynamicSettings:
     quiet_band_hz
         Where it is estimated: the shaft hardly moves there, and what it moves shows in the
         bearing channels and is taken out.
-    smoothing_lines
-        Lines over which the residual spectrum is smoothed before it weighs them.
+    smoothing_reach_bins
+        To each side, over which the residual spectrum is smoothed before it weighs the lines.
     n_iterations
         Of fitting and weighting; the third changes stiffness by less than 0.01 %.
     min_segments
@@ -43,7 +43,7 @@ class DynamicSettings:
     selection: LineSelection = field(default_factory=LineSelection)
     probe_noise_um2_per_hz: tuple[float, float] | None = None
     quiet_band_hz: tuple[float, float] = (15.0, 25.0)
-    smoothing_lines: int = 9
+    smoothing_reach_bins: int = 6
     n_iterations: int = 4
     min_segments: int = 4
     min_lines: int = 12
@@ -56,7 +56,7 @@ class DynamicSettings:
         for name, (low, high) in (("band", self.band_hz), ("quiet band", self.quiet_band_hz)):
             if not 0.0 < low < high:
                 raise ValueError(f"{name} must rise from above 0 Hz, got {low} to {high} Hz")
-        if min(self.smoothing_lines, self.n_iterations, self.min_lines) < 1:
-            raise ValueError("smoothing lines, iterations and least lines must be at least 1")
+        if min(self.smoothing_reach_bins, self.n_iterations, self.min_lines) < 1:
+            raise ValueError("smoothing reach, iterations and least lines must be at least 1")
         if self.min_segments < 3:
             raise ValueError(f"two inputs need at least 3 segments, got {self.min_segments}")

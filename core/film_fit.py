@@ -1,7 +1,7 @@
 """Fitting a film to spectra: weights from the residual, evidence, and whether the model holds."""
 
 import numpy as np
-from scipy.signal import savgol_filter
+import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import BEARING_X
@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 def line_weights(
-    equations: NormalEquations, matrix: ComplexArray, smoothing_lines: int, n_iterations: int
+    equations: NormalEquations, matrix: ComplexArray, smoothing: FloatArray, n_iterations: int
 ) -> FloatArray | None:
     """Reciprocal residual spectra, (n_lines, 2), fitted in turn with the film.
 
@@ -26,6 +26,8 @@ def line_weights(
     ----------
     matrix : (n_lines, 4, 4)
         The cross-spectra of the lines.
+    smoothing : (n_lines, n_lines)
+        From `smoother`.
 
     Returns
     -------
@@ -38,12 +40,12 @@ def line_weights(
     )
     coherence = 1.0 - rest / power
     residual = equations.force_power * (1.0 - coherence)
-    weight = coherence / smoothed(residual, equations.force_power, smoothing_lines)
+    weight = coherence / _smoothed(smoothing, residual, equations.force_power)
     for _ in range(n_iterations):
         if signal_share(equations, weight) < LEAST_SHARE:
             return None
         residual = equations.residual(equations.solve(weight, equations.force))
-        weight = 1.0 / smoothed(residual, equations.force_power, smoothing_lines)
+        weight = 1.0 / _smoothed(smoothing, residual, equations.force_power)
     return weight if signal_share(equations, weight) >= LEAST_SHARE else None
 
 
@@ -60,14 +62,29 @@ def signal_share(equations: NormalEquations, weight: FloatArray) -> float:
     return min(shares)
 
 
-def smoothed(residual: FloatArray, force_power: FloatArray, n_lines: int) -> FloatArray:
-    """Running straight line through the logarithm, (n_lines, 2): transducer noise is steep."""
-    logarithm = np.log(np.maximum(residual, ROUNDING * force_power))
-    length = min(n_lines, residual.shape[0])
-    if length < 3:
-        return np.exp(logarithm)
-    smooth = savgol_filter(logarithm, length - 1 + length % 2, polyorder=1, axis=0)
-    return np.exp(np.asarray(smooth, dtype=np.float64))
+def smoother(lines: npt.NDArray[np.int64], reach: int) -> FloatArray:
+    """Matrix that puts a straight line through the neighbours of each line, (n_lines, n_lines).
+
+    Parameters
+    ----------
+    lines
+        Indices of the lines; those further than `reach` bins apart are no neighbours.
+    """
+    distance = np.subtract.outer(lines, lines).astype(np.float64)
+    near = (np.abs(distance) <= reach).astype(np.float64)
+    count, first = near.sum(axis=1), (near * distance).sum(axis=1)
+    second = (near * distance**2).sum(axis=1)
+    alone = count * second == first**2  # a line without neighbours keeps what it has
+    determinant = np.where(alone, 1.0, count * second - first**2)
+    sloped = near * (second[:, np.newaxis] - first[:, np.newaxis] * distance)
+    matrix: FloatArray = np.where(alone[:, np.newaxis], np.eye(lines.size), sloped)
+    return matrix / determinant[:, np.newaxis]
+
+
+def _smoothed(smoothing: FloatArray, residual: FloatArray, force_power: FloatArray) -> FloatArray:
+    """Straight lines through the logarithm: the spectra of transducer noise are steep."""
+    smooth: FloatArray = np.exp(smoothing @ np.log(np.maximum(residual, ROUNDING * force_power)))
+    return smooth
 
 
 def explained_share(
