@@ -1,0 +1,173 @@
+"""Blocks as Parquet tables and back: the only module that knows pyarrow."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from acquisition.errors import ConfigError
+from acquisition.raw import RawBlock
+from acquisition.recording.limits import FOOTER_BYTES_PER_COLUMN, MAX_CHUNK_BYTES
+from acquisition.recording.manifest import RecordedUnit
+from core.arrays import CountArray
+
+ZSTD_LEVEL = 1
+"""Higher levels gain less than one per cent on differences that are already packed to bits."""
+
+_MAGIC = b"PAR1"
+_TAIL_BYTES = 8  # length of the footer, then the magic
+_REJECTION = pa.struct(
+    [
+        pa.field("reason", pa.string(), nullable=False),
+        pa.field("n_samples", pa.int64(), nullable=False),
+    ]
+)
+_REJECTED = pa.list_(pa.field("element", _REJECTION, nullable=False))
+
+
+def samples_schema(unit: RecordedUnit) -> Any:
+    """Counts, a column for each waveform channel."""
+    return pa.schema([pa.field(c.id, pa.int16(), nullable=False) for c in unit.channels])
+
+
+def blocks_schema(unit: RecordedUnit) -> Any:
+    """All of the blocks but their counts; ``ok`` has a bit for each channel, channel 0 lowest."""
+    columns = [
+        ("epoch", pa.int64()),
+        ("first_index", pa.int64()),
+        ("start_ns", pa.int64()),
+        ("n_samples", pa.int32()),
+        ("ok", pa.uint32()),
+        *((f"slow:{c.id}", pa.float64()) for c in unit.slow_channels),
+        ("rejected", _REJECTED),
+    ]
+    return pa.schema([pa.field(name, type_, nullable=False) for name, type_ in columns])
+
+
+def samples_table(counts: CountArray, unit: RecordedUnit) -> Any:
+    """(n_channels, n_samples) counts as a table."""
+    return pa.table(list(counts), schema=samples_schema(unit))
+
+
+def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
+    """Blocks without their counts as a table."""
+    slow = [pa.array([b.slow[i] for b in blocks]) for i in range(len(unit.slow_channels))]
+    rejected = [
+        [{"reason": r.reason, "n_samples": r.n_samples} for r in b.rejected] for b in blocks
+    ]
+    columns = [
+        [b.epoch for b in blocks],
+        [b.first_index for b in blocks],
+        [b.start_ns for b in blocks],
+        [b.counts.shape[1] for b in blocks],
+        [sum(ok << i for i, ok in enumerate(b.ok)) for b in blocks],
+        *slow,
+        rejected,
+    ]
+    return pa.table(columns, schema=blocks_schema(unit))
+
+
+def samples_writer(path: Path, unit: RecordedUnit) -> Any:
+    """Differences packed to bits, then zstd: 6 bits a sample where int16 itself takes 11."""
+    schema = samples_schema(unit)
+    return pq.ParquetWriter(
+        path,
+        schema,
+        compression="zstd",
+        compression_level=ZSTD_LEVEL,
+        use_dictionary=False,
+        write_statistics=False,
+        store_schema=False,
+        column_encoding=dict.fromkeys(schema.names, "DELTA_BINARY_PACKED"),
+    )
+
+
+def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
+    """Few and repetitive: dictionaries and zstd."""
+    schema = blocks_schema(unit)
+    return pq.ParquetWriter(
+        path,
+        schema,
+        compression="zstd",
+        compression_level=ZSTD_LEVEL,
+        write_statistics=False,
+        store_schema=False,
+    )
+
+
+@contextmanager
+def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> Iterator[Any]:
+    """Open a file after its footer has shown that it is what the manifest says, and no more.
+
+    Raises
+    ------
+    ConfigError
+        If it is not, or if reading it fails inside the context.
+    """
+    with foreign_errors_of(path), path.open("rb") as stream:
+        _require_small_footer(stream, path, schema, -(-n_rows // rows_per_group))
+        with pq.ParquetFile(stream) as file:
+            _require_shape(file, path, schema, n_rows, rows_per_group)
+            yield file
+
+
+@contextmanager
+def foreign_errors_of(path: Path) -> Iterator[None]:
+    """Rename what pyarrow and the disk raise to ConfigError, with the path in front."""
+    try:
+        yield
+    except (pa.ArrowException, OSError) as error:
+        words = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise ConfigError(f"{path}: {words.splitlines()[0]}") from error
+
+
+def read_counts(file: Any, group: int) -> CountArray:
+    """(n_channels, n_rows) of one row group."""
+    columns = file.read_row_group(group, use_threads=False).columns
+    return np.stack([column.to_numpy() for column in columns])
+
+
+def read_rows(file: Any, group: int, columns: list[str] | None = None) -> Iterable[dict[str, Any]]:
+    """Rows of one row group as dictionaries."""
+    rows: list[dict[str, Any]] = file.read_row_group(group, columns, use_threads=False).to_pylist()
+    return rows
+
+
+def _require_small_footer(stream: Any, path: Path, schema: Any, n_groups: int) -> None:
+    """Refuse a footer that lists more than there can be, before anything parses it."""
+    size = stream.seek(0, 2)
+    stream.seek(max(0, size - _TAIL_BYTES))
+    tail = stream.read(_TAIL_BYTES)
+    if tail[4:] != _MAGIC:
+        raise ConfigError(f"{path}: not a complete Parquet file")
+    n_columns = len(schema.names) + 2  # rejections take three
+    limit = FOOTER_BYTES_PER_COLUMN * n_columns * (n_groups + 2)
+    n_bytes = int.from_bytes(tail[:4], "little")
+    if n_bytes > limit:
+        raise ConfigError(f"{path}: footer of {n_bytes} bytes, at most {limit} belong to this one")
+    stream.seek(0)
+
+
+def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, rows_per_group: int) -> None:
+    found = file.schema_arrow
+    if not found.equals(schema):
+        name = next((a for a, b in zip(found, schema, strict=False) if a != b), None)
+        words = f"column {name.name!r} of type {name.type}" if name else f"{len(found)} columns"
+        raise ConfigError(f"{path}: {words} where the manifest says otherwise")
+    metadata = file.metadata
+    if metadata.num_rows != n_rows:
+        raise ConfigError(f"{path}: {metadata.num_rows} rows, the manifest says {n_rows}")
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    full, last = divmod(n_rows, rows_per_group)
+    expected = [rows_per_group] * full + [last] * (last > 0)
+    if [group.num_rows for group in groups] != expected:
+        raise ConfigError(f"{path}: not in row groups of {rows_per_group}")
+    for group in groups:
+        chunks = (group.column(number) for number in range(group.num_columns))
+        largest = max(chunk.total_uncompressed_size for chunk in chunks)
+        if largest > MAX_CHUNK_BYTES:
+            raise ConfigError(f"{path}: a column of {largest} bytes, at most {MAX_CHUNK_BYTES}")

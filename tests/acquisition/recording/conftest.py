@@ -1,0 +1,77 @@
+"""A unit of two channels, blocks whose samples are their own numbers, and a recording of them."""
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.raw import RawBlock
+from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recording.writer import RecordingWriter
+from core.machine import Measurand
+
+MADE_BY = "padwatch in a test"
+
+
+def recorded_unit(n_channels: int = 2, n_slow: int = 2, rate_hz: float = 600.0) -> RecordedUnit:
+    """Probes of -8 V at 2 mm, and slow channels in degC from -10 to 120."""
+    return RecordedUnit(
+        unit="U1",
+        rate_hz=rate_hz,
+        channels=tuple(
+            RecordedChannel(
+                id=f"c{n}",
+                measurand=Measurand.GAP_UM,
+                full_scale_v=12.0,
+                unit_per_v=-250.0,
+                ok_min_v=-11.0,
+                ok_max_v=11.0,
+            )
+            for n in range(n_channels)
+        ),
+        slow_channels=tuple(
+            RecordedSlowChannel(id=f"slow{n}", unit="degC", minimum=-10.0, maximum=120.0)
+            for n in range(n_slow)
+        ),
+    )
+
+
+def numbered_block(first_index: int, n_samples: int, epoch: int = 1, **changes: object) -> RawBlock:
+    index = np.arange(first_index, first_index + n_samples)
+    values: dict[str, object] = {
+        "epoch": epoch,
+        "first_index": first_index,
+        "start_ns": 1_767_225_600_000_000_000 + round(first_index * 1e9 / 600.0),
+        "rate_hz": 600.0,
+        "counts": (np.array([index, index + 1]) % 2**14).astype(np.int16),
+        "ok": (True, True),
+        "slow": (45.0, math.nan),
+    }
+    return RawBlock(**(values | changes))
+
+
+@pytest.fixture
+def unit() -> RecordedUnit:
+    return recorded_unit()
+
+
+@pytest.fixture
+def numbered() -> Callable[..., RawBlock]:
+    """Builds blocks; keywords replace fields."""
+    return numbered_block
+
+
+@pytest.fixture
+def record(tmp_path: Path, unit: RecordedUnit) -> Callable[[Iterable[RawBlock]], Path]:
+    """Records blocks; gives the folder."""
+
+    def recorded(blocks: Iterable[RawBlock]) -> Path:
+        folder = tmp_path / "recording"
+        with RecordingWriter(folder, unit, MADE_BY) as writer:
+            for block in blocks:
+                writer.write(block)
+        return folder
+
+    return recorded

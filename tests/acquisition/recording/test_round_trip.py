@@ -1,0 +1,215 @@
+"""What was written comes back: every count, every bit of every number, every gap."""
+
+import math
+import struct
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from acquisition.errors import ConfigError
+from acquisition.raw import RawBlock
+from acquisition.recording import reader, tables, writer
+from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recording.reader import open_recording
+from acquisition.recording.writer import RecordingWriter
+from core.blocks import Rejection
+from core.machine import Measurand
+
+Numbered = Callable[..., RawBlock]
+
+
+def bits(block: RawBlock) -> tuple[object, ...]:
+    """Everything about a block, NaN and signed zero included, in a form that can be compared."""
+    slow = [struct.pack("<d", value) for value in block.slow]
+    counts = (block.counts.dtype.str, block.counts.shape, block.counts.tobytes())
+    return (
+        tuple(slow),
+        counts,
+        replace(block, slow=(), counts=np.zeros((0, 0), np.int16)).__repr__(),
+    )
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
+    """Any unit and any stream of blocks a device may deliver."""
+    n_channels, n_slow = draw(st.integers(1, 32)), draw(st.integers(0, 4))
+    number = st.floats(-1e6, 1e6).filter(bool)
+    unit = RecordedUnit(
+        unit="U1",
+        rate_hz=draw(st.sampled_from([600.0, 1000 / 3])),
+        channels=tuple(
+            RecordedChannel(
+                id=f"c{n}",
+                measurand=draw(st.sampled_from(Measurand)),
+                full_scale_v=draw(st.floats(1e-3, 100.0)),
+                unit_per_v=draw(number),
+                ok_min_v=-100.0,
+                ok_max_v=draw(number),
+            )
+            for n in range(n_channels)
+        ),
+        slow_channels=tuple(
+            RecordedSlowChannel(id=f"s{n}", unit="degC", minimum=-10.0, maximum=draw(number))
+            for n in range(n_slow)
+        ),
+    )
+    blocks, epoch, index = [], draw(st.integers(0, 2**32)), draw(st.integers(0, 2**50))
+    for _ in range(draw(st.integers(1, 6))):
+        if draw(st.booleans()):
+            epoch, index = draw(st.integers(0, 2**32)), 0
+        rejected = draw(
+            st.lists(
+                st.builds(
+                    Rejection,
+                    st.text(min_size=1, max_size=64).filter(lambda text: text.isprintable()),
+                    st.integers(1, 999),
+                ),
+                max_size=3,
+            )
+        )
+        index += sum(r.n_samples for r in rejected) + draw(st.sampled_from([0, 0, 1, 10**6]))
+        n_samples = draw(st.integers(1, 9))
+        counts = draw(arrays(np.int16, (n_channels, n_samples)))
+        flags = st.lists(st.booleans(), min_size=n_channels, max_size=n_channels)
+        slow = st.lists(st.floats(), min_size=n_slow, max_size=n_slow)
+        blocks.append(
+            RawBlock(
+                epoch=epoch,
+                first_index=index,
+                start_ns=draw(st.integers(-(2**62), 2**62)),
+                rate_hz=unit.rate_hz,
+                counts=counts,
+                ok=tuple(draw(flags)),
+                slow=tuple(draw(slow)),
+                rejected=tuple(rejected),
+            )
+        )
+        index += n_samples
+    return unit, blocks
+
+
+@settings(max_examples=60, deadline=None)
+@given(recordings())
+def test_any_stream_of_blocks_comes_back_bit_for_bit(
+    recording: tuple[RecordedUnit, list[RawBlock]],
+) -> None:
+    unit, blocks = recording
+    with tempfile.TemporaryDirectory() as parent:
+        folder = Path(parent) / "recording"
+        with RecordingWriter(folder, unit, "a test") as recorder:
+            for block in blocks:
+                recorder.write(block)
+        opened = open_recording(folder)
+        assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
+        manifest = opened.manifest
+        assert RecordedUnit(**{name: getattr(manifest, name) for name in dict(unit)}) == unit
+        assert manifest.calibration == unit.calibration
+        assert (manifest.n_blocks, manifest.n_samples) == (
+            len(blocks),
+            sum(block.counts.shape[1] for block in blocks),
+        )
+
+
+@pytest.mark.parametrize("n_each", [1, 7, 64, 200])
+def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
+    record: Callable[..., Path], numbered: Numbered, monkeypatch: pytest.MonkeyPatch, n_each: int
+) -> None:
+    for module in (writer, reader):
+        monkeypatch.setattr(module, "ROWS_PER_GROUP", 200)
+        monkeypatch.setattr(module, "BLOCKS_PER_GROUP", 10)
+    blocks = [numbered(n_each * n, n_each) for n in range(900 // n_each + 3)]
+    opened = open_recording(record(blocks))
+    assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
+    assert list(map(bits, opened.raw_blocks(3))) == list(map(bits, blocks[3:]))
+    with tables.parquet_file(
+        opened.folder / "samples.parquet",
+        tables.samples_schema(opened.manifest),
+        opened.manifest.n_samples,
+        200,
+    ) as file:
+        assert file.num_row_groups == -(-opened.manifest.n_samples // 200) > 4
+
+
+def test_the_manifest_says_when_it_began_and_who_made_it(
+    record: Callable[..., Path], numbered: Numbered
+) -> None:
+    manifest = open_recording(record([numbered(5, 10), numbered(15, 10)])).manifest
+    assert manifest.start == "2026-01-01T00:00:00.008333333Z"
+    assert manifest.made_by == "padwatch in a test"
+
+
+def test_a_recording_being_written_is_none_yet(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    folder = tmp_path / "run"
+    with RecordingWriter(folder, unit, "a test") as recorder:
+        recorder.write(numbered(0, 10))
+        assert [path.name for path in tmp_path.iterdir()] == ["run.incomplete"]
+        with pytest.raises(
+            ConfigError, match=r"run\.incomplete: no manifest.json, so no recording"
+        ):
+            open_recording(tmp_path / "run.incomplete")
+        with pytest.raises(ConfigError, match=r"run\.incomplete: File exists"):
+            RecordingWriter(folder, unit, "another")
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_recording_is_never_overwritten(
+    record: Callable[..., Path], unit: RecordedUnit, numbered: Numbered
+) -> None:
+    folder = record([numbered(0, 10)])
+    with pytest.raises(ConfigError, match="is there already"):
+        RecordingWriter(folder, unit, "another")
+    assert open_recording(folder).manifest.n_samples == 10
+
+
+def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    broken_off = RecordingWriter(tmp_path / "a", unit, "x")
+    broken_off.write(numbered(0, 10))
+    with pytest.raises(ZeroDivisionError), broken_off:
+        _ = 1 / 0
+    empty = RecordingWriter(tmp_path / "b", unit, "x")
+    with pytest.raises(ConfigError, match="nothing was recorded"):
+        empty.finish()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"rate_hz": 500.0}, "at 500.0 Hz in a recording at 600.0 Hz"),
+        ({"counts": np.zeros((3, 5), np.int16)}, "3 channels"),
+        ({"counts": np.zeros((2, 5), np.int32)}, "int32"),
+        ({"counts": np.zeros((2, 0), np.int16)}, "0 samples"),
+        ({"counts": np.zeros((2, 131_073), np.int16)}, "131073 samples"),
+        ({"ok": (True,)}, "block of"),
+        ({"slow": (math.nan,)}, "1 slow values"),
+        ({"first_index": -1}, "first index -1"),
+        ({"epoch": 2**60}, "epoch 1152921504606846976"),
+        ({"rejected": (Rejection("torn", 11),)}, "11 samples rejected in a jump of 10"),
+        ({"rejected": (Rejection("x" * 65, 1),)}, "reason of 1 to 64 letters"),
+    ],
+    ids=str,
+)
+def test_what_the_reader_would_refuse_is_not_written(
+    tmp_path: Path,
+    unit: RecordedUnit,
+    numbered: Numbered,
+    changes: dict[str, object],
+    words: str,
+) -> None:
+    recorder = RecordingWriter(tmp_path / "run", unit, "x")
+    recorder.write(numbered(0, 10))
+    with pytest.raises(ConfigError, match=words):
+        recorder.write(numbered(20, 10, **changes))
+    recorder.write(numbered(20, 10, rejected=(Rejection("torn", 10),)))
+    assert recorder.finish().n_blocks == 2
