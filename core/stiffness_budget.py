@@ -14,6 +14,7 @@ STATISTICS = "spectral statistics"
 SHAFT_GAIN = "gain of shaft probe"
 BEARING_GAIN = "gain of bearing transducer"
 BRACKET = "bracket stiffness"
+RUNOUT = "runout"
 
 
 def _gains(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, BudgetLine]:
@@ -32,12 +33,21 @@ def ratio_budget(
     bracket: BracketDynamics,
     accuracy: BearingAccuracy,
     n_segments: float | None = None,
+    runout_um_pk: float = 0.0,
 ) -> Budget | None:
     """Uncertainty of equation (5), ``|X_b| / |U| k_b``.
 
     What is not coherent sits in one of the two amplitudes, and it is not known in which: the ratio
     may be high or low by 1/γ - 1. The bracket's inertia, where its mass is known, is left out by
     equation (5) and stated as what it may amount to.
+
+    Parameters
+    ----------
+    n_segments
+        Independent segments; by default those that were averaged.
+    runout_um_pk
+        Largest runout of the shaft's surface at this line, not taken off: it counts at harmonics of
+        the running speed, not at the vortex.
 
     Returns
     -------
@@ -48,6 +58,7 @@ def ratio_budget(
     if coherence <= 0.0 or counted < 2.0:
         return None
     value = float(spectrum.amplitude_ratio(bearing, shaft)[line]) * bracket.stiffness_n_per_m
+    shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
     omega = 2.0 * math.pi * float(spectrum.frequency_hz[line])
     # two powers of n segments, correlated by γ²: Bendat and Piersol, 9.1
     random = value * math.sqrt((1.0 - coherence) / (2.0 * (counted - 1.0)))
@@ -60,31 +71,44 @@ def ratio_budget(
             systematic_line(BRACKET, accuracy.bracket_stiffness, value),
             systematic_line("incoherent motion", 1.0 / math.sqrt(coherence) - 1.0, value),
             systematic_line("bracket inertia left out", inertia, value),
+            systematic_line(RUNOUT, runout_um_pk, value / shaft_um_pk),
         ),
     )
 
 
-def transfer_budgets(found: LineTransfer, accuracy: BearingAccuracy) -> tuple[Budget, Budget]:
-    """Uncertainty of stiffness in N/m and damping in N·s/m from `transfer`."""
-    freedoms = 2.0 * (found.n_segments - 1.0)
-    return (
+def transfer_budgets(
+    found: LineTransfer, accuracy: BearingAccuracy, runout_um_pk: float = 0.0
+) -> tuple[Budget, Budget]:
+    """Uncertainty of stiffness in N/m and damping in N·s/m from `transfer`.
+
+    Parameters
+    ----------
+    runout_um_pk
+        As for `ratio_budget`; its phase is not known, so that it reaches damping as well.
+    """
+    omega = 2.0 * math.pi * found.frequency_hz
+    film = math.hypot(found.k_n_per_m, omega * found.c_n_s_per_m) / found.shaft_um_pk
+    stiffness, damping = (
         Budget(
-            found.k_n_per_m,
+            value,
             (
-                random_line(STATISTICS, found.k_std_n_per_m, freedoms),
-                *_gains(found.k_n_per_m, accuracy),
-                systematic_line(BRACKET, accuracy.bracket_stiffness, found.k_per_bracket_n_per_m),
+                random_line(STATISTICS, std, 2.0 * (found.n_segments - 1.0)),
+                *_gains(value, accuracy),
+                systematic_line(BRACKET, accuracy.bracket_stiffness, per_bracket),
+                systematic_line(RUNOUT, runout_um_pk, per_um),
             ),
-        ),
-        Budget(
-            found.c_n_s_per_m,
+        )
+        for value, std, per_bracket, per_um in (
+            (found.k_n_per_m, found.k_std_n_per_m, found.k_per_bracket_n_per_m, film),
             (
-                random_line(STATISTICS, found.c_std_n_s_per_m, freedoms),
-                *_gains(found.c_n_s_per_m, accuracy),
-                systematic_line(BRACKET, accuracy.bracket_stiffness, found.c_per_bracket_n_s_per_m),
+                found.c_n_s_per_m,
+                found.c_std_n_s_per_m,
+                found.c_per_bracket_n_s_per_m,
+                film / omega,
             ),
-        ),
+        )
     )
+    return stiffness, damping
 
 
 def dynamic_budgets(found: DynamicStiffness, accuracy: BearingAccuracy) -> dict[str, Budget]:

@@ -24,6 +24,8 @@ class LineTransfer:
         Random standard uncertainties.
     k_per_bracket_n_per_m, c_per_bracket_n_s_per_m
         Change per relative change of the bracket's stiffness.
+    shaft_um_pk
+        Amplitude of the shaft's motion.
     coherence
         Squared, of shaft and bearing motion.
     n_segments
@@ -37,6 +39,7 @@ class LineTransfer:
     c_std_n_s_per_m: float
     k_per_bracket_n_per_m: float
     c_per_bracket_n_s_per_m: float
+    shaft_um_pk: float
     coherence: float
     n_segments: float
 
@@ -86,6 +89,7 @@ def line_transfer(
         c_std_n_s_per_m=std / omega,
         k_per_bracket_n_per_m=bracket.stiffness_n_per_m * ratio.real,
         c_per_bracket_n_s_per_m=bracket.stiffness_n_per_m * ratio.imag / omega,
+        shaft_um_pk=math.sqrt(shaft_power),
         coherence=coherence,
         n_segments=counted,
     )
