@@ -24,6 +24,9 @@ from core.machine import Measurand
 
 Numbered = Callable[..., RawBlock]
 
+WORDS = st.text(st.characters(codec="utf-8"), min_size=1, max_size=64)
+REJECTIONS = st.builds(Rejection, WORDS, st.integers(1, 999))
+
 
 def bits(block: RawBlock) -> tuple[object, ...]:
     """Everything about a block, NaN and signed zero included, in a form that can be compared."""
@@ -64,16 +67,7 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
     for _ in range(draw(st.integers(1, 6))):
         if draw(st.booleans()):
             epoch, index = draw(st.integers(0, 2**32)), 0
-        rejected = draw(
-            st.lists(
-                st.builds(
-                    Rejection,
-                    st.text(min_size=1, max_size=64).filter(lambda text: text.isprintable()),
-                    st.integers(1, 999),
-                ),
-                max_size=3,
-            )
-        )
+        rejected = draw(st.lists(REJECTIONS, max_size=3))
         index += sum(r.n_samples for r in rejected) + draw(st.sampled_from([0, 0, 1, 10**6]))
         n_samples = draw(st.integers(1, 9))
         counts = draw(arrays(np.int16, (n_channels, n_samples)))
@@ -210,6 +204,6 @@ def test_what_the_reader_would_refuse_is_not_written(
     recorder = RecordingWriter(tmp_path / "run", unit, "x")
     recorder.write(numbered(0, 10))
     with pytest.raises(ConfigError, match=words):
-        recorder.write(numbered(20, 10, **changes))
+        recorder.write(replace(numbered(20, 10), **changes))
     recorder.write(numbered(20, 10, rejected=(Rejection("torn", 10),)))
     assert recorder.finish().n_blocks == 2
