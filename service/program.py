@@ -108,16 +108,18 @@ async def _run(
     )
     server = HttpServer(config)
     stopped = _stop_on_signals()
-    async with asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(runner.run(), name="run")
-        serving = tasks.create_task(server.serve([listener]), name="serve")
-        announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
-        await stopped.wait()
-        server.should_exit = True
-        running.cancel()
-        announcing.cancel()
-        await asyncio.wait([serving])
-    await recorder.flush()
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(runner.run(), name="run")
+            serving = tasks.create_task(server.serve([listener]), name="serve")
+            announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
+            await stopped.wait()
+            server.should_exit = True
+            running.cancel()
+            announcing.cancel()
+            await asyncio.wait([serving])
+    finally:
+        await recorder.flush()  # also when a bug ends the program
 
 
 def _refresh_s(plant: PlantFile) -> float:

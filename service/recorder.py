@@ -60,8 +60,8 @@ class Recorder:
 
     async def flush(self) -> None:
         """Write what is queued now, once; used at the end."""
-        if self._waiting:
-            await self._write()
+        if self._waiting and not await self._write():
+            log.error("results are lost", n_findings=len(self._waiting))
 
     async def _write(self) -> bool:
         batch = list(self._waiting)

@@ -47,6 +47,7 @@ class Runner:
     ) -> None:
         self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
         self._bus = Bus(BUS_CAPACITY)
+        self._n_blocks = dict.fromkeys(units, 0)
 
     async def run(self) -> None:
         """Acquire and analyse; ends when every source has come to its end."""
@@ -64,11 +65,11 @@ class Runner:
         """Read one unit for ever, and wait ever longer between attempts at a lost link."""
         n_failures = 0
         while True:
-            before = self._live.status(unit).last_sample_ns
+            before = self._n_blocks[unit]
             try:
                 await self._read(unit, source)
             except AcquisitionError as error:
-                n_failures = n_failures + 1 if self._is_silent_since(unit, before) else 1
+                n_failures = n_failures + 1 if self._n_blocks[unit] == before else 1
                 self._note_failure(unit, error)
                 await self._clock.sleep(_retry_s(error, n_failures))
             else:
@@ -80,10 +81,8 @@ class Runner:
             async for block in blocks:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
+                self._n_blocks[unit] += 1
                 await self._bus.publish(block)
-
-    def _is_silent_since(self, unit: str, last_sample_ns: int | None) -> bool:
-        return self._live.status(unit).last_sample_ns == last_sample_ns
 
     def _note_failure(self, unit: str, error: AcquisitionError) -> None:
         if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):

@@ -1,0 +1,152 @@
+"""A runner over scripted plants, a clock that never waits and a real store."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.blocks import SampleBlock
+from core.machine import Bearing, Channel, Measurand, Unit
+from core.monitor import UnitMonitor
+from core.quality import GOOD
+from core.settings import AnalysisSettings
+from service.live import LiveView
+from service.recorder import Recorder
+from service.runner import Runner, WatchedUnit
+from service.store.sqlite import SqliteStore
+
+RATE_HZ = 100.0
+SEGMENT = 1024
+HOP = 896
+BLOCK = 128
+T0 = 1_767_225_600_000_000_000
+
+Step = BaseException | SampleBlock
+"""What a scripted plant does next: deliver a block or fail."""
+
+
+class RecordingClock:
+    """Time that passes at once when somebody waits, and remembers for how long."""
+
+    def __init__(self) -> None:
+        self.elapsed_s = 0.0
+        self.slept_s: list[float] = []
+
+    def now_ns(self) -> int:
+        return T0 + round(self.elapsed_s * 1e9)
+
+    def monotonic_s(self) -> float:
+        return self.elapsed_s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.slept_s.append(duration_s)
+        self.elapsed_s += duration_s
+        await asyncio.sleep(0)
+
+
+class ScriptedPlant:
+    """One list of steps for each connection; the last connection stays open, or ends."""
+
+    def __init__(self, *connections: Sequence[Step], ends: bool = True) -> None:
+        self._connections = list(connections)
+        self._ends = ends
+        self.n_connections = 0
+        self.n_open = 0
+        self.exhausted = asyncio.Event()
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        steps = self._connections[self.n_connections]
+        self.n_connections += 1
+        if steps and isinstance(steps[0], BaseException):
+            raise steps[0]
+        self.n_open += 1
+        try:
+            yield self._blocks(steps, self.n_connections == len(self._connections))
+        finally:
+            self.n_open -= 1
+
+    async def _blocks(self, steps: Sequence[Step], is_last: bool) -> AsyncIterator[SampleBlock]:
+        for step in steps:
+            if isinstance(step, BaseException):
+                raise step
+            yield step
+        if is_last:
+            self.exhausted.set()
+            if not self._ends:
+                await asyncio.Event().wait()
+
+
+def unit_named(name: str) -> Unit:
+    """One bearing, four channels, 60 r/min."""
+    channels = (
+        Channel("sx", Measurand.DISPLACEMENT_UM),
+        Channel("sy", Measurand.DISPLACEMENT_UM),
+        Channel("bx", Measurand.DISPLACEMENT_UM),
+        Channel("by", Measurand.DISPLACEMENT_UM),
+    )
+    bearing = Bearing("UJB", 1.18e9, "sx", "sy", "bx", "by", 200.0, (2000.0, 2000.0))
+    return Unit(name, 60.0, RATE_HZ, channels, (bearing,))
+
+
+def block_number(number: int, unit: str = "U1", rate_hz: float = RATE_HZ) -> SampleBlock:
+    """Samples of a shaft that turns once a second; block 1 follows block 0, and so on."""
+    first = number * BLOCK
+    angle = 2 * np.pi * np.arange(first, first + BLOCK) / RATE_HZ
+    turning = np.array([50 * np.cos(angle), 50 * np.sin(angle)])
+    return SampleBlock(
+        unit=unit,
+        epoch=1,
+        first_index=first,
+        start_ns=T0 + round(first / RATE_HZ * 1e9),
+        rate_hz=rate_hz,
+        samples=np.concatenate([turning, turning / 5]).astype(np.float32),
+        channel_quality=(GOOD,) * 4,
+    )
+
+
+class Plant:
+    """Everything that a running service has, over some scripted units."""
+
+    def __init__(self, path: Path, capacity: int = 5000) -> None:
+        self.path = path
+        self.clock = RecordingClock()
+        self.store = SqliteStore(path)
+        self.live = LiveView(["U1", "U2"], self.clock, 30.0)
+        self.recorder = Recorder(self.store, self.live, self.clock, capacity)
+
+    def runner(self, **units: ScriptedPlant) -> Runner:
+        settings = AnalysisSettings(segment_samples=SEGMENT, n_segments=4, min_segments=2)
+        watched = {
+            name: WatchedUnit(source, UnitMonitor(unit_named(name), settings))
+            for name, source in units.items()
+        }
+        return Runner(watched, self.live, self.recorder, self.clock)
+
+
+@pytest.fixture
+def scripted() -> Callable[..., ScriptedPlant]:
+    return ScriptedPlant
+
+
+@pytest.fixture
+def block() -> Callable[..., SampleBlock]:
+    return block_number
+
+
+@pytest.fixture
+def plant(tmp_path: Path) -> Iterator[Plant]:
+    built = Plant(tmp_path / "padwatch.sqlite3")
+    yield built
+    built.store.close()
+
+
+@pytest.fixture
+def small_plant(tmp_path: Path) -> Iterator[Plant]:
+    """A plant whose recorder keeps three findings at most."""
+    built = Plant(tmp_path / "padwatch.sqlite3", capacity=3)
+    yield built
+    built.store.close()

@@ -1,0 +1,181 @@
+"""Links that fail are named and tried again; bugs are not."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from acquisition.errors import ConfigError, LinkError
+from service.bus import Bus
+from service.live import LinkState
+
+Make = Callable[..., Any]
+
+LONGEST_S = 5.0 * 1.25
+
+
+async def run_until(plant: Any, exhausted: asyncio.Event, **units: Any) -> None:
+    running = asyncio.create_task(plant.runner(**units).run())
+    waiting = asyncio.create_task(exhausted.wait())
+    await asyncio.wait([running, waiting], timeout=60, return_when=asyncio.FIRST_COMPLETED)
+    assert exhausted.is_set()
+    running.cancel()
+    await asyncio.wait([running])
+    if not running.cancelled():
+        await running
+
+
+async def test_a_device_that_does_not_answer_is_tried_again_ever_more_seldom(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    refusals = [[LinkError("10.0.0.7:502: Connection refused")] for _ in range(12)]
+    source = scripted(*refusals, [block(0)], ends=False)
+
+    await run_until(plant, source.exhausted, U1=source)
+
+    waits = plant.clock.slept_s
+    assert len(waits) == 12
+    for n, wait_s in enumerate(waits):
+        expected_s = min(0.5 * 2**n, 5.0)
+        assert 0.75 * expected_s <= wait_s <= 1.25 * expected_s
+    assert max(waits) <= LONGEST_S
+    assert len(set(waits)) == 12
+
+
+async def test_a_unit_without_link_says_why_and_since_when(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    first = scripted([LinkError("10.0.0.7:502: Connection refused")], [block(0)], ends=False)
+    seen: list[Any] = []
+    plant.clock.sleep = _noting(plant, seen, plant.clock.sleep)
+
+    await run_until(plant, first.exhausted, U1=first)
+
+    assert [(s.state, s.reason) for s in seen] == [
+        (LinkState.NOT_CONNECTED, "10.0.0.7:502: Connection refused")
+    ]
+    assert seen[0].since_ns == plant.clock.now_ns() - round(plant.clock.elapsed_s * 1e9)
+    status = plant.live.status("U1")
+    assert (status.state, status.reason) == (LinkState.CONNECTED, None)
+    assert status.since_ns == plant.clock.now_ns()
+
+
+async def test_another_reason_replaces_the_first_but_not_since_when(plant: Any) -> None:
+    assert plant.live.set_link("U1", LinkState.NOT_CONNECTED, "refused")
+    plant.clock.elapsed_s = 60.0
+
+    assert not plant.live.set_link("U1", LinkState.NOT_CONNECTED, "no route")
+
+    status = plant.live.status("U1")
+    assert status.reason == "no route"
+    assert status.since_ns == plant.clock.now_ns() - 60_000_000_000
+
+
+async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    wrong = [[ConfigError("block ring: n_channels is 8, expected 12")] for _ in range(3)]
+    source = scripted(*wrong, [block(0)], ends=False)
+
+    await run_until(plant, source.exhausted, U1=source)
+
+    assert plant.clock.slept_s == [15.0] * 3
+
+
+async def test_a_link_that_delivers_and_breaks_starts_with_short_waits_again(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    refused = [LinkError("refused")]
+    breaking = [[block(n), LinkError("reset by peer")] for n in range(6)]
+    source = scripted(refused, refused, refused, *breaking, [block(6)], ends=False)
+
+    await run_until(plant, source.exhausted, U1=source)
+
+    waits = plant.clock.slept_s
+    assert len(waits) == 9
+    assert waits[2] >= 0.75 * 2.0
+    assert max(waits[3:]) <= 0.5 * 1.25
+    assert plant.live.status("U1").account.n_stored == 7 * 128
+    assert source.n_open == 0
+
+
+async def test_one_unit_without_link_does_not_hold_up_another(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    absent = scripted(*([LinkError("no route")] for _ in range(500)), [], ends=False)
+    present = scripted([block(n, "U2") for n in range(20)], ends=False)
+
+    await run_until(plant, present.exhausted, U1=absent, U2=present)
+
+    assert plant.live.status("U1").state is LinkState.NOT_CONNECTED
+    assert plant.live.status("U2").state is LinkState.CONNECTED
+
+
+async def test_a_recording_that_ends_leaves_its_unit_not_connected(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    source = scripted([block(0)])
+
+    await asyncio.wait_for(plant.runner(U1=source).run(), 30)
+
+    status = plant.live.status("U1")
+    assert (status.state, status.reason) == (LinkState.NOT_CONNECTED, "the source has ended")
+    assert status.account.n_stored == 128
+
+
+async def test_a_bug_in_a_source_ends_the_run_and_closes_all_links(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    broken = scripted([block(0), RuntimeError("a bug")])
+    healthy = scripted([block(0, "U2")], ends=False)
+
+    with pytest.raises(ExceptionGroup) as ended:
+        await asyncio.wait_for(plant.runner(U1=broken, U2=healthy).run(), 30)
+
+    assert ended.group_contains(RuntimeError, match="a bug")
+    assert (broken.n_open, healthy.n_open) == (0, 0)
+    assert plant.clock.slept_s == []
+
+
+async def test_a_bug_in_the_analysis_ends_the_run(plant: Any, scripted: Make, block: Make) -> None:
+    source = scripted([block(0, rate_hz=99.0)], ends=False)
+
+    with pytest.raises(ExceptionGroup) as ended:
+        await asyncio.wait_for(plant.runner(U1=source).run(), 30)
+
+    assert ended.group_contains(ValueError, match="samples at 99.0 Hz, configured 100.0 Hz")
+
+
+async def test_a_full_bus_makes_the_publisher_wait_and_drops_nothing(block: Make) -> None:
+    bus = Bus(3)
+    taken: list[int] = []
+
+    async def publish() -> None:
+        for number in range(20):
+            await bus.publish(block(number))
+            assert bus.depth <= bus.capacity
+
+    publishing = asyncio.create_task(publish())
+    async with asyncio.timeout(30):
+        while bus.depth < bus.capacity:
+            await asyncio.sleep(0)
+        assert bus.n_published == 3
+        async for found in bus.blocks():
+            taken.append(found.first_index // 128)
+            bus.done()
+            if len(taken) == 20:
+                break
+        await publishing
+        await bus.drained()
+
+    assert taken == list(range(20))
+    assert bus.n_published == 20
+
+
+def _noting(plant: Any, seen: list[Any], sleep: Any) -> Any:
+    async def noted(duration_s: float) -> None:
+        seen.append(plant.live.status("U1"))
+        await sleep(duration_s)
+
+    return noted

@@ -1,0 +1,147 @@
+"""What blocks have taught reaches the disk, also when the disk does not answer for a while."""
+
+import asyncio
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx2
+
+from core.account import Gap
+from service.api.app import create_app
+from service.api.context import Context
+from service.recorder import Findings
+from service.store.port import TrendQuery, UnitGap
+
+Make = Callable[..., Any]
+
+K = "order1_k_eff_xx_n_per_m"
+
+
+def run_sql(path: Path, script: str) -> None:
+    connection = sqlite3.connect(path, timeout=30)
+    connection.executescript(script)
+    connection.close()
+
+
+def stored(plant: Any, unit: str = "U1") -> list[float | None]:
+    query = TrendQuery(unit, "UJB", (K,), 0, 2**62, 5000, 2**62)
+    return list(plant.store.trend(query).series[K].mean)
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(60):
+        while not condition():
+            await asyncio.sleep(0)
+
+
+def break_store(plant: Any) -> None:
+    run_sql(
+        plant.path,
+        "CREATE TRIGGER broken BEFORE INSERT ON assessment"
+        " BEGIN SELECT RAISE(ABORT, 'disk I/O error'); END",
+    )
+
+
+def mend_store(plant: Any) -> None:
+    run_sql(plant.path, "DROP TRIGGER broken")
+
+
+async def test_what_blocks_teach_is_shown_and_stored(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    n_blocks = 36  # 1024 + 4 hops of 896 samples
+    sources = {
+        name: scripted([block(number, name) for number in range(n_blocks)]) for name in ("U1", "U2")
+    }
+
+    await asyncio.wait_for(plant.runner(**sources).run(), 60)
+    await plant.recorder.flush()
+
+    for unit in sources:
+        assert len(stored(plant, unit)) == 5
+        newest = plant.live.assessment(unit, "UJB").readings[K].value
+        assert stored(plant, unit)[-1] == newest
+        assert abs(newest - 1.18e9 / 5) < 1e6
+        account = plant.live.status(unit).account
+        assert account.n_offered == account.n_stored == n_blocks * 128
+        assert plant.live.status(unit).last_sample_ns == block(n_blocks, unit).start_ns
+
+
+async def test_a_gap_is_stored_with_its_exact_length(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    source = scripted([block(n) for n in range(30) if n not in (4, 5, 6)])
+
+    await asyncio.wait_for(plant.runner(U1=source).run(), 60)
+    await plant.recorder.flush()
+
+    assert plant.store.gaps("U1", 0, 2**62) == [Gap(1, 4 * 128, 3 * 128, block(7).start_ns)]
+    assert plant.live.status("U1").account.n_gap == 3 * 128
+    assert plant.live.status("U1").account.n_offered == 30 * 128
+
+
+async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_loses_nothing(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    break_store(plant)
+    source = scripted([block(number) for number in range(36)], ends=False)
+    app = create_app(Context("Plant", {}, plant.live, plant.store, plant.clock, 9.0))
+    running = asyncio.create_task(plant.runner(U1=source).run())
+    client = httpx2.AsyncClient(transport=httpx2.ASGITransport(app), base_url="http://padwatch")
+
+    await until(lambda: plant.live.store_error is not None)
+    broken = await client.get("/readyz")
+    await until(source.exhausted.is_set)
+    assert stored(plant) == []
+    mend_store(plant)
+    await until(lambda: len(stored(plant)) == 5 and plant.live.store_error is None)
+    mended = await client.get("/readyz")
+    await client.aclose()
+    running.cancel()
+    await asyncio.wait([running])
+
+    assert broken.status_code == 503
+    assert "disk I/O error" in broken.json()["checks"]["store"]
+    assert mended.status_code == 200
+    assert plant.live.n_unstored == 0
+    assert set(plant.clock.slept_s) == {1.0}
+    assert stored(plant)[-1] == plant.live.assessment("U1", "UJB").readings[K].value
+
+
+async def test_what_does_not_fit_while_the_store_is_away_is_counted(
+    small_plant: Any, scripted: Make, block: Make
+) -> None:
+    plant = small_plant
+    break_store(plant)
+    source = scripted([block(number) for number in range(36)])
+
+    await asyncio.wait_for(plant.runner(U1=source).run(), 60)
+    newest = plant.live.assessment("U1", "UJB").readings[K].value
+    mend_store(plant)
+    await plant.recorder.flush()
+
+    assert plant.live.n_unstored == 2
+    assert len(stored(plant)) == 3
+    assert stored(plant)[-1] == newest
+
+
+async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothing_twice(
+    plant: Any,
+) -> None:
+    gaps = [UnitGap("U1", Gap(1, n * 100, 10, n)) for n in range(5)]
+    blocker = sqlite3.connect(plant.path)
+    blocker.execute("BEGIN IMMEDIATE")
+    recording = asyncio.create_task(plant.recorder.run())
+    plant.recorder.put(Findings([], gaps[:3]))
+    await until(plant.store._lock.locked)
+
+    recording.cancel()
+    await asyncio.wait([recording])
+    plant.recorder.put(Findings([], gaps[3:]))
+    blocker.rollback()
+    blocker.close()
+    await plant.recorder.flush()
+
+    assert plant.store.gaps("U1", 0, 100) == [g.gap for g in gaps]
