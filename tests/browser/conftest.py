@@ -112,10 +112,14 @@ def stop(process: "subprocess.Popen[str] | None") -> None:
         return
     if process.poll() is None:
         process.send_signal(signal.SIGTERM)
-    process.wait(STOP_S)
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            pipe.close()
+    try:
+        process.wait(STOP_S)
+    finally:
+        process.kill()  # one that does not end when asked fails the test, but does not outlive it
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
 
 
 @pytest.fixture(scope="session")
