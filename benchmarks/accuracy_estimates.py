@@ -1,0 +1,119 @@
+"""All estimators on one bearing's spectra, as relative errors against the truth."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from benchmarks.accuracy_plant import BearingSpectra
+from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from core.dynamic import dynamic_stiffness
+from core.dynamic_settings import DynamicSettings
+from core.excitation import LineLimits, line_excitation
+from core.quality import Reason
+from core.segments import ORDER1, VORTEX
+from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
+from core.transfer import line_transfer
+from core.uncertainty import BearingAccuracy, Budget
+
+LINES = {"1×": ORDER1, "vortex": VORTEX}
+AXES = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}
+
+NO_RUNOUT_LIMITS = LineLimits()
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One number of one estimator in one run.
+
+    Parameters
+    ----------
+    name
+        ``dynamic k_xx``, ``transfer 1× k_yy``, ``ratio vortex k_xx``, ...
+    error
+        Estimate minus truth over the scale of the comparison; NaN without a result.
+    covered, covered_random
+        Whether the truth lies in the 95 % interval, and in that of the random part alone.
+    std
+        Stated random standard uncertainty over the same scale.
+    """
+
+    name: str
+    error: float
+    covered: bool = False
+    covered_random: bool = False
+    std: float = math.nan
+
+
+def estimates(
+    spectra: BearingSpectra,
+    accuracy: BearingAccuracy,
+    lines: tuple[str, ...] = ("1×",),
+    c_over_k_xx: bool = False,
+    limits: LineLimits = NO_RUNOUT_LIMITS,
+) -> list[Estimate]:
+    """Evaluate every estimator.
+
+    Parameters
+    ----------
+    lines
+        Where `transfer` and `ratio` are read.
+    c_over_k_xx
+        Compare ω·c at 1× with k_xx, as cross-coupled damping may be nothing to compare with.
+    """
+    found = list(_dynamic(spectra, accuracy, c_over_k_xx))
+    for name in lines:
+        found += _at_line(spectra, accuracy, name, limits)
+    return found
+
+
+def _dynamic(
+    spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool
+) -> Iterator[Estimate]:
+    film = spectra.film
+    result = dynamic_stiffness(spectra.bins, spectra.bracket, spectra.turn_hz, DynamicSettings())
+    budgets = {} if isinstance(result, Reason) else dynamic_budgets(result, accuracy)
+    omega = 2.0 * math.pi * float(spectra.orders.frequency_hz[ORDER1])
+    for letter, truth in (("k", film.stiffness_n_per_m), ("c", film.damping_n_s_per_m)):
+        scale = float(truth[0, 0])
+        if letter == "c" and c_over_k_xx:
+            scale = film.k_xx_n_per_m / omega
+        for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            name = f"{letter}_{'xy'[row]}{'xy'[column]}"
+            true = float(truth[row, column])
+            yield _compared(f"dynamic {name}", budgets.get(name), true, scale)
+
+
+def _at_line(
+    spectra: BearingSpectra, accuracy: BearingAccuracy, line_name: str, limits: LineLimits
+) -> Iterator[Estimate]:
+    line, film = LINES[line_name], spectra.film
+    omega = 2.0 * math.pi * float(spectra.orders.frequency_hz[line])
+    effective = film.effective_stiffness_n_per_m(omega)
+    true = (film.k_xx_n_per_m, film.k_yy_n_per_m)
+    for index, (axes, (shaft, bearing)) in enumerate(AXES.items()):
+        orders, bracket = spectra.orders, spectra.bracket
+        excited = line_excitation(orders, line, shaft, bearing, limits) is Reason.OK
+        transfer = line_transfer(orders, line, shaft, bearing, bracket) if excited else None
+        budget = transfer_budgets(transfer, accuracy)[0] if transfer else None
+        yield _compared(f"transfer {line_name} k_{axes}", budget, true[index], true[0])
+        ratio = ratio_budget(orders, line, shaft, bearing, bracket, accuracy) if excited else None
+        # what equation (5) asks for leaves out the bracket's inertia
+        asked = effective[index] / (1.0 - bracket.mass_kg * omega**2 / bracket.stiffness_n_per_m)
+        yield _compared(f"ratio {line_name} k_{axes}", ratio, effective[index], true[0], asked)
+
+
+def _compared(
+    name: str, budget: Budget | None, true: float, scale: float, asked: float | None = None
+) -> Estimate:
+    """Compare with the truth; statistics alone with what the estimator can find on average."""
+    if budget is None:
+        return Estimate(name, math.nan)
+    low, high = budget.interval
+    low_random, high_random = budget.random_interval
+    return Estimate(
+        name=name,
+        error=(budget.value - true) / scale,
+        covered=low <= true <= high,
+        covered_random=low_random <= (true if asked is None else asked) <= high_random,
+        std=budget.random / scale,
+    )
