@@ -1,5 +1,6 @@
 """The manifest of a recording: what was recorded, how to read it, and what its files must be."""
 
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -151,6 +152,13 @@ def read_manifest(folder: Path) -> Manifest:
         place = "".join(f".{part}"[:60] for part in first["loc"]).lstrip(".")
         words = f"{place}: {first['msg']}" if place else first["msg"]
         raise ConfigError(f"{path}: {words}") from error
+
+
+def manifest_text(manifest: Manifest) -> str:
+    """The manifest as its file has it: what it is comes first."""
+    values = manifest.model_dump(mode="json")
+    first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
+    return json.dumps(first | values, indent=1) + "\n"
 
 
 def start_text(start_ns: int) -> str:

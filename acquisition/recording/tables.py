@@ -120,7 +120,7 @@ def foreign_errors_of(path: Path) -> Iterator[None]:
     """Rename what pyarrow and the disk raise to ConfigError, with the path in front."""
     try:
         yield
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:  # names may not be text
         words = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ConfigError(f"{path}: {words.splitlines()[0]}") from error
 

@@ -27,6 +27,7 @@ from acquisition.recording.manifest import (
     Manifest,
     RecordedFile,
     RecordedUnit,
+    manifest_text,
     start_text,
 )
 from acquisition.recording.progress import Progress
@@ -155,8 +156,7 @@ class RecordingWriter:
             self._write_blocks()
             self._close()
             manifest = self._manifest()
-            text = manifest.model_dump_json(indent=1) + "\n"
-            (self._aside / MANIFEST).write_text(text, encoding="utf-8")
+            (self._aside / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")
             for name in (SAMPLES, BLOCKS, MANIFEST):
                 _sync(self._aside / name)
             _sync(self._aside)

@@ -10,6 +10,8 @@ from service.cli import config
 from service.cli.daq import daq
 from service.cli.demo import demo
 from service.cli.logs import set_up_logging
+from service.cli.reanalyse import reanalyse
+from service.cli.record import record
 from service.cli.run import run
 from service.cli.validate import validate
 
@@ -19,6 +21,8 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 app.command()(run)
 app.command()(demo)
 app.command()(daq)
+app.command()(record)
+app.command()(reanalyse)
 app.command()(validate)
 app.add_typer(config.app, name="config")
 

@@ -1,0 +1,120 @@
+"""A recording through the same analysis as live samples, and its results in the API's words."""
+
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from typing import Literal
+
+from acquisition.calibration import UnitCalibration
+from acquisition.source import SampleSource
+from core.assessment import Assessment
+from core.monitor import UnitMonitor
+from service.api.models import ApiModel, QualityModel, ReadingModel, Time, WindowModel
+from service.api.times import rfc3339
+from service.api.views import quality_model, reading_model, window_model
+
+
+class AssessmentModel(ApiModel):
+    """One bearing at one refresh; the parts are those of the API's ``latest``."""
+
+    unit: str
+    """Unit."""
+
+    bearing: str
+    """Bearing."""
+
+    time: Time
+    """End of the samples."""
+
+    quality: QualityModel
+    """The worst of the 1× results."""
+
+    speed_source: Literal["slow_channel", "line", "rated"]
+    """Where the running speed came from."""
+
+    window: WindowModel
+    """The samples."""
+
+    readings: dict[str, ReadingModel]
+    """All quantities of the catalogue, by name."""
+
+
+def assessment_model(assessment: Assessment) -> AssessmentModel:
+    """An assessment as the API shows its parts, to the last digit."""
+    return AssessmentModel(
+        unit=assessment.unit,
+        bearing=assessment.bearing,
+        time=rfc3339(assessment.time_ns),
+        quality=quality_model(assessment.quality),
+        speed_source=assessment.speed_source.value,
+        window=window_model(assessment.window),
+        readings={name: reading_model(name, r) for name, r in assessment.readings.items()},
+    )
+
+
+async def assessments(
+    source: SampleSource, monitor: UnitMonitor, passed: Callable[[int], None]
+) -> AsyncIterator[Assessment]:
+    """All that a monitor learns from a source that comes to an end.
+
+    Parameters
+    ----------
+    passed
+        Called with the number of samples per channel of each block that is done.
+
+    Raises
+    ------
+    AcquisitionError
+        If the source fails.
+    """
+    async with source.connect() as blocks:
+        async for block in blocks:
+            for assessment in monitor.ingest(block):
+                yield assessment
+            passed(block.n_samples)
+
+
+def is_full(assessment: Assessment) -> bool:
+    """Whether the average has all the segments it wants."""
+    return assessment.window.n_segments >= assessment.window.n_segments_wanted
+
+
+class LastAverages:
+    """The last full average of each bearing; the last one of all while none is full."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Assessment] = {}
+
+    def put(self, assessment: Assessment) -> None:
+        """Take the next assessment."""
+        kept = self._kept.get(assessment.bearing)
+        if kept is None or is_full(assessment) or not is_full(kept):
+            self._kept[assessment.bearing] = assessment
+
+    def all(self) -> Iterable[Assessment]:
+        """One for each bearing, in the order they came."""
+        return self._kept.values()
+
+
+def calibration_differences(
+    ids: Sequence[str], recorded: UnitCalibration, configured: UnitCalibration
+) -> list[str]:
+    """What the plant file says otherwise than the recording, in words.
+
+    Parameters
+    ----------
+    ids
+        Of the waveform channels, which are the same in both.
+    """
+    words = []
+    for id_, then, now in zip(ids, recorded.channels, configured.channels, strict=True):
+        words += [
+            f"channel {id_}: {name} was {value:.9g} when recorded, is {vars(now)[name]:.9g} now"
+            for name, value in vars(then).items()
+            if value != vars(now)[name]
+        ]
+    for slow, slow_now in zip(recorded.slow, configured.slow, strict=True):
+        if slow != slow_now:
+            words.append(
+                f"slow channel {slow.id}: range was {slow.minimum:g} to {slow.maximum:g},"
+                f" is {slow_now.minimum:g} to {slow_now.maximum:g} now"
+            )
+    return words

@@ -1,0 +1,130 @@
+"""A recording as a source: its end, its pace, and which channels of it."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.calibration import calibrate
+from acquisition.errors import ConfigError
+from acquisition.raw import RawBlock
+from acquisition.recording.manifest import RecordedUnit
+from acquisition.recording.reader import open_recording
+from acquisition.recording.selection import select
+from acquisition.recording.source import RecordingSource
+from core.machine import Channel, Measurand, Unit
+
+Record = Callable[[Iterable[RawBlock]], Path]
+Numbered = Callable[..., RawBlock]
+
+
+def machine(*channels: str, measurand: Measurand = Measurand.GAP_UM, **changes: object) -> Unit:
+    made = Unit("U1", 92.3, 600.0, tuple(Channel(id_, measurand) for id_ in channels), ())
+    return replace(made, **changes)
+
+
+async def test_blocks_are_those_that_were_calibrated_live_and_then_it_ends(
+    record: Record, numbered: Numbered, unit: RecordedUnit, stepped_clock
+) -> None:
+    raws = [numbered(60 * n, 60) for n in range(5)]
+    source = RecordingSource(open_recording(record(raws)), stepped_clock)
+    async with source.connect() as blocks:
+        found = [block async for block in blocks]
+    assert stepped_clock.monotonic_s() == 0.0
+    for block, raw in zip(found, raws, strict=True):
+        live = calibrate(raw, unit.calibration)
+        assert block.samples.tobytes() == live.samples.tobytes()
+        assert replace(block, samples=live.samples) == live
+    async with source.connect() as blocks:
+        assert [block async for block in blocks] == []
+
+
+async def test_an_unpaced_recording_left_and_taken_up_again_loses_nothing(
+    record: Record, numbered: Numbered, stepped_clock
+) -> None:
+    recording = open_recording(record(numbered(60 * n, 60) for n in range(5)))
+    source = RecordingSource(recording, stepped_clock)
+    async with source.connect() as blocks:
+        first = [await anext(blocks), await anext(blocks)]
+    stepped_clock.step(1e6)
+    async with source.connect() as blocks:
+        rest = [block async for block in blocks]
+    assert [block.first_index for block in first + rest] == [0, 60, 120, 180, 240]
+
+
+@pytest.mark.parametrize("speed", [1.0, 50.0])
+async def test_it_takes_the_time_it_took_gaps_included_and_restarts_not(
+    record: Record, numbered: Numbered, stepped_clock, speed: float
+) -> None:
+    raws = [numbered(0, 60), numbered(6060, 60), numbered(120, 60, epoch=2)]
+    source = RecordingSource(open_recording(record(raws)), stepped_clock, speed=speed)
+    async with source.connect() as blocks:
+        arrived_s = [stepped_clock.monotonic_s() async for _ in blocks]
+    assert np.multiply(arrived_s, speed) == pytest.approx([0.1, 10.2, 10.3])
+
+
+def test_time_cannot_stand_still_or_run_back(
+    record: Record, numbered: Numbered, stepped_clock
+) -> None:
+    recording = open_recording(record([numbered(0, 60)]))
+    for speed in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="positive speed"):
+            RecordingSource(recording, stepped_clock, speed=speed)
+
+
+async def test_a_unit_finds_its_channels_by_name_wherever_they_are(
+    record: Record, numbered: Numbered, stepped_clock
+) -> None:
+    raw = numbered(0, 60, ok=(True, False), slow=(40.0, 50.0))
+    recording = open_recording(record([raw]))
+    wanted = machine("c1", "c0", id="U7")
+    selection = select(recording.manifest, wanted, {"slow1": "degC"})
+    async with RecordingSource(recording, stepped_clock, selection).connect() as blocks:
+        block = await anext(blocks)
+    assert block.unit == "U7"
+    whole = calibrate(raw, recording.manifest.calibration)
+    np.testing.assert_array_equal(block.samples, whole.samples[[1, 0]])
+    assert block.channel_quality == whole.channel_quality[::-1]
+    assert {id_: reading.value for id_, reading in block.slow.items()} == {"slow1": 50.0}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "slow_units", "words"),
+    [
+        (machine("c0", rate_hz=500.0), {}, "600 Hz, unit U1 is configured for 500 Hz"),
+        (machine("c0", "x", "y"), {}, "needs channel x, y, the recording has c0, c1"),
+        (
+            machine("c0", measurand=Measurand.VELOCITY_MM_S),
+            {},
+            "channel c0 is recorded as gap_um, unit U1 is configured for velocity_mm_s",
+        ),
+        (
+            machine("c0"),
+            {"power": "MW"},
+            "needs slow channel power, the recording has slow0, slow1",
+        ),
+        (
+            machine("c0"),
+            {"slow0": "mm"},
+            "slow channel slow0 is recorded as degC, unit U1 is configured for mm",
+        ),
+    ],
+    ids=["rate", "channel", "measurand", "slow channel", "slow unit"],
+)
+def test_a_recording_of_something_else_is_refused_naming_both(
+    unit: RecordedUnit, wanted: Unit, slow_units: dict[str, str], words: str
+) -> None:
+    with pytest.raises(ConfigError, match=words):
+        select(unit, wanted, slow_units)
+
+
+async def test_a_recording_that_vanishes_is_an_error_of_its_own(
+    record: Record, numbered: Numbered, stepped_clock
+) -> None:
+    recording = open_recording(record([numbered(0, 60)]))
+    (recording.folder / "samples.parquet").unlink()
+    async with RecordingSource(recording, stepped_clock).connect() as blocks:
+        with pytest.raises(ConfigError, match=r"samples\.parquet: No such file"):
+            await anext(blocks)
