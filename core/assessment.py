@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 from core.arrays import SampleArray
 from core.cross_spectrum import CrossSpectrum
+from core.estimators import Estimator
 from core.quality import Quality, Reading
 from core.speed import SpeedSource
+from core.uncertainty import Budget
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,10 @@ class Assessment:
         One for each quantity of :data:`core.quantities.CATALOGUE`.
     quality
         Of the bearing's 1× results as a whole: the worst of its measured inputs.
+    budgets
+        Where the uncertainty of a reading comes from, by quantity, where it is known.
+    estimators
+        Where `stiffness` came from, by axes "xx" and "yy"; None if there is none.
     spectrum
         At the bins; displacement, µm.
     """
@@ -76,5 +82,7 @@ class Assessment:
     speed_source: SpeedSource
     quality: Quality
     readings: Mapping[str, Reading]
+    budgets: Mapping[str, Budget]
+    estimators: Mapping[str, Estimator | None]
     spectrum: CrossSpectrum
     orbit: OrbitTrace | None

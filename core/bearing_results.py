@@ -1,39 +1,30 @@
 """From the segments of a unit to the readings of one bearing."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
-from core.cross_spectrum import (
-    BEARING_X,
-    BEARING_Y,
-    SHAFT_X,
-    SHAFT_Y,
-    CrossSpectrum,
-    average,
-)
+from core.arrays import ComplexArray, FloatArray
+from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum, average
+from core.estimators import Estimator, preferred_stiffness
+from core.film_results import film_results
+from core.line_results import OrderLine
 from core.machine import Bearing, Measurand, Unit
 from core.quality import (
     Quality,
     Reading,
     Reason,
+    bad,
     mean_reading,
     missing,
     uncertain,
     worst,
 )
-from core.ratio import effective_stiffness_n_per_m
 from core.segments import ORDER1, VORTEX, Segment
 from core.settings import AnalysisSettings
 from core.shaft_centre import shaft_centre
-
-FLOOR_REACH = 12
-"""Bins to each side of a line in which its surroundings are judged."""
-
-MAIN_LOBE = 2
-"""Bins to each side of a tone that a Hann taper spreads it over."""
+from core.uncertainty import Budget
 
 
 class BearingResults:
@@ -47,6 +38,15 @@ class BearingResults:
         (n_lines,) of the segments' bins.
     n_expected
         How many segments there could have been.
+
+    Attributes
+    ----------
+    readings
+        One for each quantity of the catalogue.
+    budgets
+        Of the stiffness and damping readings that have a number, by quantity.
+    estimators
+        Where `stiffness` came from, by axes "xx" and "yy".
     """
 
     def __init__(
@@ -62,35 +62,44 @@ class BearingResults:
         self._segments = segments
         ids = [channel.id for channel in unit.channels]
         self._rows = [ids.index(id_) for id_ in bearing.channels]
-        usable = np.array([segment.usable[self._rows] for segment in segments])
-        self.spectrum = self._average(frequency_hz, [s.bin_phasors_um_pk for s in segments], usable)
-        self._orders = self._average(
-            np.mean([s.order_frequency_hz for s in segments], axis=0),
-            [s.order_phasors_um_pk for s in segments],
-            usable,
-        )
-        self.n_segments = int(usable.all(axis=1).sum())
+        self._usable = np.array([segment.usable[self._rows] for segment in segments])
+        self._whole: npt.NDArray[np.bool_] = np.all(self._usable, axis=1)
+        self._bins = np.array([segment.bin_phasors_um_pk[self._rows] for segment in segments])
+        self.spectrum = average(frequency_hz, self._bins, self._usable)
+        self._orders = self._average_orders()
+        self.n_segments = int(self._whole.sum())
         self.coverage = self.n_segments / n_expected
+        self.budgets: Mapping[str, Budget] = {}
+        self.estimators: Mapping[str, Estimator | None] = {}
+        self.readings = self._readings()
 
-    def readings(self) -> dict[str, Reading]:
-        """One reading for each quantity of the catalogue."""
-        newest = self._segments[-1]
-        return {
-            "speed_rpm": newest.speed.rpm,
+    def _average_orders(self) -> CrossSpectrum:
+        phasors: ComplexArray = np.array(
+            [segment.order_phasors_um_pk[self._rows] for segment in self._segments]
+        )
+        frequency_hz = np.mean([segment.order_frequency_hz for segment in self._segments], axis=0)
+        return average(frequency_hz, phasors, self._usable)
+
+    def _readings(self) -> dict[str, Reading]:
+        order1, budgets1 = self._order("order1", ORDER1)
+        vortex, budgets_v = self._order("vortex", VORTEX)
+        film, budgets_f = self._film()
+        readings = {
+            "speed_rpm": self._segments[-1].speed.rpm,
             "power_mw": self._slow(self._unit.power_channel),
             "oil_temperature_c": self._slow(self._bearing.oil_temperature),
             **self._position(),
-            **self._order("order1", ORDER1),
-            **self._order("vortex", VORTEX),
+            **order1,
+            **vortex,
+            **film,
         }
-
-    def _average(
-        self,
-        frequency_hz: FloatArray,
-        phasors: list[npt.NDArray[np.complex128]],
-        usable: npt.NDArray[np.bool_],
-    ) -> CrossSpectrum:
-        return average(frequency_hz, np.array([p[self._rows] for p in phasors]), usable)
+        self.budgets = {**budgets1, **budgets_v, **budgets_f}
+        chosen = {
+            axes: preferred_stiffness(readings, self._bearing.preference, axes)
+            for axes in ("xx", "yy")
+        }
+        self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
+        return readings | {f"stiffness_{a}_n_per_m": reading for a, (reading, _) in chosen.items()}
 
     def _slow(self, channel: str | None) -> Reading:
         if channel is None:
@@ -131,32 +140,51 @@ class BearingResults:
             ]
         )
 
-    def _order(self, prefix: str, line: int) -> dict[str, Reading]:
-        x = self._direction(line, SHAFT_X, BEARING_X)
-        y = self._direction(line, SHAFT_Y, BEARING_Y)
-        return {
-            f"{prefix}_frequency_hz": self._frequency(line),
-            f"{prefix}_shaft_x_um_pk": self._amplitude(line, SHAFT_X),
-            f"{prefix}_shaft_y_um_pk": self._amplitude(line, SHAFT_Y),
-            f"{prefix}_bearing_x_um_pk": self._amplitude(line, BEARING_X),
-            f"{prefix}_bearing_y_um_pk": self._amplitude(line, BEARING_Y),
-            f"{prefix}_k_eff_xx_n_per_m": x[0],
-            f"{prefix}_k_eff_yy_n_per_m": y[0],
-            f"{prefix}_coherence_xx": x[1],
-            f"{prefix}_coherence_yy": y[1],
-        }
+    def _order(self, prefix: str, line: int) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+        order = OrderLine(
+            self._bearing,
+            self._settings,
+            self._orders,
+            self.spectrum,
+            line,
+            self._line_quality if line == ORDER1 or self._unit.has_vortex else _switched_off,
+        )
+        stiffness, budgets = order.stiffness()
+        readings = {f"{name}_um_pk": reading for name, reading in order.amplitudes().items()}
+        readings |= {"frequency_hz": self._frequency(line)} | stiffness
+        return (
+            {f"{prefix}_{name}": reading for name, reading in readings.items()},
+            {f"{prefix}_{name}": budget for name, budget in budgets.items()},
+        )
+
+    def _film(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+        """All eight coefficients from the segments in which every channel was usable."""
+        quality = self._line_quality(*range(len(self._rows)))
+        if isinstance(quality, Reading) or not self.n_segments:
+            reason = quality.quality if isinstance(quality, Reading) else quality
+            return film_results(
+                self._bearing, None, (0.0, 0.0), bad(reason.reason), self._settings.dynamic
+            )
+        whole = [s for s, counts in zip(self._segments, self._whole, strict=True) if counts]
+        turns_hz = [float(segment.order_frequency_hz[ORDER1]) for segment in whole]
+        spectrum = average(
+            self.spectrum.frequency_hz,
+            self._bins[self._whole],
+            np.ones((len(whole), len(self._rows)), dtype=np.bool_),
+        )
+        return film_results(
+            self._bearing,
+            spectrum,
+            (min(turns_hz), max(turns_hz)),
+            quality,
+            self._settings.dynamic,
+        )
 
     def _frequency(self, line: int) -> Reading:
         speed = self._segments[-1].speed.rpm
         if speed.value is None:
             return speed
         return Reading(float(self._orders.frequency_hz[line]), speed.quality)
-
-    def _amplitude(self, line: int, place: int) -> Reading:
-        quality = self._line_quality(place)
-        if isinstance(quality, Reading):
-            return quality
-        return Reading(float(self._orders.amplitude_um_pk(place)[line]), quality)
 
     def _line_quality(self, *places: int) -> Quality | Reading:
         """Quality of what is read off a line of these channels, or the reason why nothing is."""
@@ -172,32 +200,6 @@ class BearingResults:
             return worst([now, uncertain(Reason.LOW_COVERAGE)])
         return now
 
-    def _direction(self, line: int, shaft: int, bearing: int) -> tuple[Reading, Reading]:
-        """Effective stiffness in one direction, and the coherence it rests on."""
-        quality = self._line_quality(shaft, bearing)
-        if isinstance(quality, Reading):
-            return quality, quality
-        few = int(self._orders.n_segments[shaft, bearing]) < self._settings.min_segments
-        coherence = float(self._orders.coherence(shaft, bearing)[line])
-        shown = missing(Reason.FEW_SEGMENTS) if few else Reading(coherence, quality)
-        excited = (
-            self._stands_out(line, bearing) if few else coherence >= self._settings.min_coherence
-        )
-        if few or line == VORTEX:  # what is no line must not be read as the vortex's
-            excited = excited and self._stands_out(line, shaft)
-        ratio = float(self._orders.amplitude_ratio(bearing, shaft)[line])
-        if not excited or ratio <= 0.0:
-            return missing(Reason.INSUFFICIENT_EXCITATION), shown
-        stiffness = effective_stiffness_n_per_m(ratio, 1.0, self._bearing.bracket_stiffness_n_per_m)
-        return Reading(stiffness, quality), shown
 
-    def _stands_out(self, line: int, place: int) -> bool:
-        """Whether a line stands above its surroundings, in which the other order lines lie too."""
-        frequency_hz = self.spectrum.frequency_hz
-        bins = (self._orders.frequency_hz / (frequency_hz[1] - frequency_hz[0])).round() - 1
-        number = np.arange(frequency_hz.size)
-        near = np.abs(number - bins[line]) <= FLOOR_REACH
-        in_lobe = (np.abs(number[:, np.newaxis] - bins) <= MAIN_LOBE).any(axis=1)
-        floor = np.median(self.spectrum.power[near & ~in_lobe, place, place])
-        peak = self._orders.power[line, place, place]
-        return bool(peak > self._settings.min_line_to_floor * floor)
+def _switched_off(*places: int) -> Reading:  # noqa: ARG001  the same whatever is asked for
+    return missing(Reason.SWITCHED_OFF)

@@ -1,7 +1,12 @@
 """The machine as the numerics see it: which channel measures what, on which bearing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+
+from core.bracket import BracketDynamics
+from core.estimators import PREFERENCE, Estimator
+from core.transducer_response import Response
+from core.uncertainty import BearingAccuracy
 
 
 class Measurand(StrEnum):
@@ -22,11 +27,14 @@ class Channel:
     direction
         +1 if a growing reading means motion along the positive bearing axis, -1 if against it. A
         probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1.
+    response
+        How the transducer changes the signal with frequency; none if it does not.
     """
 
     id: str
     measurand: Measurand
     direction: int = 1
+    response: Response | None = None
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,21 @@ class Bearing:
     oil_temperature, gap_x, gap_y
         Slow channel ids, where measured. Without slow gap channels the mean of the shaft channels
         is the gap.
+    opposite_x, opposite_y
+        Probes across the shaft from `shaft_x` and `shaft_y`, by channel id, where there are any.
+    opposite_gap_x, opposite_gap_y
+        Their slow gap channels, where measured.
+    opposite_reference_um
+        Their gaps (x, y) with the shaft centred.
+    bracket_mass_kg, bracket_damping_n_s_per_m
+        Effective mass and damping of the bracket; zero where not known. Equation (5) leaves them
+        out, the other estimators take them in.
+    runout_um_pk
+        Largest runout of the shaft's surface at 1×, as far as it is not taken off.
+    accuracy
+        How well transducers and bracket are known.
+    preference
+        Which estimators `stiffness` is taken from, best first.
     """
 
     id: str
@@ -57,6 +80,23 @@ class Bearing:
     oil_temperature: str | None = None
     gap_x: str | None = None
     gap_y: str | None = None
+    opposite_x: str | None = None
+    opposite_y: str | None = None
+    opposite_gap_x: str | None = None
+    opposite_gap_y: str | None = None
+    opposite_reference_um: tuple[float, float] | None = None
+    bracket_mass_kg: float = 0.0
+    bracket_damping_n_s_per_m: float = 0.0
+    runout_um_pk: float = 0.0
+    accuracy: BearingAccuracy = field(default_factory=BearingAccuracy)
+    preference: tuple[Estimator, ...] = PREFERENCE
+
+    @property
+    def bracket(self) -> BracketDynamics:
+        """The bracket as a spring that force is read from."""
+        return BracketDynamics(
+            self.bracket_stiffness_n_per_m, self.bracket_mass_kg, self.bracket_damping_n_s_per_m
+        )
 
     @property
     def channels(self) -> tuple[str, str, str, str]:
@@ -66,7 +106,13 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Unit:
-    """A generating unit: its waveform channels in wire order and its bearings."""
+    """A generating unit: its waveform channels in wire order and its bearings.
+
+    Parameters
+    ----------
+    has_vortex
+        Whether a part-load vortex can occur: in Francis turbines, not in Kaplan turbines.
+    """
 
     id: str
     rated_speed_rpm: float
@@ -75,3 +121,4 @@ class Unit:
     bearings: tuple[Bearing, ...]
     speed_channel: str | None = None
     power_channel: str | None = None
+    has_vortex: bool = True

@@ -120,7 +120,7 @@ class UnitMonitor:
             self._transform.frequency_hz,
             min(settings.n_segments, n_possible),
         )
-        readings = results.readings()
+        readings = results.readings
         n_samples = newest.stop_index - segments[0].first_index
         return Assessment(
             unit=self.unit.id,
@@ -139,6 +139,8 @@ class UnitMonitor:
             speed_source=newest.speed.source,
             quality=worst(r.quality for name, r in readings.items() if name in JUDGED),
             readings=readings,
+            budgets=results.budgets,
+            estimators=results.estimators,
             spectrum=results.spectrum,
             orbit=self._orbit(bearing, newest),
         )

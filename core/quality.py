@@ -30,6 +30,8 @@ class Reason(StrEnum):
     FEW_SEGMENTS = "few_segments"
     LOW_COVERAGE = "low_coverage"
     INSUFFICIENT_EXCITATION = "insufficient_excitation"
+    POOR_FIT = "poor_fit"
+    SWITCHED_OFF = "switched_off"
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,15 @@ def worst(qualities: Iterable[Quality]) -> Quality:
 class Reading:
     """One number with its quality; a bad reading has no number at all.
 
+    Parameters
+    ----------
+    u_random, u_systematic
+        Standard uncertainties in the unit of the value, where they are known. The random part
+        differs from one result to the next; the systematic part stays as long as transducers and
+        bracket do, and cancels in a channel's own trend.
+    interval_95
+        Holds the truth with 95 %, where that is known.
+
     Raises
     ------
     ValueError
@@ -70,6 +81,9 @@ class Reading:
 
     value: float | None
     quality: Quality = GOOD
+    u_random: float | None = None
+    u_systematic: float | None = None
+    interval_95: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if (self.value is None) != (self.quality.level is Level.BAD):

@@ -15,11 +15,17 @@ class Quantity:
         UCUM-like, as shown to people.
     label
         What it is, in a few words.
+    has_uncertainty
+        Whether its readings state a random and a systematic standard uncertainty.
     """
 
     name: str
     unit: str
     label: str
+    has_uncertainty: bool = False
+
+
+AXES = ("xx", "xy", "yx", "yy")
 
 
 def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:
@@ -29,14 +35,27 @@ def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:
         Quantity(f"{prefix}_shaft_y_um_pk", "µm 0-pk", f"Relative shaft vibration y, {words}"),
         Quantity(f"{prefix}_bearing_x_um_pk", "µm 0-pk", f"Absolute bearing vibration x, {words}"),
         Quantity(f"{prefix}_bearing_y_um_pk", "µm 0-pk", f"Absolute bearing vibration y, {words}"),
-        Quantity(f"{prefix}_k_eff_xx_n_per_m", "N/m", f"Effective stiffness x, {words}"),
-        Quantity(f"{prefix}_k_eff_yy_n_per_m", "N/m", f"Effective stiffness y, {words}"),
         Quantity(f"{prefix}_coherence_xx", "1", f"Coherence of shaft and bearing x, {words}"),
         Quantity(f"{prefix}_coherence_yy", "1", f"Coherence of shaft and bearing y, {words}"),
+        *_in_both_directions(
+            f"{prefix}_k_eff", "N/m", f"Effective stiffness, {words}, equation (5)"
+        ),
+        *_in_both_directions(f"{prefix}_transfer_k", "N/m", f"Stiffness, {words}, transfer"),
+        *_in_both_directions(f"{prefix}_transfer_c", "N·s/m", f"Damping, {words}, transfer"),
     )
 
 
+def _in_both_directions(prefix: str, unit: str, words: str) -> tuple[Quantity, ...]:
+    return tuple(_coefficient(prefix, axes, unit, words) for axes in ("xx", "yy"))
+
+
+def _coefficient(prefix: str, axes: str, unit: str, words: str) -> Quantity:
+    suffix = {"N/m": "n_per_m", "N·s/m": "n_s_per_m"}[unit]
+    return Quantity(f"{prefix}_{axes}_{suffix}", unit, f"{words}, {axes}", has_uncertainty=True)
+
+
 CATALOGUE: tuple[Quantity, ...] = (
+    *_in_both_directions("stiffness", "N/m", "Film stiffness by the preferred estimator"),
     Quantity("speed_rpm", "r/min", "Running speed"),
     Quantity("power_mw", "MW", "Active power"),
     Quantity("oil_temperature_c", "°C", "Oil temperature"),
@@ -48,6 +67,13 @@ CATALOGUE: tuple[Quantity, ...] = (
     Quantity("attitude_angle_deg", "deg", "Attitude angle"),
     *_order_quantities("order1", "1×"),
     *_order_quantities("vortex", "vortex"),
+    *(_coefficient("dynamic_k", axes, "N/m", "Film stiffness, dynamic") for axes in AXES),
+    *(_coefficient("dynamic_c", axes, "N·s/m", "Film damping, dynamic") for axes in AXES),
+    Quantity("dynamic_coherence_x", "1", "Share of the bearing's motion x that the film explains"),
+    Quantity("dynamic_coherence_y", "1", "Share of the bearing's motion y that the film explains"),
+    Quantity("dynamic_lack_of_fit_x", "1", "Lack of fit of the film x, about 1 if it fits"),
+    Quantity("dynamic_lack_of_fit_y", "1", "Lack of fit of the film y, about 1 if it fits"),
+    Quantity("dynamic_n_lines", "1", "Spectral lines used by dynamic"),
 )
 
 BY_NAME = {quantity.name: quantity for quantity in CATALOGUE}

@@ -1,6 +1,8 @@
 """How the analysis is set up; the defaults are the paper's (Brito et al., section 3.1)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from core.dynamic_settings import DynamicSettings
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,14 @@ class AnalysisSettings:
         coherence while there are too few segments to know that.
     min_coverage
         Share of the wanted segments below which a result is marked uncertain.
+    min_bearing_um_pk
+        Bearing amplitude of a line below which equation (5) and `transfer` say nothing: at 1× of
+        92.3 r/min, 4 µm are 0.04 mV of a 1000 mV/g accelerometer. The paper's balanced machine
+        (Table 8), whose figures it calls unreliable, has 1.9 to 3.4 µm.
+    max_line_uncertainty
+        Random standard uncertainty of `transfer` over its stiffness beyond which it says nothing.
+    dynamic
+        How all eight coefficients are sought.
     min_speed_fraction
         Share of the rated speed below which the machine counts as standing.
     """
@@ -45,7 +55,10 @@ class AnalysisSettings:
     min_coherence: float = 0.9
     min_line_to_floor: float = 10.0
     min_coverage: float = 0.5
+    min_bearing_um_pk: float = 4.0
+    max_line_uncertainty: float = 0.2
     min_speed_fraction: float = 0.2
+    dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 
     @property
     def hop_samples(self) -> int:

@@ -9,7 +9,8 @@ from core.machine import Channel, Measurand
 def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexArray:
     """Displacement phasor in µm per phasor of the channel's own engineering unit.
 
-    Velocity is integrated once, acceleration twice, by division by iω and (iω)².
+    Velocity is integrated once, acceleration twice, by division by iω and (iω)²; what the
+    transducer's own response did to the signal is undone.
 
     Parameters
     ----------
@@ -35,4 +36,6 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
             factor = 1e3 / i_omega
         case Measurand.ACCELERATION_M_S2:
             factor = 1e6 / i_omega**2
+    if channel.response is not None:
+        factor = factor / channel.response.at(frequency_hz)
     return channel.direction * factor

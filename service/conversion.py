@@ -1,10 +1,13 @@
 """From the plant file's settings to the plain values that core and adapters take."""
 
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from core.dynamic_settings import DynamicSettings
 from core.machine import Bearing, Channel, Unit
 from core.settings import AnalysisSettings
+from core.uncertainty import BearingAccuracy
+from core.usable_lines import LineSelection
 from service.settings.plant import AnalysisModel
-from service.settings.units import UnitSettings
+from service.settings.units import BearingSettings, UnitSettings
 
 
 def machine_of(settings: UnitSettings) -> Unit:
@@ -14,9 +17,27 @@ def machine_of(settings: UnitSettings) -> Unit:
         rated_speed_rpm=settings.rated_speed_rpm,
         rate_hz=settings.rate_hz,
         channels=tuple(Channel(c.id, c.measurand, c.sign) for c in settings.channel),
-        bearings=tuple(Bearing(**bearing.model_dump()) for bearing in settings.bearing),
+        bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
         speed_channel=settings.speed_channel,
         power_channel=settings.power_channel,
+        has_vortex=settings.turbine == "francis",
+    )
+
+
+def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
+    return Bearing(
+        **settings.model_dump(exclude={"bracket_stiffness_uncertainty"}),
+        accuracy=_accuracy(settings, unit),
+    )
+
+
+def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
+    """The worse of two transducers stands for both directions."""
+    gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
+    return BearingAccuracy(
+        shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
+        bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
+        bracket_stiffness=settings.bracket_stiffness_uncertainty,
     )
 
 
@@ -35,4 +56,17 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
 
 def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
     """How samples are segmented, averaged and judged."""
-    return AnalysisSettings(**settings.model_dump())
+    dynamic = settings.dynamic
+    noise = dynamic.probe_noise_um2_per_hz
+    return AnalysisSettings(
+        **settings.model_dump(exclude={"dynamic"}),
+        dynamic=DynamicSettings(
+            band_hz=dynamic.band_hz,
+            selection=LineSelection(guard_bins=dynamic.guard_bins),
+            probe_noise_um2_per_hz=None if noise is None else (noise, noise),
+            quiet_band_hz=dynamic.quiet_band_hz,
+            min_segments=max(settings.min_segments, 3),
+            max_relative_uncertainty=dynamic.max_relative_uncertainty,
+            overlap=settings.overlap,
+        ),
+    )

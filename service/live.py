@@ -57,6 +57,7 @@ class CurrentBearing:
     age_s: float | None
     quality: Quality
     readings: Mapping[str, Reading]
+    is_current: bool
 
 
 class LiveView:
@@ -125,8 +126,9 @@ class LiveView:
                 age_s=age_s,
                 quality=bad(nothing.quality.reason),
                 readings={quantity.name: nothing for quantity in CATALOGUE},
+                is_current=False,
             )
-        return CurrentBearing(entry[1], age_s, entry[1].quality, entry[1].readings)
+        return CurrentBearing(entry[1], age_s, entry[1].quality, entry[1].readings, is_current=True)
 
     def _why_not_current(self, unit: str, age_s: float | None) -> Reason | None:
         if self._status[unit].state is not LinkState.CONNECTED:

@@ -7,11 +7,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query
 from pydantic import BeforeValidator
 
+from core.estimators import STIFFNESS_OF
 from core.quantities import BY_NAME
 from core.units import ns_from_s
-from service.api.context import BearingId, Context, UnitId
+from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.models import (
     BearingModel,
+    BudgetModel,
     GapModel,
     LatestModel,
     OrbitModel,
@@ -20,7 +22,15 @@ from service.api.models import (
 )
 from service.api.problems import ProblemError, problem_responses
 from service.api.times import ns_from_datetime, rfc3339, written_as_date
-from service.api.views import latest_model, orbit_model, spectrum_model, trend_model
+from service.api.views import (
+    budget_model,
+    latest_model,
+    orbit_model,
+    spectrum_model,
+    trend_columns,
+    trend_model,
+)
+from service.live import CurrentBearing
 from service.store.port import TrendQuery, ValueRange
 
 MAX_POINTS = 5000
@@ -119,7 +129,7 @@ def bearing_router(context: Context) -> APIRouter:
         query = TrendQuery(
             unit=unit,
             bearing=bearing,
-            quantities=_known(quantity),
+            quantities=trend_columns(_known(quantity)),
             start_ns=times[0],
             end_ns=times[1],
             max_points=max_points,
@@ -128,6 +138,19 @@ def bearing_router(context: Context) -> APIRouter:
             oil_temperature_c=oil_temperature,
         )
         return trend_model(query, await asyncio.to_thread(context.store.trend, query))
+
+    @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
+    async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
+        """Where the uncertainty of the newest result of a quantity comes from."""
+        context.bearing(unit, bearing)
+        if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
+            detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
+            raise ProblemError(404, "No such budget", detail)
+        found = _budget(context.live.current(unit, bearing), quantity)
+        if found is None:
+            detail = f"{quantity} has no number just now, and so no budget"
+            raise ProblemError(409, "No result", detail)
+        return found
 
     @router.get("/{bearing}/spectrum", summary="Spectra", responses=no_result)
     async def spectrum(unit: UnitId, bearing: BearingId) -> SpectrumModel:
@@ -186,6 +209,20 @@ def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
             "bearing_y": settings.bearing_y,
         },
     )
+
+
+def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
+    """Budget of a current reading; the preferred stiffness has that of its estimator."""
+    assessment = current.assessment
+    if assessment is None or not current.is_current:
+        return None
+    source = quantity
+    if quantity.startswith("stiffness_"):
+        axes = quantity.split("_")[1]
+        estimator = assessment.estimators[axes]
+        source = STIFFNESS_OF[estimator].format(axes=axes) if estimator else quantity
+    budget = assessment.budgets.get(source)
+    return None if budget is None else budget_model(quantity, assessment.time_ns, budget)
 
 
 def _known(quantities: list[str]) -> tuple[str, ...]:

@@ -14,6 +14,9 @@ from service.store.port import Store
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
 BearingId = Annotated[str, Path(description="Identifier of a bearing.", examples=["UJB"])]
+QuantityName = Annotated[
+    str, Path(description="Name from the catalogue.", examples=["dynamic_k_xx_n_per_m"])
+]
 
 
 @dataclass(frozen=True)

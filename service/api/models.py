@@ -13,6 +13,10 @@ class ApiModel(BaseModel):
 
 LevelName = Literal["good", "uncertain", "bad"]
 
+EstimatorName = Literal[
+    "dynamic", "transfer_order1", "transfer_vortex", "ratio_order1", "ratio_vortex"
+]
+
 Time = Annotated[str, Field(examples=["2026-11-21T09:03:12.400Z"])]
 
 
@@ -24,6 +28,22 @@ class QualityModel(ApiModel):
 
     reason: Annotated[str, Field(examples=["insufficient_excitation"])]
     """Why it is not good; "ok" if it is."""
+
+
+class UncertaintyModel(ApiModel):
+    """Standard uncertainties (GUM), in the unit of the value."""
+
+    random: float | None
+    """What differs from one result to the next."""
+
+    systematic: float | None
+    """What stays: transducers, bracket."""
+
+    low_95: float
+    """Lower end of the interval that holds the truth with 95 %."""
+
+    high_95: float
+    """Upper end of that interval."""
 
 
 class ReadingModel(ApiModel):
@@ -43,6 +63,9 @@ class ReadingModel(ApiModel):
 
     reason: Annotated[str, Field(examples=["ok"])]
     """Why it is not good."""
+
+    uncertainty: UncertaintyModel | None
+    """Of stiffness and damping, where it is known."""
 
 
 class WindowModel(ApiModel):
@@ -96,6 +119,9 @@ class LatestModel(ApiModel):
 
     window: WindowModel | None
     """The newest result's samples."""
+
+    estimators: dict[str, EstimatorName | None]
+    """Where `stiffness` came from, by axes "xx" and "yy"; null if there is none."""
 
     readings: dict[str, ReadingModel]
     """All quantities of the catalogue, by name."""
@@ -271,6 +297,12 @@ class TrendSeriesModel(ApiModel):
     worst_level: list[LevelName | None]
     """Worst quality in the bucket; null where there was no reading at all."""
 
+    u_random: list[float | None] | None
+    """Mean random standard uncertainty; null for quantities without."""
+
+    u_systematic: list[float | None] | None
+    """Mean systematic standard uncertainty; null for quantities without."""
+
 
 class TrendModel(ApiModel):
     """Trends of one bearing, by column."""
@@ -295,6 +327,50 @@ class TrendModel(ApiModel):
 
     series: dict[str, TrendSeriesModel]
     """The quantities asked for."""
+
+
+class BudgetLineModel(ApiModel):
+    """One contribution to the uncertainty of a result."""
+
+    name: Annotated[str, Field(examples=["bracket stiffness"])]
+    """What contributes."""
+
+    kind: Literal["random", "systematic"]
+    """Whether it differs from one result to the next, or stays."""
+
+    distribution: Literal["normal", "uniform"]
+    """What is known about it besides its width."""
+
+    width: float
+    """Standard uncertainty if normal, half-width if uniform, in the unit of what contributes."""
+
+    sensitivity: float
+    """Change of the result per unit of what contributes."""
+
+    contribution: float
+    """Standard uncertainty of the result by this alone."""
+
+
+class BudgetModel(ApiModel):
+    """Where the uncertainty of one result comes from (JCGM 100:2008, "GUM")."""
+
+    quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
+    """Name from the catalogue."""
+
+    unit: Annotated[str, Field(examples=["N/m"])]
+    """Unit of the value and of the uncertainties."""
+
+    time: Time
+    """End of the samples."""
+
+    value: float
+    """The result."""
+
+    uncertainty: UncertaintyModel
+    """All contributions together."""
+
+    lines: list[BudgetLineModel]
+    """Each contribution, largest first."""
 
 
 class GapModel(ApiModel):

@@ -1,11 +1,17 @@
 """From the program's values to the API's models."""
 
+from collections.abc import Iterable, Mapping
+
 from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.quality import Level, Quality, Reading
 from core.quantities import BY_NAME
+from core.uncertainty import Budget
 from core.units import NS_PER_S
 from service.api.models import (
+    BudgetLineModel,
+    BudgetModel,
+    EstimatorName,
     LatestModel,
     LevelName,
     OrbitModel,
@@ -16,10 +22,12 @@ from service.api.models import (
     SpectrumModel,
     TrendModel,
     TrendSeriesModel,
+    UncertaintyModel,
     WindowModel,
 )
 from service.api.times import rfc3339
-from service.live import LiveView
+from service.live import CurrentBearing, LiveView
+from service.store.codec import U_RANDOM, U_SYSTEMATIC, columns_of
 from service.store.port import Trend, TrendQuery, TrendSeries
 
 LEVEL_NAMES: dict[Level, LevelName] = {
@@ -50,6 +58,44 @@ def reading_model(name: str, reading: Reading) -> ReadingModel:
         label=quantity.label,
         level=LEVEL_NAMES[reading.quality.level],
         reason=reading.quality.reason.value,
+        uncertainty=_uncertainty(reading),
+    )
+
+
+def _uncertainty(reading: Reading) -> UncertaintyModel | None:
+    if reading.interval_95 is None:
+        return None
+    return UncertaintyModel(
+        random=reading.u_random,
+        systematic=reading.u_systematic,
+        low_95=reading.interval_95[0],
+        high_95=reading.interval_95[1],
+    )
+
+
+def budget_model(name: str, time_ns: int, budget: Budget) -> BudgetModel:
+    """A budget, its largest contribution first."""
+    low, high = budget.interval
+    ordered = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
+    return BudgetModel(
+        quantity=name,
+        unit=BY_NAME[name].unit,
+        time=rfc3339(time_ns),
+        value=budget.value,
+        uncertainty=UncertaintyModel(
+            random=budget.random, systematic=budget.systematic, low_95=low, high_95=high
+        ),
+        lines=[
+            BudgetLineModel(
+                name=line.name,
+                kind=line.kind.value,
+                distribution=line.distribution.value,
+                width=line.width,
+                sensitivity=line.sensitivity,
+                contribution=line.contribution,
+            )
+            for line in ordered
+        ],
     )
 
 
@@ -65,8 +111,16 @@ def latest_model(live: LiveView, unit: str, bearing: str) -> LatestModel:
         quality=quality_model(current.quality),
         speed_source=newest.speed_source.value if newest else None,
         window=window_model(newest.window) if newest else None,
+        estimators=_estimators(current),
         readings={name: reading_model(name, r) for name, r in current.readings.items()},
     )
+
+
+def _estimators(current: CurrentBearing) -> dict[str, EstimatorName | None]:
+    if current.assessment is None or not current.is_current:
+        return {"xx": None, "yy": None}
+    chosen = current.assessment.estimators
+    return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
 
 
 def window_model(window: AveragingWindow) -> WindowModel:
@@ -113,7 +167,9 @@ def trend_model(query: TrendQuery, trend: Trend) -> TrendModel:
         end=rfc3339(query.end_ns),
         bucket_s=None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S,
         time=[time_ns / NS_PER_S for time_ns in trend.time_ns],
-        series={name: _series_model(name, series) for name, series in trend.series.items()},
+        series={
+            name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME
+        },
     )
 
 
@@ -147,7 +203,14 @@ def orbit_model(orbit: OrbitTrace) -> OrbitModel:
     )
 
 
-def _series_model(name: str, series: TrendSeries) -> TrendSeriesModel:
+def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
+    """Columns of the store that a trend of some quantities needs."""
+    return columns_of(BY_NAME[name] for name in quantities)
+
+
+def _series_model(name: str, columns: Mapping[str, TrendSeries]) -> TrendSeriesModel:
+    series = columns[name]
+    random, systematic = columns.get(name + U_RANDOM), columns.get(name + U_SYSTEMATIC)
     return TrendSeriesModel(
         unit=BY_NAME[name].unit,
         min=list(series.minimum),
@@ -155,4 +218,6 @@ def _series_model(name: str, series: TrendSeries) -> TrendSeriesModel:
         mean=list(series.mean),
         count=list(series.count),
         worst_level=[None if level is None else LEVEL_NAMES[level] for level in series.worst_level],
+        u_random=list(random.mean) if random else None,
+        u_systematic=list(systematic.mean) if systematic else None,
     )

@@ -88,6 +88,10 @@ class ChannelSettings(Settings):
     ok_max_v: Annotated[float, Field(ge=-100.0, le=100.0)]
     """Highest mean voltage of a healthy transducer (gap OK limit); example: 11.0."""
 
+    gain_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
+    """Half-width of what the sensitivity may be off, as a share: the transducer's class; example:
+    0.05."""
+
     direction: Literal[1, -1] | None = None
     """+1 if a growing reading is motion along the positive bearing axis, -1 if against it. Default:
     -1 for a proximity probe, which sits on the positive axis and sees its gap shrink; else +1."""

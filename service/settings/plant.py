@@ -47,6 +47,35 @@ class ServiceSettings(Settings):
         return self
 
 
+class DynamicModel(Settings):
+    """How all eight film coefficients are sought between the harmonics of the running speed."""
+
+    band_hz: tuple[float, float] = (0.6, 12.0)
+    """Lines are taken from this band [low, high] in Hz."""
+
+    guard_bins: Annotated[float, Field(ge=1.0, le=50.0)] = 3.0
+    """Distance from each harmonic, in bins, within which lines are left out: runout lives there."""
+
+    probe_noise_um2_per_hz: Annotated[float, Field(ge=0.0, le=1e3)] | None = None
+    """Known one-sided noise density of the shaft probes, µm²/Hz; without it the quiet band shows
+    it. White noise of 1.2 µm rms up to 300 Hz is 0.0048."""
+
+    quiet_band_hz: tuple[float, float] = (15.0, 25.0)
+    """Band [low, high] in Hz in which the shaft hardly moves, for the probes' noise."""
+
+    max_relative_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
+    """Random standard uncertainty of a direct stiffness, as a share, beyond which there is no
+    result."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("band_hz", "quiet_band_hz"):
+            low, high = getattr(self, name)
+            if not 0.0 < low < high:
+                raise MisfitError(f"must rise from above 0, got [{low:g}, {high:g}]", name)
+        return self
+
+
 class AnalysisModel(Settings):
     """Segments and averaging; the defaults are those of Brito et al., section 3.1."""
 
@@ -80,6 +109,16 @@ class AnalysisModel(Settings):
 
     min_coverage: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     """Share of the possible segments below which a result is uncertain."""
+
+    min_bearing_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 4.0
+    """Bearing amplitude of a line, µm zero-to-peak, below which equation (5) and transfer give no
+    stiffness; lower it for transducers better than a 1000 mV/g accelerometer."""
+
+    max_line_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
+    """Random standard uncertainty of transfer, as a share, beyond which there is no result."""
+
+    dynamic: DynamicModel = DynamicModel()
+    """How all eight film coefficients are sought."""
 
     min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
     """Share of the rated speed below which the machine counts as standing."""

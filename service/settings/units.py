@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
+from core.estimators import PREFERENCE, Estimator
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.simulation import SimulationSettings
@@ -54,6 +55,25 @@ class BearingSettings(Settings):
 
     gap_y: Identifier | None = None
     """Slow channel (mm) of the y gap."""
+
+    bracket_stiffness_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.10
+    """Half-width of what the bracket's stiffness may be off, as a share; example: 0.10."""
+
+    bracket_mass_kg: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
+    """Effective mass of bracket and bearing in kg; 0 if not known. Equation (5) leaves it out,
+    the other estimators take its inertia in. Example: 45.0e3."""
+
+    bracket_damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=1e10)] = 0.0
+    """Damping of the bracket in N·s/m; 0 if not known."""
+
+    runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    """Largest runout of the shaft's surface at 1×, µm zero-to-peak; widens the uncertainty of what
+    is read at 1×. Example: 10.0."""
+
+    preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
+    """Estimators that the stiffness for trends and alarms is taken from, best first: the first
+    that has a number. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
+    "ratio_order1"."""
 
 
 class ModbusRingSettings(Settings):
@@ -114,6 +134,9 @@ class UnitSettings(Settings):
 
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
     """Samples per second and channel; example: 600.0."""
+
+    turbine: Literal["francis", "kaplan"] = "francis"
+    """"francis" or "kaplan". A Kaplan turbine has no part-load vortex: that order is off."""
 
     speed_channel: Identifier | None = None
     """Slow channel (r/min) of the running speed; without it the 1× line is used."""

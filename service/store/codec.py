@@ -1,22 +1,33 @@
-"""Readings as bytes: one float64 and one quality byte for each quantity of a layout."""
+"""Readings as bytes: one float64 and one quality byte for each column of a layout."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.quality import Reading, Reason
+from core.quality import Quality, Reading, Reason
+from core.quantities import Quantity
 
 LEVEL_SHIFT = 6
 """A quality byte is the level in its two top bits and the number of the reason below."""
 
 
+U_RANDOM, U_SYSTEMATIC = ".u_random", ".u_systematic"
+"""Behind the name of a quantity: the column of its standard uncertainty."""
+
+
+def columns_of(quantities: Iterable[Quantity]) -> tuple[str, ...]:
+    """Names of the columns that hold quantities and, where they have them, their uncertainties."""
+    suffixes = {False: ("",), True: ("", U_RANDOM, U_SYSTEMATIC)}
+    return tuple(q.name + suffix for q in quantities for suffix in suffixes[q.has_uncertainty])
+
+
 @dataclass(frozen=True)
 class Layout:
-    """Which quantities a stored row holds, and what its reason numbers mean.
+    """Which columns a stored row holds, and what its reason numbers mean.
 
     Rows keep the layout they were written with, so that the catalogue can grow.
     """
@@ -40,11 +51,11 @@ class Layout:
 
     def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
         """Values (NaN for none) and qualities, in the order of the layout."""
-        ordered = [readings[name] for name in self.quantities]
-        values = np.array([np.nan if r.value is None else r.value for r in ordered], dtype="<f8")
+        ordered = [_column(readings, name) for name in self.quantities]
+        values = np.array([number for number, _ in ordered], dtype="<f8")
         qualities = bytes(
-            r.quality.level << LEVEL_SHIFT | self.reasons.index(r.quality.reason.value)
-            for r in ordered
+            quality.level << LEVEL_SHIFT | self.reasons.index(quality.reason.value)
+            for _, quality in ordered
         )
         return values.tobytes(), qualities
 
@@ -56,3 +67,12 @@ class Layout:
         number = np.frombuffer(b"".join(values), dtype="<f8").reshape(shape)
         byte = np.frombuffer(b"".join(qualities), dtype=np.uint8).reshape(shape)
         return number.astype(np.float64), (byte >> LEVEL_SHIFT).astype(np.uint8)
+
+
+def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Quality]:
+    name, dot, which = column.partition(".")
+    reading = readings[name]
+    number = {U_RANDOM: reading.u_random, U_SYSTEMATIC: reading.u_systematic}.get(
+        dot + which, reading.value
+    )
+    return np.nan if number is None else number, reading.quality

@@ -46,6 +46,10 @@ MIGRATIONS = (
         PRIMARY KEY (unit, epoch, first_index, stop_ns)
     ) STRICT, WITHOUT ROWID;
     """,
+    """
+    ALTER TABLE assessment ADD COLUMN estimator_xx TEXT;
+    ALTER TABLE assessment ADD COLUMN estimator_yy TEXT;
+    """,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -13,7 +13,7 @@ from core.assessment import Assessment
 from core.quality import Level
 from core.quantities import CATALOGUE
 from service.store.buckets import Readings, bucket_width_ns, bucketed, single_points
-from service.store.codec import Layout
+from service.store.codec import Layout, columns_of
 from service.store.port import (
     QueryTooLargeError,
     StoreError,
@@ -29,7 +29,7 @@ MAX_ROWS = 1_000_000
 BUSY_TIMEOUT_S = 5.0
 
 INSERT_ASSESSMENT = """
-    INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)
+    INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
     ON CONFLICT (series, time_ns) DO NOTHING
 """
 INSERT_GAP = "INSERT INTO gap VALUES (?,?,?,?,?) ON CONFLICT DO NOTHING"
@@ -67,7 +67,7 @@ class SqliteStore:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lock = Lock()
-        self._layout = Layout.of(tuple(quantity.name for quantity in CATALOGUE))
+        self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._writer = sqlite3.connect(
@@ -131,6 +131,8 @@ class SqliteStore:
             self._layout_id,
             values,
             qualities,
+            assessment.estimators["xx"],
+            assessment.estimators["yy"],
         )
 
     def _series_id(self, unit: str, bearing: str) -> int:

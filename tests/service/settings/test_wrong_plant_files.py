@@ -166,7 +166,7 @@ def test_an_unknown_key_is_named_with_the_keys_that_are_known_there(
     [found] = mistakes(text)
 
     assert found.startswith(f"{line + 1}: {UJB}bracket_stiffnes = 'soft': unknown key")
-    assert "bracket_stiffness_n_per_m, clearance_um" in found
+    assert "bracket_stiffness_n_per_m, bracket_stiffness_uncertainty, clearance_um" in found
 
 
 def test_a_bearing_under_its_own_unknown_table_is_no_bearing(

@@ -37,6 +37,8 @@ def build_assessment(
         speed_source=SpeedSource.SLOW_CHANNEL,
         quality=GOOD,
         readings=everything,
+        budgets={},
+        estimators={"xx": None, "yy": None},
         spectrum=nothing,
         orbit=None,
     )

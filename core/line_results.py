@@ -1,0 +1,174 @@
+"""What one order line says of a bearing: amplitudes, equation (5) and transfer, with evidence."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
+from core.machine import Bearing
+from core.quality import Quality, Reading, Reason, missing
+from core.ratio import effective_stiffness_n_per_m
+from core.segments import ORDER1, VORTEX
+from core.settings import AnalysisSettings
+from core.spectral_statistics import independent_segments
+from core.stiffness_budget import ratio_budget, transfer_budgets
+from core.transfer import LineTransfer, line_transfer
+from core.uncertainty import Budget
+
+FLOOR_REACH = 12
+"""Bins to each side of a line in which its surroundings are judged."""
+
+MAIN_LOBE = 2
+"""Bins to each side of a tone that a Hann taper spreads it over."""
+
+DIRECTIONS = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}
+
+AMPLITUDES = {
+    "shaft_x": SHAFT_X,
+    "shaft_y": SHAFT_Y,
+    "bearing_x": BEARING_X,
+    "bearing_y": BEARING_Y,
+}
+
+
+def reading_of(budget: Budget, quality: Quality) -> Reading:
+    """The result of a budget with its standard uncertainties."""
+    return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
+
+
+@dataclass(frozen=True)
+class OrderLine:
+    """An order line of one bearing.
+
+    Parameters
+    ----------
+    orders
+        Cross-spectrum at the exact order frequencies.
+    bins
+        Cross-spectrum at the bins, for the surroundings of the line.
+    line
+        Which of the order lines.
+    quality
+        Of what is read from some channels at an order line; without a number, why.
+    """
+
+    bearing: Bearing
+    settings: AnalysisSettings
+    orders: CrossSpectrum
+    bins: CrossSpectrum
+    line: int
+    quality: Callable[..., Quality | Reading]
+
+    @property
+    def _runout_um_pk(self) -> float:
+        """Runout is locked to the shaft, so that the vortex is free of it."""
+        return self.bearing.runout_um_pk if self.line == ORDER1 else 0.0
+
+    def amplitudes(self) -> dict[str, Reading]:
+        """Amplitude of each channel, by name."""
+        return {name: self._amplitude(place) for name, place in AMPLITUDES.items()}
+
+    def stiffness(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+        """Coherence, equation (5) and transfer in both directions, and their budgets."""
+        readings: dict[str, Reading] = {}
+        budgets: dict[str, Budget] = {}
+        for axes, (shaft, bearing) in DIRECTIONS.items():
+            quality = self.quality(shaft, bearing)
+            if isinstance(quality, Reading):
+                readings |= dict.fromkeys(_names(axes), quality)
+            else:
+                found = self._direction(axes, shaft, bearing, quality, budgets)
+                readings |= dict(zip(_names(axes), found, strict=True))
+        return readings, budgets
+
+    def _amplitude(self, place: int) -> Reading:
+        quality = self.quality(place)
+        if isinstance(quality, Reading):
+            return quality
+        return Reading(float(self.orders.amplitude_um_pk(place)[self.line]), quality)
+
+    def _direction(
+        self, axes: str, shaft: int, bearing: int, quality: Quality, budgets: dict[str, Budget]
+    ) -> tuple[Reading, Reading, Reading, Reading]:
+        n_segments = int(self.orders.n_segments[shaft, bearing])
+        few = n_segments < self.settings.min_segments
+        coherence = float(self.orders.coherence(shaft, bearing)[self.line])
+        shown = missing(Reason.FEW_SEGMENTS) if few else Reading(coherence, quality)
+        silent = missing(Reason.INSUFFICIENT_EXCITATION)
+        if not self._moves(shaft, bearing):
+            return shown, silent, silent, silent
+        independent = independent_segments(n_segments, self.settings.overlap)
+        k_eff = silent
+        if self._stands_out(bearing) if few else coherence >= self.settings.min_coherence:
+            k_eff = self._ratio(axes, shaft, bearing, quality, independent, budgets)
+        if few:
+            return shown, k_eff, missing(Reason.FEW_SEGMENTS), missing(Reason.FEW_SEGMENTS)
+        found = line_transfer(
+            self.orders, self.line, shaft, bearing, self.bearing.bracket, independent
+        )
+        if found is None or not self._is_certain(found):
+            return shown, k_eff, silent, silent
+        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk)
+        budgets[f"transfer_k_{axes}_n_per_m"] = of_k
+        budgets[f"transfer_c_{axes}_n_s_per_m"] = of_c
+        return shown, k_eff, reading_of(of_k, quality), reading_of(of_c, quality)
+
+    def _ratio(
+        self,
+        axes: str,
+        shaft: int,
+        bearing: int,
+        quality: Quality,
+        n_segments: float,
+        budgets: dict[str, Budget],
+    ) -> Reading:
+        ratio = float(self.orders.amplitude_ratio(bearing, shaft)[self.line])
+        k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket_stiffness_n_per_m)
+        budget = ratio_budget(
+            self.orders,
+            self.line,
+            shaft,
+            bearing,
+            self.bearing.bracket,
+            self.bearing.accuracy,
+            n_segments,
+            self._runout_um_pk,
+        )
+        if budget is None:
+            return Reading(k_eff, quality)
+        budgets[f"k_eff_{axes}_n_per_m"] = budget
+        return reading_of(budget, quality)
+
+    def _moves(self, shaft: int, bearing: int) -> bool:
+        """Whether there is a line that is worth reading."""
+        few = int(self.orders.n_segments[shaft, bearing]) < self.settings.min_segments
+        if self.orders.power[self.line, shaft, bearing] <= 0.0:
+            return False
+        if self.orders.amplitude_um_pk(bearing)[self.line] < self.settings.min_bearing_um_pk:
+            return False
+        # what is no line must not be read as the vortex's
+        return self._stands_out(shaft) if few or self.line == VORTEX else True
+
+    def _is_certain(self, found: LineTransfer) -> bool:
+        return found.k_std_n_per_m <= self.settings.max_line_uncertainty * abs(found.k_n_per_m)
+
+    def _stands_out(self, place: int) -> bool:
+        """Whether the line stands above its surroundings, less those of the other order line."""
+        frequency_hz = self.bins.frequency_hz
+        positions = (self.orders.frequency_hz / (frequency_hz[1] - frequency_hz[0])).round() - 1
+        number = np.arange(frequency_hz.size)
+        near = np.abs(number - positions[self.line]) <= FLOOR_REACH
+        in_lobe = (np.abs(number[:, np.newaxis] - positions) <= MAIN_LOBE).any(axis=1)
+        floor = np.median(self.bins.power[near & ~in_lobe, place, place])
+        peak = self.orders.power[self.line, place, place]
+        return bool(peak > self.settings.min_line_to_floor * floor)
+
+
+def _names(axes: str) -> tuple[str, str, str, str]:
+    return (
+        f"coherence_{axes}",
+        f"k_eff_{axes}_n_per_m",
+        f"transfer_k_{axes}_n_per_m",
+        f"transfer_c_{axes}_n_s_per_m",
+    )
