@@ -109,7 +109,7 @@ def dynamic_stiffness(
     index = np.flatnonzero(lines)
     stiffness = bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[index])
     equations = normal_equations(spectrum, index, stiffness, noise_power)
-    smoothing = smoother(index, settings.smoothing_reach_bins)
+    smoothing = smoother(tuple(index.tolist()), settings.smoothing_reach_bins)
     weight = line_weights(equations, spectrum.matrix[index], smoothing, settings.n_iterations)
     if weight is None:
         return Reason.INSUFFICIENT_EXCITATION

@@ -1,7 +1,9 @@
 """Fitting a film to spectra: weights from the residual, evidence, and whether the model holds."""
 
+import math
+from functools import lru_cache
+
 import numpy as np
-import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import BEARING_X
@@ -51,18 +53,29 @@ def line_weights(
 
 def signal_share(equations: NormalEquations, weight: FloatArray) -> float:
     """Smallest share of motion in the weighted shaft spectra, over directions and rows."""
-    shares = []
-    for row_weight in weight.T:
-        whole = np.tensordot(row_weight, equations.gram[:, :2, :2], axes=1)
-        noise = np.tensordot(row_weight, equations.noise_gram[:, :2, :2], axes=1)
-        scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
-        if scale.min() <= 0.0 or np.linalg.eigvalsh(whole / scale)[0] < ROUNDING:
-            return 0.0
-        shares.append(1.0 - float(np.linalg.eigvals(np.linalg.solve(whole, noise)).real.max()))
-    return min(shares)
+    n_lines = weight.shape[0]
+    motion = equations.gram[:, :2, :2].reshape(n_lines, 4)
+    noise = equations.noise_gram[:, :2, :2].reshape(n_lines, 4)
+    return min(
+        1.0 - _largest_share(*shares)
+        for shares in zip(weight.T @ noise, weight.T @ motion, strict=True)
+    )
 
 
-def smoother(lines: npt.NDArray[np.int64], reach: int) -> FloatArray:
+def _largest_share(part: FloatArray, whole: FloatArray) -> float:
+    """Largest part in any direction of the whole, two symmetric (2, 2) matrices laid out flat."""
+    determinant = float(whole[0] * whole[3] - whole[1] ** 2)
+    if not determinant > ROUNDING * float(whole[0] * whole[3]):
+        return 1.0
+    # largest root of det(part - share · whole) = 0
+    mixed = float(part[0] * whole[3] + part[3] * whole[0] - 2.0 * part[1] * whole[1])
+    left = float(part[0] * part[3] - part[1] ** 2)
+    root = math.sqrt(max(mixed**2 - 4.0 * determinant * left, 0.0))
+    return (mixed + root) / (2.0 * determinant)
+
+
+@lru_cache(maxsize=32)
+def smoother(lines: tuple[int, ...], reach: int) -> FloatArray:
     """Matrix that puts a straight line through the neighbours of each line, (n_lines, n_lines).
 
     Parameters
@@ -70,15 +83,17 @@ def smoother(lines: npt.NDArray[np.int64], reach: int) -> FloatArray:
     lines
         Indices of the lines; those further than `reach` bins apart are no neighbours.
     """
-    distance = np.subtract.outer(lines, lines).astype(np.float64)
+    distance = np.subtract.outer(np.array(lines), np.array(lines)).astype(np.float64)
     near = (np.abs(distance) <= reach).astype(np.float64)
     count, first = near.sum(axis=1), (near * distance).sum(axis=1)
     second = (near * distance**2).sum(axis=1)
     alone = count * second == first**2  # a line without neighbours keeps what it has
     determinant = np.where(alone, 1.0, count * second - first**2)
     sloped = near * (second[:, np.newaxis] - first[:, np.newaxis] * distance)
-    matrix: FloatArray = np.where(alone[:, np.newaxis], np.eye(lines.size), sloped)
-    return matrix / determinant[:, np.newaxis]
+    matrix: FloatArray = np.where(alone[:, np.newaxis], np.eye(len(lines)), sloped)
+    matrix /= determinant[:, np.newaxis]
+    matrix.setflags(write=False)
+    return matrix
 
 
 def _smoothed(smoothing: FloatArray, residual: FloatArray, force_power: FloatArray) -> FloatArray:
