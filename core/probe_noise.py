@@ -1,13 +1,19 @@
 """The noise floor of the shaft probes, known or read from a quiet band."""
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import BEARING_X, CrossSpectrum
+from core.spectral_statistics import CORRELATED_LINES
 
 N_BLOCKS = 4
-"""Parts of the quiet band; the quietest counts, in case the shaft moves unseen in the others."""
+"""Parts of the quiet band, in case the shaft moves unseen in some of them."""
+
+SAME_FLOOR = 3.0
+"""Standard deviations within which a part shows the same floor as the quietest."""
 
 
 def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
@@ -40,7 +46,7 @@ def probe_noise_power(
 
     What shaft and bearing have in common is motion and does not count; the rest is the probes'
     noise and, through the film, the bearing transducers'. Where those are quiet the estimate is
-    true, else it is high; never is it low.
+    true, else it is high.
 
     Parameters
     ----------
@@ -62,8 +68,14 @@ def probe_noise_power(
     )
     n_blocks = min(N_BLOCKS, rest.shape[0])
     edges = np.linspace(0, rest.shape[0], n_blocks + 1).astype(np.int64)[:-1]
-    counts = np.diff(np.append(edges, rest.shape[0]))
-    blocks = np.add.reduceat(rest, edges, axis=0) / counts[:, np.newaxis]
+    counts = np.diff(np.append(edges, rest.shape[0]))[:, np.newaxis]
+    sums = np.add.reduceat(rest, edges, axis=0)
     # two fitted signals take two of the segments' freedoms (Bendat and Piersol, 9.3)
-    floor: FloatArray = blocks.min(axis=0) * n_segments / (n_segments - 2.0)
-    return floor
+    freedoms = n_segments - 2.0
+    spread = math.sqrt(CORRELATED_LINES / (counts.min() * freedoms))
+    # the mean of all parts that show the same floor: the least alone would be low by chance
+    same = sums / counts <= (1.0 + SAME_FLOOR * math.sqrt(2.0) * spread) * (sums / counts).min(
+        axis=0
+    )
+    floor: FloatArray = (sums * same).sum(axis=0) / (counts * same).sum(axis=0)
+    return floor * n_segments / freedoms

@@ -13,7 +13,8 @@ NOISE_BANDWIDTH_BINS = 1.5
 BIN_CORRELATION = (1.0, 2.0 / 3.0, 1.0 / 6.0)
 """Of the phasors of white noise in bins 0, 1 and 2 apart: Hann's taper convolved with itself."""
 
-CORRELATION_REACH = len(BIN_CORRELATION) - 1
+CORRELATED_LINES = 1.0 + 2.0 * sum(rho**2 for rho in BIN_CORRELATION[1:])
+"""Neighbouring lines that count as one in a mean of squares, 1.94."""
 
 
 def phasor_power_per_density(bin_hz: float) -> float:
