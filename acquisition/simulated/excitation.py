@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 import scipy.signal
 
+from acquisition.simulated.rotation import Rotation
 from core.arrays import FloatArray
 
 CUTOFF_FILTER_ORDER = 4
@@ -21,19 +22,25 @@ class Excitation(Protocol):
 
 
 class UnbalanceForce:
-    """Force that turns forward with the shaft."""
+    """Force that turns forward with the shaft and grows with the square of its speed.
 
-    def __init__(self, force_n: float, frequency_hz: float, rate_hz: float) -> None:
+    Parameters
+    ----------
+    force_n
+        At the mean speed.
+    """
+
+    def __init__(self, force_n: float, rotation: Rotation) -> None:
         self._force_n = force_n
-        self._turns_per_sample = frequency_hz / rate_hz
+        self._rotation = rotation
         self._index = 0
 
     def advance(self, n_samples: int) -> FloatArray:
         """Give the next forces (x, y) in newtons, (2, n_samples)."""
-        turns = self._turns_per_sample * np.arange(self._index, self._index + n_samples)
+        index = np.arange(self._index, self._index + n_samples, dtype=np.float64)
         self._index += n_samples
-        angle = 2.0 * math.pi * np.fmod(turns, 1.0)
-        return _rotating(self._force_n, angle)
+        angle = 2.0 * math.pi * np.fmod(self._rotation.turns(index), 1.0)
+        return _rotating(self._force_n, angle) * self._rotation.relative_speed(index) ** 2
 
 
 class RopeForce:

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.simulated.chain import TransducerChain
 from acquisition.simulated.conditions import Conditions, SlowWander
 from acquisition.simulated.excitation import Excitation, HydraulicForce, RopeForce, UnbalanceForce
+from acquisition.simulated.rotation import Rotation
 from acquisition.simulated.scenario import Scenario
-from acquisition.simulated.transducers import noise_rms, output_map, standing_gap_um
+from acquisition.simulated.transducers import output_map
 from core.arrays import FloatArray
 from core.machine import Unit
 from core.rotor import force_map, rotor_matrices
@@ -33,11 +35,14 @@ class Chunk:
     ----------
     readings
         (n_channels, CHUNK_SAMPLES) in engineering units.
+    first_index
+        Samples since the plant began to warm up.
     """
 
     readings: FloatArray
     start: Conditions
     stop: Conditions
+    first_index: int
 
 
 class SimulatedPlant:
@@ -50,29 +55,43 @@ class SimulatedPlant:
     """
 
     def __init__(self, machine: Unit, scenario: Scenario, seed: int) -> None:
-        seeds = np.random.SeedSequence(seed).spawn(4)
-        hydraulic, rope, noise, wander = (np.random.Generator(np.random.SFC64(s)) for s in seeds)
-        self._machine = machine
+        seeds = np.random.SeedSequence(seed).spawn(7)
+        hydraulic, rope, noise, wander, growth, speed, own = (
+            np.random.Generator(np.random.SFC64(s)) for s in seeds
+        )
+        rate_hz = machine.rate_hz
+        turn_hz = hz_from_rpm(scenario.speed_rpm)
+        self._rotation = Rotation(
+            speed, turn_hz, rate_hz, scenario.speed_wander, scenario.wander_time_s
+        )
         self._rotor = _lifted_rotor(machine, scenario)
         self._state = np.zeros(self._rotor.transition.shape[0])
-        self._forces = _excitations(scenario, machine.rate_hz, hydraulic, rope)
-        self._noise = noise
-        self._noise_rms = noise_rms(machine, scenario.noise)
-        self._wander = SlowWander(wander, machine, scenario, CHUNK_SAMPLES / machine.rate_hz)
-        self._ramp = np.arange(CHUNK_SAMPLES) / CHUNK_SAMPLES
-        for _ in range(int(WARM_UP_S * machine.rate_hz / CHUNK_SAMPLES) + 1):
-            self._vibration()
+        self._forces = _excitations(scenario, rate_hz, self._rotation, hydraulic, rope)
+        self._chain = TransducerChain(machine, scenario, noise, own)
+        self._wander = SlowWander(wander, growth, machine, scenario, CHUNK_SAMPLES / rate_hz)
+        self._index = 0
+        standing = self._wander.now()
+        for _ in range(int(WARM_UP_S * rate_hz / CHUNK_SAMPLES) + 1):
+            self._readings(standing, standing)
 
     def advance(self) -> Chunk:
         """Produce the next chunk."""
-        readings = self._vibration()
+        first_index = self._index
         start, stop = self._wander.now(), self._wander.advance()
-        gap_um, next_gap_um = (standing_gap_um(self._machine, c) for c in (start, stop))
-        readings += gap_um[:, np.newaxis]
-        readings += np.outer(next_gap_um - gap_um, self._ramp)
-        noise = self._noise.standard_normal(readings.shape, dtype=np.float32)
-        readings += noise * self._noise_rms[:, np.newaxis]
-        return Chunk(readings, start, stop)
+        readings = self._readings(start, stop)
+        self._chain.add_white_noise(readings)
+        return Chunk(readings, start, stop, first_index)
+
+    def relative_speed(self, chunk: Chunk, offset: int) -> float:
+        """Speed at a sample of a chunk, over its mean."""
+        return float(
+            self._rotation.relative_speed(np.array([float(chunk.first_index + offset)]))[0]
+        )
+
+    def _readings(self, start: Conditions, stop: Conditions) -> FloatArray:
+        index = np.arange(self._index, self._index + CHUNK_SAMPLES, dtype=np.float64)
+        self._index += CHUNK_SAMPLES
+        return self._chain.read(self._vibration(), self._rotation.turns(index), start, stop)
 
     def _vibration(self) -> FloatArray:
         forces = np.concatenate(
@@ -90,9 +109,10 @@ def _lifted_rotor(machine: Unit, scenario: Scenario) -> LiftedRotor:
     if missing:
         raise ConfigError(f"the scenario of {machine.id!r} lacks {', '.join(sorted(missing))}")
     films = {name: bearing.film for name, bearing in scenario.bearings.items()}
-    matrices = rotor_matrices(scenario.rotor, films, scenario.speed_rpm)
-    forces = np.hstack([force_map(scenario.rotor, plane) for plane in _planes(scenario)])
-    outputs = output_map(machine, scenario.rotor, matrices)
+    parameters = scenario.true_rotor
+    matrices = rotor_matrices(parameters, films, scenario.speed_rpm)
+    forces = np.hstack([force_map(parameters, plane) for plane in _planes(scenario)])
+    outputs = output_map(machine, parameters, matrices)
     rotor = discretize(matrices, forces, outputs, machine.rate_hz, Hold.RAMP)
     return lift(rotor, LIFTED_STEPS)
 
@@ -106,6 +126,7 @@ def _planes(scenario: Scenario) -> list[ForcePlane]:
 def _excitations(
     scenario: Scenario,
     rate_hz: float,
+    rotation: Rotation,
     hydraulic: np.random.Generator,
     rope: np.random.Generator,
 ) -> dict[ForcePlane, list[Excitation]]:
@@ -113,7 +134,7 @@ def _excitations(
     unbalance_n = unbalance_force_n(scenario.unbalance_grade_mm_s, scenario.speed_rpm)
     noise, vortex = scenario.hydraulic, scenario.rope
     by_plane: dict[ForcePlane, list[Excitation]] = {plane: [] for plane in _planes(scenario)}
-    by_plane[ForcePlane.MASS_CENTRE].append(UnbalanceForce(unbalance_n, turn_hz, rate_hz))
+    by_plane[ForcePlane.MASS_CENTRE].append(UnbalanceForce(unbalance_n, rotation))
     by_plane[noise.plane].append(HydraulicForce(hydraulic, noise.rms_n, noise.cutoff_hz, rate_hz))
     by_plane[ForcePlane.RUNNER].append(
         RopeForce(rope, vortex.force_n, vortex.order * turn_hz, vortex.line_width_hz, rate_hz)

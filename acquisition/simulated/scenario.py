@@ -1,10 +1,12 @@
 """What a simulated unit goes through: its films, what shakes it, how well it is measured."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from acquisition.simulated.faults import Fault
 from core.film import Film
 from core.rotor_parameters import ForcePlane, RotorParameters
+from core.transducer_response import Response
 
 
 @dataclass(frozen=True)
@@ -17,6 +19,14 @@ class BearingScenario:
         Mean position of the shaft centre from the bearing centre.
     centre_wander_um_rms
         Slow wander of that position, for each direction.
+    gap_growth_um, gap_growth_wander_um_rms
+        By how much all gaps of the bearing are wider than with the shaft centred at reference
+        temperature, and its slow wander: positive where the housing grows more than the shaft.
+    runout_um_pk
+        Runout of the shaft under the probes, 1×, 2×, …: phasors at the x probe, locked to the
+        shaft; the other probes see the same surface later. Towards a probe is positive.
+    bracket_stiffness_factor
+        True stiffness of the bracket over the one of `Scenario.rotor`, which monitors are told.
     """
 
     film: Film
@@ -25,6 +35,10 @@ class BearingScenario:
     centre_wander_um_rms: float = 0.0
     oil_temperature_c: float = 45.0
     oil_temperature_wander_c_rms: float = 0.0
+    gap_growth_um: float = 0.0
+    gap_growth_wander_um_rms: float = 0.0
+    runout_um_pk: tuple[complex, ...] = ()
+    bracket_stiffness_factor: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,12 +78,43 @@ class VortexRope:
 
 @dataclass(frozen=True)
 class TransducerNoise:
-    """White noise of each kind of transducer over the whole band, rms."""
+    """Noise of each kind of transducer.
+
+    Parameters
+    ----------
+    gap_um_rms, displacement_um_rms, velocity_mm_s_rms, acceleration_m_s2_rms
+        White over the whole band, behind the transducer: its response does not touch it.
+    accelerometer_g_per_sqrt_hz
+        One-sided density of the accelerometers' own noise, before their response; a velocity
+        channel is an accelerometer whose charge amplifier integrates.
+    accelerometer_corner_hz
+        Below here it rises as 1/f in power: at the corner itself the power is twice the density's.
+    """
 
     gap_um_rms: float = 0.0
     displacement_um_rms: float = 0.0
     velocity_mm_s_rms: float = 0.0
     acceleration_m_s2_rms: float = 0.0
+    accelerometer_g_per_sqrt_hz: float = 0.0
+    accelerometer_corner_hz: float = 2.0
+
+
+@dataclass(frozen=True)
+class ChannelScenario:
+    """What one transducer really is like, whatever the monitor is told.
+
+    Parameters
+    ----------
+    response
+        Complex response; none is flat. Must be a model, not a table.
+    gain
+        True sensitivity over the nominal one. A probe's reference gap was read with the probe
+        itself, so that the gain acts on what differs from it.
+    """
+
+    response: Response | None = None
+    gain: float = 1.0
+    faults: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,7 +128,14 @@ class Scenario:
     unbalance_grade_mm_s
         ISO grade at 92.3 r/min, as in the paper: G4.25 is 75.6 kN there.
     wander_time_s
-        How slowly shaft centres, temperatures and power wander.
+        How slowly shaft centres, temperatures and power wander, and the speed.
+    speed_wander
+        Largest departure of the running speed from `speed_rpm`, as a share of it; 0.003 is 0.3 %.
+        The film and the gyroscopic forces stay those of `speed_rpm`.
+    channels
+        Transducers that differ from perfect ones, by channel.
+    exchanged
+        Pairs of channels whose cables are swapped.
     """
 
     bearings: Mapping[str, BearingScenario]
@@ -96,3 +148,16 @@ class Scenario:
     noise: TransducerNoise = field(default_factory=TransducerNoise)
     wander_time_s: float = 600.0
     rotor: RotorParameters = field(default_factory=RotorParameters)
+    speed_wander: float = 0.0
+    channels: Mapping[str, ChannelScenario] = field(default_factory=dict)
+    exchanged: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def true_rotor(self) -> RotorParameters:
+        """The rotor on its brackets as they are."""
+        factors = {id_: bearing.bracket_stiffness_factor for id_, bearing in self.bearings.items()}
+        brackets = tuple(
+            replace(b, stiffness_n_per_m=factors.get(b.bearing, 1.0) * b.stiffness_n_per_m)
+            for b in self.rotor.brackets
+        )
+        return replace(self.rotor, brackets=brackets)

@@ -1,10 +1,9 @@
-"""What probes and accelerometers make of the motion of the rotor: output map, gap, noise."""
+"""Which motion of the rotor each transducer sees, and as what."""
 
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.simulated.conditions import Conditions
-from acquisition.simulated.scenario import TransducerNoise
+from acquisition.simulated.probes import probes
 from core.arrays import FloatArray
 from core.machine import Measurand, Unit
 from core.rotor import RotorMatrices, bracket_motion, relative_motion
@@ -15,12 +14,12 @@ SHAFT, BEARING = "shaft", "bearing"
 
 
 def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatrices) -> FloatArray:
-    """Map the state of the rotor to what the transducers see, without gap and noise.
+    """Map the state of the rotor to what the transducers see of its vibration.
 
     Returns
     -------
-    (n_channels, n_states) in each channel's engineering unit. The transducers' own frequency
-    response is flat.
+    (n_channels, n_states) in each channel's engineering unit; the transducers' own frequency
+    response comes later.
 
     Raises
     ------
@@ -40,34 +39,6 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
             )
         rows.append(channel.direction * maps[part, channel.measurand][row])
     return np.stack(rows)
-
-
-def standing_gap_um(machine: Unit, now: Conditions) -> FloatArray:
-    """Mean reading of every channel, (n_channels,): the gap of the probes, zero elsewhere."""
-    centred_um, centre_um = {}, {}
-    for index, bearing in enumerate(machine.bearings):
-        for axis, probe in enumerate((bearing.shaft_x, bearing.shaft_y)):
-            centred_um[probe] = bearing.gap_reference_um[axis]
-            centre_um[probe] = now.centre_um[index, axis]
-    return np.array(
-        [
-            centred_um[c.id] + c.direction * centre_um[c.id]
-            if c.measurand is Measurand.GAP_UM
-            else 0.0
-            for c in machine.channels
-        ]
-    )
-
-
-def noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
-    """White noise of each channel in its engineering unit, (n_channels,)."""
-    by_measurand = {
-        Measurand.GAP_UM: noise.gap_um_rms,
-        Measurand.DISPLACEMENT_UM: noise.displacement_um_rms,
-        Measurand.VELOCITY_MM_S: noise.velocity_mm_s_rms,
-        Measurand.ACCELERATION_M_S2: noise.acceleration_m_s2_rms,
-    }
-    return np.array([by_measurand[channel.measurand] for channel in machine.channels])
 
 
 def _motion_maps(
@@ -96,8 +67,9 @@ def _places(machine: Unit, parameters: RotorParameters) -> dict[str, tuple[str, 
         if bearing.id not in names:
             raise ConfigError(f"a simulated unit has bearings {', '.join(names)}: {bearing.id!r}")
         row = 2 * names.index(bearing.id)
-        places[bearing.shaft_x] = (SHAFT, row)
-        places[bearing.shaft_y] = (SHAFT, row + 1)
         places[bearing.bearing_x] = (BEARING, row)
         places[bearing.bearing_y] = (BEARING, row + 1)
+    for probe in probes(machine):
+        row = 2 * names.index(machine.bearings[probe.bearing].id)
+        places[probe.channel] = (SHAFT, row + probe.axis)
     return places

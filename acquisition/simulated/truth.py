@@ -21,6 +21,10 @@ class BearingTruth:
         ``|k + iΩc|`` at the running speed, which equation (5) of Brito et al. estimates.
     eccentricity
         Distance of the shaft centre from the bearing centre over the clearance.
+    gap_growth_um
+        What all gaps of the bearing have in common.
+    bracket_stiffness_n_per_m
+        Of the bracket as it is, not as the monitor is told.
     """
 
     film: Film
@@ -30,6 +34,8 @@ class BearingTruth:
     centre_y_um: float
     eccentricity: float
     oil_temperature_c: float
+    gap_growth_um: float
+    bracket_stiffness_n_per_m: float
 
 
 @dataclass(frozen=True)
@@ -41,12 +47,13 @@ class UnitTruth:
     bearings: Mapping[str, BearingTruth]
 
 
-def unit_truth(machine: Unit, scenario: Scenario, now: Conditions) -> UnitTruth:
+def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
     """Gather what is so at one instant."""
+    brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
     bearings = {}
     for index, bearing in enumerate(machine.bearings):
         film = scenario.bearings[bearing.id].film
-        k_eff = film.effective_stiffness_n_per_m(rad_s_from_rpm(now.speed_rpm))
+        k_eff = film.effective_stiffness_n_per_m(rad_s_from_rpm(speed_rpm))
         centre_x_um, centre_y_um = (float(c) for c in now.centre_um[index])
         bearings[bearing.id] = BearingTruth(
             film=film,
@@ -56,5 +63,7 @@ def unit_truth(machine: Unit, scenario: Scenario, now: Conditions) -> UnitTruth:
             centre_y_um=centre_y_um,
             eccentricity=math.hypot(centre_x_um, centre_y_um) / bearing.clearance_um,
             oil_temperature_c=float(now.oil_temperature_c[index]),
+            gap_growth_um=float(now.gap_growth_um[index]),
+            bracket_stiffness_n_per_m=brackets[bearing.id],
         )
-    return UnitTruth(now.speed_rpm, now.active_power_mw, bearings)
+    return UnitTruth(speed_rpm, now.active_power_mw, bearings)

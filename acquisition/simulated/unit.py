@@ -7,10 +7,12 @@ import numpy as np
 from acquisition.calibration import UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
-from acquisition.simulated.conditions import Conditions, between, slow_values
+from acquisition.simulated.conditions import Conditions, between
 from acquisition.simulated.converter import to_counts
+from acquisition.simulated.faults import FaultInjector
 from acquisition.simulated.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.scenario import Scenario
+from acquisition.simulated.slow_values import slow_values
 from acquisition.simulated.truth import UnitTruth, unit_truth
 from core.machine import Unit
 from core.units import NS_PER_S
@@ -48,6 +50,8 @@ class SimulatedUnit:
         self._scenario = scenario
         self._start_ns = start_ns
         self._plant = SimulatedPlant(machine, scenario, seed)
+        self._faults = _faults(machine, scenario, seed)
+        self._exchanged = _exchanged(machine, calibration, scenario)
         self._index = 0
         self._next_chunk()
 
@@ -83,18 +87,25 @@ class SimulatedUnit:
 
     def truth(self) -> UnitTruth:
         """Tell what is really so at the next sample."""
-        return unit_truth(self._machine, self._scenario, self._conditions())
+        return unit_truth(self._machine, self._scenario, self._conditions(), self._speed_rpm())
 
     def _next_chunk(self) -> None:
         self._chunk = self._plant.advance()
         self._counts = to_counts(self._chunk.readings, self._calibration)
+        self._faults.spoil(self._counts, self._index)
+        for rows in self._exchanged:
+            self._counts[rows] = self._counts[rows[::-1]]
+
+    def _speed_rpm(self) -> float:
+        offset = self._index % CHUNK_SAMPLES
+        return self._scenario.speed_rpm * self._plant.relative_speed(self._chunk, offset)
 
     def _conditions(self) -> Conditions:
         fraction = self._index % CHUNK_SAMPLES / CHUNK_SAMPLES
         return between(self._chunk.start, self._chunk.stop, fraction)
 
     def _slow(self) -> tuple[float, ...]:
-        values = slow_values(self._machine, self._conditions())
+        values = slow_values(self._machine, self._conditions(), self._speed_rpm())
         return tuple(values.get(channel.id, math.nan) for channel in self._calibration.slow)
 
 
@@ -109,3 +120,25 @@ def _check(machine: Unit, calibration: UnitCalibration) -> None:
             f"unit {machine.id!r} samples at {machine.rate_hz} Hz,"
             f" its calibration says {calibration.rate_hz} Hz"
         )
+
+
+def _faults(machine: Unit, scenario: Scenario, seed: int) -> FaultInjector:
+    rows = {channel.id: row for row, channel in enumerate(machine.channels)}
+    return FaultInjector(
+        np.random.default_rng(seed),
+        {rows[id_]: channel.faults for id_, channel in scenario.channels.items()},
+    )
+
+
+def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) -> list[list[int]]:
+    """Pairs of rows whose cables are swapped."""
+    rows = {channel.id: row for row, channel in enumerate(machine.channels)}
+    pairs = []
+    for pair in scenario.exchanged:
+        if not rows.keys() >= set(pair):
+            raise ConfigError(f"unit {machine.id!r} has no channels {pair} to be exchanged")
+        first, second = (calibration.channels[rows[id_]].full_scale_v for id_ in pair)
+        if first != second:
+            raise ConfigError(f"channels {pair} cannot be exchanged: {first} V and {second} V")
+        pairs.append([rows[id_] for id_ in pair])
+    return pairs

@@ -10,11 +10,17 @@ from acquisition.simulated.excitation import (
     RopeForce,
     UnbalanceForce,
 )
+from acquisition.simulated.rotation import Rotation
 
 RATE_HZ = 600.0
 
+
+def rotation(turn_hz: float, speed_wander: float = 0.0) -> Rotation:
+    return Rotation(np.random.default_rng(7), turn_hz, RATE_HZ, speed_wander)
+
+
 STREAMS: dict[str, Callable[[], Excitation]] = {
-    "unbalance": lambda: UnbalanceForce(1.0, 1.538, RATE_HZ),
+    "unbalance": lambda: UnbalanceForce(1.0, rotation(1.538, 0.003)),
     "rope": lambda: RopeForce(np.random.default_rng(1), 1.0, 0.385, 0.01, RATE_HZ),
     "white": lambda: HydraulicForce(np.random.default_rng(2), 1.0, None, RATE_HZ),
     "band": lambda: HydraulicForce(np.random.default_rng(3), 1.0, 20.0, RATE_HZ),
@@ -31,11 +37,19 @@ def test_a_force_joins_from_piece_to_piece_without_a_seam(name: str) -> None:
 
 
 def test_unbalance_turns_forward_once_per_revolution_with_constant_force() -> None:
-    x, y = UnbalanceForce(75.6e3, 1.5, RATE_HZ).advance(800)
+    x, y = UnbalanceForce(75.6e3, rotation(1.5)).advance(800)
     angle = np.unwrap(np.arctan2(y, x))
 
     assert np.hypot(x, y) == pytest.approx(75.6e3)
     assert angle == pytest.approx(2 * np.pi * 1.5 / RATE_HZ * np.arange(800))
+
+
+def test_unbalance_grows_with_the_square_of_the_speed() -> None:
+    wandering = rotation(1.5, 0.01)
+    force = np.hypot(*UnbalanceForce(75.6e3, wandering).advance(60_000))
+
+    assert force == pytest.approx(75.6e3 * wandering.relative_speed(np.arange(60_000.0)) ** 2)
+    assert np.ptp(force) > 500.0
 
 
 @pytest.mark.parametrize("cutoff_hz", [None, 20.0, 5.0])

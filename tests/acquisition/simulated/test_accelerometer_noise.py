@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+import scipy.signal
+
+from acquisition.simulated.accelerometer_noise import AccelerometerNoise
+from core.arrays import FloatArray
+
+RATE_HZ = 600.0
+DENSITY_G = 5e-6
+CORNER_HZ = 2.0
+
+
+def noise(seed: int = 1) -> AccelerometerNoise:
+    random = np.random.default_rng(seed)
+    return AccelerometerNoise(random, (False, True), DENSITY_G, CORNER_HZ, RATE_HZ)
+
+
+def density(samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return scipy.signal.welch(samples, RATE_HZ, nperseg=1 << 14)
+
+
+def test_the_noise_has_the_density_of_its_data_sheet_and_rises_below_its_corner() -> None:
+    frequency_hz, power = density(noise().advance(3_000_000)[0])
+    expected = (DENSITY_G * 9.80665) ** 2 * (1 + CORNER_HZ / frequency_hz.clip(0.01))
+
+    # 365 independent segments: 5 % a line, bands of 8 lines and more 2 % and less.
+    for low_hz, high_hz in ((0.4, 0.8), (0.8, 2.0), (2.0, 6.0), (6.0, 25.0), (25.0, 250.0)):
+        band = (frequency_hz >= low_hz) & (frequency_hz < high_hz)
+        assert power[band].sum() == pytest.approx(expected[band].sum(), rel=0.05)
+
+
+def test_a_velocity_channel_carries_the_integral_of_such_noise() -> None:
+    frequency_hz, power = density(noise().advance(3_000_000)[1])
+    per_second = 1e3 / (2 * np.pi * frequency_hz.clip(0.01))
+    expected = (DENSITY_G * 9.80665 * per_second) ** 2 * (1 + CORNER_HZ / frequency_hz.clip(0.01))
+
+    # The floor at 0.1 Hz takes 0.4 % at 0.4 Hz, the window's leakage of the steep slope adds some.
+    for low_hz, high_hz in ((0.4, 0.8), (0.8, 2.0), (2.0, 6.0), (6.0, 25.0)):
+        band = (frequency_hz >= low_hz) & (frequency_hz < high_hz)
+        assert power[band].sum() == pytest.approx(expected[band].sum(), rel=0.06)
+
+
+def test_integrated_noise_does_not_run_away() -> None:
+    stream = noise(2)
+    early, late = stream.advance(600_000)[1], np.hstack([stream.advance(600_000)] * 9)[1]
+
+    assert np.abs(late).max() < 2.0 * np.abs(early).max()
+    assert abs(late.mean()) < 0.05 * late.std()
+
+
+def test_noise_joins_from_chunk_to_chunk_without_a_step() -> None:
+    stream = noise(3)
+    velocity = np.concatenate([stream.advance(2048)[1] for _ in range(50)])
+    steps = np.abs(np.diff(velocity))
+
+    assert steps[2047::2048].max() < steps.max() + 1e-12
+    assert steps[2047::2048].mean() == pytest.approx(steps.mean(), rel=0.5)
+
+
+def test_no_two_channels_share_their_noise() -> None:
+    two = AccelerometerNoise(np.random.default_rng(4), (False, False), 1.0, 2.0, RATE_HZ)
+
+    first, second = two.advance(600_000)
+    assert abs(np.mean(first * second)) < 0.05 * first.std() * second.std()

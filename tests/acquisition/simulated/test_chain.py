@@ -1,0 +1,199 @@
+"""What the transducers of a simulated unit make of the machine, beyond its motion."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.simulated.faults import Fault, FaultKind
+from acquisition.simulated.plant import SimulatedPlant
+from acquisition.simulated.scenario import ChannelScenario, Scenario, TransducerNoise
+from acquisition.simulated.unit import SimulatedUnit
+from core.arrays import FloatArray
+from core.machine import Channel, Measurand, Unit
+from core.transducer_response import HighPass, Resonance
+
+BuildUnit = Callable[..., SimulatedUnit]
+UJB = 0
+TURN = 400
+"""Samples of one turn at 90 r/min."""
+
+
+def readings(machine: Unit, scenario: Scenario, n_chunks: int = 1) -> FloatArray:
+    plant = SimulatedPlant(machine, replace(scenario, speed_rpm=90.0), seed=7)
+    return np.concatenate([plant.advance().readings for _ in range(n_chunks)], axis=1)
+
+
+def line(signal: FloatArray, order: int = 1) -> complex:
+    turns = np.arange(TURN * (signal.size // TURN)) / TURN
+    return complex(2.0 * np.mean(signal[: turns.size] * np.exp(-2j * np.pi * order * turns)))
+
+
+def with_bearing(scenario: Scenario, **changes: object) -> Scenario:
+    changed = replace(scenario.bearings["UJB"], **changes)  # type: ignore[arg-type]
+    return replace(scenario, bearings={**scenario.bearings, "UJB": changed})
+
+
+@pytest.fixture
+def four_probes(machine: Unit) -> Unit:
+    """UJB with probes across from its own, as channels 12 and 13."""
+    opposite = tuple(Channel(f"UJB_{axis}_far", Measurand.GAP_UM, 1) for axis in "xy")
+    bearing = replace(
+        machine.bearings[UJB],
+        opposite_x="UJB_x_far",
+        opposite_y="UJB_y_far",
+        opposite_gap_x="UJB_gap_x_far",
+        opposite_reference_um=(1900.0, 1950.0),
+    )
+    return replace(
+        machine,
+        channels=machine.channels + opposite,
+        bearings=(bearing, *machine.bearings[1:]),
+    )
+
+
+def test_an_accelerometer_s_corner_takes_from_its_signal_what_it_should(
+    machine: Unit, quiet: Scenario
+) -> None:
+    corner = HighPass(0.5, order=2)
+    weak = replace(quiet, channels={"UJB_vx": ChannelScenario(response=corner)})
+
+    found = line(readings(machine, weak, 4)[2]) / line(readings(machine, quiet, 4)[2])
+
+    assert abs(found / corner.at(np.array([1.5]))[0] - 1.0) < 1e-3
+
+
+def test_a_probe_s_own_resonance_leaves_its_gap_alone(machine: Unit, quiet: Scenario) -> None:
+    soft = replace(quiet, channels={"UJB_ux": ChannelScenario(response=Resonance(60.0, 0.05))})
+
+    difference = readings(machine, soft)[0] - readings(machine, quiet)[0]
+
+    assert abs(difference[: 5 * TURN].mean()) < 0.05
+    assert np.abs(difference).max() < 0.2
+
+
+def test_runout_passes_each_probe_in_turn_and_shakes_no_bearing(
+    four_probes: Unit, quiet: Scenario
+) -> None:
+    rough = with_bearing(quiet, runout_um_pk=(10.0, 4.0j))
+
+    runout = readings(four_probes, rough) - readings(four_probes, quiet)
+
+    x, y, far_x, far_y = (runout[row, : 5 * TURN] for row in (0, 1, 12, 13))
+    assert [abs(line(x)), abs(line(x, 2))] == pytest.approx([10.0, 4.0])
+    # the surface needs a quarter turn from x to y, and half a turn to the far side
+    assert y[100:] == pytest.approx(x[:-100])
+    assert far_x[200:] == pytest.approx(x[:-200])
+    assert far_y[200:] == pytest.approx(y[:-200])
+    assert np.abs(runout[2:12]).max() == 0.0
+
+
+def test_a_gain_error_leaves_the_reference_gap_as_it_is(machine: Unit, quiet: Scenario) -> None:
+    wrong = {"UJB_ux": ChannelScenario(gain=1.05), "UJB_vy": ChannelScenario(gain=0.97)}
+
+    right = readings(machine, quiet)
+    found = readings(machine, replace(quiet, channels=wrong))
+
+    assert found[0] - 2000.0 == pytest.approx(1.05 * (right[0] - 2000.0))
+    assert found[3] == pytest.approx(0.97 * right[3])
+    assert np.array_equal(found[1], right[1])
+
+
+def test_a_softer_bracket_than_the_monitor_is_told_moves_more(
+    machine: Unit, quiet: Scenario, build_unit: BuildUnit
+) -> None:
+    soft = with_bearing(quiet, bracket_stiffness_factor=0.9)
+
+    right, found = readings(machine, quiet), readings(machine, soft)
+    # equation (5) with the nominal stiffness; the bracket's inertia moves it by another 0.05 %
+    nominal = abs(line(right[2]) / line(right[0]))
+
+    assert abs(line(found[2]) / line(found[0])) / nominal == pytest.approx(1 / 0.9, rel=1e-3)
+    assert build_unit(soft).truth().bearings["UJB"].bracket_stiffness_n_per_m == 0.9 * 1.18e9
+    assert machine.bearings[UJB].bracket_stiffness_n_per_m == 1.18e9
+
+
+def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_against_each_other(
+    four_probes: Unit, quiet: Scenario
+) -> None:
+    grown = with_bearing(quiet, gap_growth_um=70.0)
+
+    mean = readings(four_probes, grown)[:, : 5 * TURN].mean(axis=1)
+
+    # the shaft stands at (60, -80) µm
+    assert mean[[0, 1]] == pytest.approx([2000.0 - 60.0 + 70.0, 2100.0 + 80.0 + 70.0], abs=0.01)
+    assert mean[[12, 13]] == pytest.approx([1900.0 + 60.0 + 70.0, 1950.0 - 80.0 + 70.0], abs=0.01)
+
+
+def test_the_growth_of_the_gaps_wanders_and_moves_nothing_else(
+    build_unit: BuildUnit, full_load: Scenario
+) -> None:
+    wandering = with_bearing(full_load, gap_growth_wander_um_rms=20.0)
+    one, other = build_unit(wandering), build_unit(full_load)
+    one.advance(600_000)
+    other.advance(600_000)
+
+    assert abs(one.truth().bearings["UJB"].gap_growth_um) > 1.0
+    assert one.truth().bearings["UJB"].centre_x_um == other.truth().bearings["UJB"].centre_x_um
+
+
+def test_the_speed_channel_follows_a_wandering_speed_exactly(
+    build_unit: BuildUnit, quiet: Scenario
+) -> None:
+    unit = build_unit(replace(quiet, speed_wander=0.003, wander_time_s=60.0))
+    blocks = [unit.advance(60) for _ in range(3000)]
+    speed_rpm = np.array([block.slow[0] for block in blocks])
+    shaft = np.concatenate([block.counts for block in blocks], axis=1)[0].astype(np.float64)
+
+    # what the waveform itself says: the angle of 1× advances by the integral of the speed
+    turns = np.concatenate([[0.0], np.cumsum((speed_rpm[1:] + speed_rpm[:-1]) / 2 / 60 * 0.1)])
+    spun = (shaft - shaft.mean()) * np.exp(
+        -2j * np.pi * np.interp(np.arange(shaft.size) / 60.0, np.arange(3000), turns)
+    )
+    carried = spun[: 390 * 450].reshape(-1, 3900).mean(axis=1)
+
+    assert 0.004 * 92.3 < np.ptp(speed_rpm) <= 0.006 * 92.3
+    assert np.ptp(np.unwrap(np.angle(carried))) < 0.01
+    assert unit.truth().speed_rpm == unit.advance(1).slow[0]
+
+
+def test_noise_of_an_accelerometer_passes_its_own_corner(machine: Unit, quiet: Scenario) -> None:
+    silent = replace(quiet, unbalance_grade_mm_s=0.0)
+    noisy = replace(
+        silent,
+        noise=TransducerNoise(accelerometer_g_per_sqrt_hz=5e-6),
+        channels={"UJB_vx": ChannelScenario(response=HighPass(2.0, order=2))},
+    )
+
+    rms = readings(machine, noisy, 60).std(axis=1)
+
+    # the 1/f noise below 2 Hz, integrated, is nearly all there is; probes have none of it
+    assert rms[2] < 0.2 * rms[3]
+    assert rms[0] < 1e-6
+
+
+def test_everything_at_once_does_not_depend_on_the_pieces_it_is_asked_for_in(
+    build_unit: BuildUnit, part_load: Scenario
+) -> None:
+    rough = with_bearing(
+        part_load, runout_um_pk=(10.0, 3.0), gap_growth_um=30.0, gap_growth_wander_um_rms=5.0
+    )
+    scenario = replace(
+        rough,
+        speed_wander=0.003,
+        noise=TransducerNoise(gap_um_rms=1.2, accelerometer_g_per_sqrt_hz=5e-6),
+        channels={
+            "UJB_vx": ChannelScenario(HighPass(0.5, order=2), 1.03),
+            "LJB_vy": ChannelScenario(HighPass(0.5), faults=(Fault(FaultKind.STUCK, 4000),)),
+        },
+        exchanged=(("TJB_ux", "TJB_uy"),),
+    )
+    pieces = (1, 7, 2041, 2047, 4096, 1000)
+    whole = build_unit(scenario).advance(sum(pieces))
+    unit = build_unit(scenario)
+
+    cut = np.concatenate([unit.advance(n).counts for n in pieces], axis=1)
+
+    assert np.array_equal(cut, whole.counts)
+    assert not np.array_equal(build_unit(scenario, 2).advance(5000).counts, cut[:, :5000])

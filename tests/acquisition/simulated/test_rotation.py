@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from acquisition.simulated.rotation import Rotation
+
+RATE_HZ = 600.0
+TURN_HZ = 92.3 / 60.0
+
+
+def wandering() -> Rotation:
+    return Rotation(np.random.default_rng(1), TURN_HZ, RATE_HZ, 0.003, 120.0)
+
+
+def test_the_shaft_turns_as_fast_as_its_speed_says() -> None:
+    index = np.arange(0.0, 300.0 * RATE_HZ)
+    rotation = wandering()
+
+    measured = np.gradient(rotation.turns(index)) * RATE_HZ / TURN_HZ
+
+    assert measured[1:-1] == pytest.approx(rotation.relative_speed(index)[1:-1], abs=1e-7)
+
+
+def test_the_speed_wanders_by_what_it_is_told_and_never_beyond() -> None:
+    relative = wandering().relative_speed(np.arange(0.0, 7200.0 * RATE_HZ, 600.0))
+
+    assert np.abs(relative - 1.0).max() <= 0.003
+    assert np.ptp(relative) > 0.004
+    assert relative.mean() == pytest.approx(1.0, abs=1e-4)
+
+
+def test_without_wander_the_turns_are_even() -> None:
+    even = Rotation(np.random.default_rng(1), TURN_HZ, RATE_HZ)
+    index = np.arange(10_000.0)
+
+    assert np.array_equal(even.turns(index), TURN_HZ / RATE_HZ * index)
+    assert np.array_equal(even.relative_speed(index), np.ones(10_000))
