@@ -1,0 +1,150 @@
+"""All estimators side by side on the demo plant: against the truth, and against each other."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from acquisition.calibration import calibrate
+from acquisition.simulated.unit import SimulatedUnit
+from core.assessment import Assessment
+from core.estimators import STIFFNESS_OF, Estimator
+from core.monitor import UnitMonitor
+from core.quality import Level, Reason, bad
+from core.quantities import BY_NAME
+from service.conversion import analysis_of, calibration_of, machine_of
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
+from service.wiring import scenario_of
+
+DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
+MINUTES = 6
+
+
+@pytest.fixture(scope="module")
+def plant() -> PlantFile:
+    return load_plant_file(DEMO)
+
+
+def watch(plant: PlantFile, unit: UnitSettings, minutes: float = MINUTES) -> list[Assessment]:
+    """The newest assessment of each bearing."""
+    machine, calibration = machine_of(unit), calibration_of(unit)
+    assert unit.simulation is not None
+    feed = SimulatedUnit(machine, calibration, scenario_of(unit.simulation), 11, 0)
+    monitor = UnitMonitor(machine, analysis_of(plant.analysis))
+    newest: list[Assessment] = []
+    for _ in range(int(minutes * 60)):
+        newest = monitor.ingest(calibrate(feed.advance(600), calibration)) or newest
+    return newest
+
+
+@pytest.fixture(scope="module")
+def part_load(plant: PlantFile) -> list[Assessment]:
+    return watch(plant, plant.unit[0])
+
+
+@pytest.fixture(scope="module")
+def full_load(plant: PlantFile) -> list[Assessment]:
+    return watch(plant, plant.unit[1])
+
+
+def test_every_film_coefficient_lies_in_its_interval(
+    plant: PlantFile, part_load: list[Assessment]
+) -> None:
+    """The simulated transducers and brackets are exact, so the random part alone must cover."""
+    assert plant.unit[0].simulation is not None
+    films = scenario_of(plant.unit[0].simulation).bearings
+    for assessment in part_load:
+        film = films[assessment.bearing].film
+        for name in ("k_xx", "k_xy", "k_yx", "k_yy", "c_xx", "c_xy", "c_yx", "c_yy"):
+            unit = "n_per_m" if name[0] == "k" else "n_s_per_m"
+            reading = assessment.readings[f"dynamic_{name}_{unit}"]
+            assert reading.quality.level is Level.GOOD
+            assert reading.value is not None
+            assert reading.u_random is not None
+            error = reading.value - getattr(film, f"{name}_{unit}")
+            assert abs(error) < 4.0 * reading.u_random, (assessment.bearing, name)
+            # and it is not only because the interval is wide
+            scale = film.k_xx_n_per_m if name[0] == "k" else film.c_xx_n_s_per_m
+            assert reading.u_random < 0.01 * scale
+
+
+def test_the_estimators_agree_within_their_uncertainty(part_load: list[Assessment]) -> None:
+    for assessment in part_load:
+        for axes in ("xx", "yy"):
+            found = {
+                estimator: assessment.readings[name.format(axes=axes)]
+                for estimator, name in STIFFNESS_OF.items()
+            }
+            low = max(r.interval_95[0] for r in found.values() if r.interval_95)
+            high = min(r.interval_95[1] for r in found.values() if r.interval_95)
+            assert low < high
+            assert all(reading.interval_95 for reading in found.values())
+
+
+def test_transfer_separates_damping_from_stiffness(
+    plant: PlantFile, part_load: list[Assessment]
+) -> None:
+    """Equation (5) reads |k + iωc| and leaves the bracket's inertia out; transfer reads k and c."""
+    assert plant.unit[0].simulation is not None
+    film = scenario_of(plant.unit[0].simulation).bearings["UJB"].film
+    upper = next(a for a in part_load if a.bearing == "UJB").readings
+    assert upper["order1_transfer_k_xx_n_per_m"].value == pytest.approx(film.k_xx_n_per_m, rel=5e-3)
+    c = upper["order1_transfer_c_xx_n_s_per_m"]
+    assert c.value == pytest.approx(film.c_xx_n_s_per_m, rel=0.02)
+    assert upper["order1_k_eff_xx_n_per_m"].value == pytest.approx(
+        1.0073 * 1.0036 * film.k_xx_n_per_m, rel=5e-3
+    )
+
+
+def test_stiffness_is_the_preferred_estimate_and_names_its_estimator(
+    part_load: list[Assessment],
+) -> None:
+    for assessment in part_load:
+        assert assessment.estimators == {"xx": Estimator.DYNAMIC, "yy": Estimator.DYNAMIC}
+        for axes in ("xx", "yy"):
+            preferred = assessment.readings[f"stiffness_{axes}_n_per_m"]
+            assert preferred == assessment.readings[f"dynamic_k_{axes}_n_per_m"]
+
+
+def test_without_a_vortex_only_that_line_is_silent(full_load: list[Assessment]) -> None:
+    silent = bad(Reason.INSUFFICIENT_EXCITATION)
+    for assessment in full_load:
+        for name in ("vortex_k_eff_xx_n_per_m", "vortex_transfer_k_yy_n_per_m"):
+            assert assessment.readings[name].quality == silent
+        assert assessment.readings["dynamic_k_xx_n_per_m"].value is not None
+
+
+def test_a_kaplan_unit_has_no_vortex_order(plant: PlantFile) -> None:
+    kaplan = plant.unit[0].model_copy(update={"turbine": "kaplan"})
+    for assessment in watch(plant, kaplan, minutes=1):
+        for name, reading in assessment.readings.items():
+            if name.startswith("vortex_") and name != "vortex_frequency_hz":
+                assert reading.quality == bad(Reason.SWITCHED_OFF), name
+
+
+def test_a_budget_adds_up_to_the_uncertainty_that_is_stated(part_load: list[Assessment]) -> None:
+    assessment = part_load[0]
+    assert set(assessment.budgets) == {
+        name
+        for name, quantity in BY_NAME.items()
+        if quantity.has_uncertainty and not name.startswith("stiffness_")
+    }
+    for name, budget in assessment.budgets.items():
+        reading = assessment.readings[name]
+        assert reading.value == budget.value
+        contributions = [line.contribution for line in budget.lines]
+        assert math.hypot(*contributions) == pytest.approx(
+            math.hypot(reading.u_random or 0.0, reading.u_systematic or 0.0)
+        )
+
+
+def test_a_wrong_bracket_mass_shows_as_lack_of_fit(plant: PlantFile) -> None:
+    """Without the bracket's inertia a film seems to stiffen with frequency: said, not hidden."""
+    bearings = tuple(b.model_copy(update={"bracket_mass_kg": 0.0}) for b in plant.unit[0].bearing)
+    massless = plant.unit[0].model_copy(update={"bearing": bearings})
+    for assessment in watch(plant, massless):
+        reading = assessment.readings["dynamic_k_xx_n_per_m"]
+        assert reading.quality.reason is Reason.POOR_FIT
+        assert assessment.estimators["xx"] is not Estimator.DYNAMIC
