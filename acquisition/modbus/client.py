@@ -76,6 +76,17 @@ def foreign_errors_renamed(where: str) -> Iterator[None]:
         raise FrameError(f"{where}: {exc}") from exc
 
 
+def _let_stop_through() -> None:
+    """End a task that was told to stop while pymodbus waited.
+
+    Its `asyncio.wait_for` loses the cancellation, before Python 3.12, if the reply arrives at the
+    same moment (CPython issue 86296); the task would then go on reading for ever.
+    """
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
+
+
 class RegisterLink:
     """An open connection: one request at a time, each reply checked against its request.
 
@@ -86,7 +97,7 @@ class RegisterLink:
         self._settings = settings
         self._where = f"{settings.host}:{settings.port}"
         self._framer = ReadOnlyFramer()
-        self._refusal: OSError | None = None
+        self._refusal: str | None = None
         self._client = AsyncModbusTcpClient(
             settings.host,
             port=settings.port,
@@ -113,6 +124,7 @@ class RegisterLink:
                 connected = await self._client.connect()
             except ValueError as exc:  # a host name that no resolver can even be asked for
                 raise ConfigError(f"{self._where}: {exc}") from exc
+            _let_stop_through()
             if not connected:
                 limit = f"no connection within {self._settings.timeout_s} s"
                 raise LinkError(f"{self._where}: {self._refusal or limit}")
@@ -159,6 +171,8 @@ class RegisterLink:
             dev_id=self._settings.device_id, address=address, count=count
         )
         reply: RegisterReply = await self._client.execute(False, request)
+        _let_stop_through()
+        _cancel_if_asked()
         if reply.fault:
             raise FrameError(f"{self._where}: {reply.fault}")
         if reply.refusal is not None:
@@ -170,7 +184,7 @@ class RegisterLink:
         try:
             return await self._create_connection()
         except OSError as exc:
-            self._refusal = exc
+            self._refusal = exc.strerror or str(exc)
             raise
 
     def _connection_changed(self, connected: bool) -> None:
@@ -186,3 +200,13 @@ class RegisterLink:
             f"{self._where}: device answers exception {code} ({names.get(code, 'unknown')})"
             f" to a read of {count} registers at {address}"
         )
+
+
+def _cancel_if_asked() -> None:
+    """Raise a cancellation that came together with a reply.
+
+    pymodbus waits with `asyncio.wait_for`, which on Python 3.11 drops it then.
+    """
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
