@@ -25,6 +25,3 @@ MAX_MANIFEST_BYTES = 1_000_000
 
 FOOTER_BYTES_PER_COLUMN = 512
 """Of a Parquet footer, for each column of each row group; a fourth of it is really needed."""
-
-MAX_CHUNK_BYTES = 8_000_000
-"""Of one column of one row group, uncompressed."""

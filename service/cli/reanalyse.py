@@ -49,7 +49,7 @@ def reanalyse(
     window: Annotated[
         WindowChoice | None,
         typer.Option(
-            help="The last full average of each bearing, or all results [default: last, --json all]",
+            help="The last full average of each bearing, or every result [last; --json: all]",
             show_default=False,
         ),
     ] = None,

@@ -43,7 +43,7 @@ def record(
     settings = one_unit(read_plant_file(plant_file), unit, plant_file)
     try:
         writer = recording_writer(settings, out, _made_by())
-        problem = uvloop.run(_record(source_of(settings, SystemClock()), writer, seconds))
+        problem = uvloop.run(record_blocks(source_of(settings, SystemClock()), writer, seconds))
         manifest = recording_of(out).manifest
     except AcquisitionError as error:
         fail(f"padwatch record: {error}")
@@ -59,8 +59,20 @@ def record(
         fail(f"padwatch record: ended early: {problem}")
 
 
-async def _record(source: SampleSource, writer: RecordingWriter, seconds: float) -> str | None:
-    """Record until enough has passed, someone ends it, or the link is lost; say why it was."""
+async def record_blocks(
+    source: SampleSource, writer: RecordingWriter, seconds: float
+) -> str | None:
+    """Record until enough has passed, SIGINT or SIGTERM comes, or the link is lost.
+
+    Returns
+    -------
+    Why the link was lost, if it was.
+
+    Raises
+    ------
+    AcquisitionError
+        If nothing at all could be recorded; then nothing is left behind.
+    """
     with writer:
         reading = asyncio.create_task(_read(source, writer, seconds))
         loop = asyncio.get_running_loop()

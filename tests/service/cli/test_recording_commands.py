@@ -1,0 +1,233 @@
+"""`padwatch record` and `padwatch reanalyse` as processes."""
+
+import asyncio
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import aclosing, asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from acquisition.calibration import calibrate
+from acquisition.clock import SystemClock
+from acquisition.errors import LinkError
+from core.blocks import SampleBlock
+from core.monitor import UnitMonitor
+from service.cli.record import record_blocks
+from service.conversion import analysis_of, calibration_of, machine_of
+from service.reanalysis import assessment_model, assessments
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
+from service.wiring import recording_of, recording_source, recording_writer, selection_of
+from service.wiring import simulated_feed as feed_of
+
+COMMAND = [sys.executable, "-m", "service.cli.main"]
+ENVIRONMENT = {"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}
+
+SMALL = "[analysis]\nsegment_samples = 4096\nn_segments = 4\n\n[service]"
+
+
+def padwatch(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [*COMMAND, *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, env=ENVIRONMENT, timeout=60, check=False
+    )
+
+
+@pytest.fixture
+def plant_path(plant_text: str, tmp_path: Path) -> Path:
+    """The demonstration plant, simulated in this process, with short segments."""
+    wire = 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = 0'
+    assert wire in plant_text
+    path = tmp_path / "plant.toml"
+    simulated = plant_text.replace(wire, 'kind = "simulated"').replace("[service]", SMALL)
+    path.write_text(simulated, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def plant(plant_path: Path) -> PlantFile:
+    return load_plant_file(plant_path)
+
+
+@pytest.fixture
+def recording(plant: PlantFile, tmp_path: Path) -> Path:
+    """Half a minute of unit U1: five segments of its analysis."""
+    feed = feed_of(plant.unit[0], SystemClock())
+    with recording_writer(plant.unit[0], tmp_path / "run", "a test") as writer:
+        for _ in range(310):
+            writer.write(feed.advance(60))
+    return tmp_path / "run"
+
+
+def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    result = padwatch("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout == f"{out}: 0.5 s of unit U2, 12 channels, 0.0 MB\n"
+    manifest = recording_of(out).manifest
+    assert (manifest.unit, manifest.n_samples, manifest.n_blocks) == ("U2", 300, 5)
+    assert manifest.made_by.startswith("padwatch 0")
+
+    again = padwatch("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
+    assert (again.returncode, again.stdout) == (1, "")
+    assert again.stderr == (
+        f"padwatch record: {out}: is there already; a recording is never overwritten\n"
+    )
+
+
+class Interrupted:
+    """A simulated unit; after three blocks something happens, and no more come."""
+
+    def __init__(self, unit: UnitSettings, event: Callable[[], None]) -> None:
+        self._feed, self._calibration = feed_of(unit, SystemClock()), calibration_of(unit)
+        self._event = event
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        async with aclosing(self._blocks()) as blocks:
+            yield blocks
+
+    async def _blocks(self) -> AsyncGenerator[SampleBlock]:
+        for _ in range(3):
+            yield calibrate(self._feed.advance(60), self._calibration)
+        self._event()
+        await asyncio.Event().wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+async def test_ending_a_recording_early_keeps_it(
+    plant: PlantFile, tmp_path: Path, number: signal.Signals
+) -> None:
+    unit = plant.unit[0]
+    source = Interrupted(unit, lambda: signal.raise_signal(number))
+    writer = recording_writer(unit, tmp_path / "run", "a test")
+    assert await record_blocks(source, writer, seconds=600.0) is None
+    assert recording_of(tmp_path / "run").manifest.n_samples == 180
+
+
+async def test_a_lost_link_ends_a_recording_and_keeps_it(plant: PlantFile, tmp_path: Path) -> None:
+    def lose() -> None:
+        raise LinkError("cable cut")
+
+    unit = plant.unit[0]
+    writer = recording_writer(unit, tmp_path / "run", "a test")
+    assert await record_blocks(Interrupted(unit, lose), writer, seconds=600.0) == "cable cut"
+    assert recording_of(tmp_path / "run").manifest.n_samples == 180
+
+
+def test_no_source_leaves_no_recording(plant_path: Path, tmp_path: Path) -> None:
+    text = plant_path.read_text().replace(
+        'kind = "simulated"', 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = 1'
+    )
+    plant_path.write_text(text)
+    result = padwatch("record", plant_path, "--unit", "U1", "--out", tmp_path / "run")
+    assert result.returncode == 1
+    assert result.stderr.startswith("padwatch record: 127.0.0.1:1: ")
+    assert result.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plant.toml"]
+
+
+def test_a_unit_has_to_be_chosen_and_to_exist(plant_path: Path, tmp_path: Path) -> None:
+    result = padwatch("record", plant_path, "--out", tmp_path / "run")
+    assert (result.returncode, result.stderr) == (
+        2,
+        f"{plant_path}: has units U1, U2; choose one with --unit\n",
+    )
+    result = padwatch("record", plant_path, "--unit", "U3", "--out", tmp_path / "run")
+    assert (result.returncode, result.stderr) == (
+        2,
+        f"{plant_path}: has no unit U3, it has U1, U2\n",
+    )
+
+
+async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_digit(
+    plant: PlantFile, plant_path: Path, recording: Path
+) -> None:
+    result = padwatch("reanalyse", recording, "--plant", plant_path, "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+
+    opened, unit = recording_of(recording), plant.unit[0]
+    source = recording_source(opened, selection_of(opened, unit), None, SystemClock())
+    monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
+    expected = [
+        assessment_model(found).model_dump(mode="json")
+        async for found in assessments(source, monitor, lambda _: None)
+    ]
+    assert len(expected) == 3 * 5
+    assert json.loads(result.stdout) == expected
+
+    last = padwatch("reanalyse", recording, "--plant", plant_path, "--json", "--window", "last")
+    assert json.loads(last.stdout) == expected[-3:]
+
+
+def test_people_get_a_table_for_each_bearing(plant_path: Path, recording: Path) -> None:
+    result = padwatch("reanalyse", recording, "--plant", plant_path)
+    assert (result.returncode, result.stderr) == (0, "")
+    for bearing in ("UJB", "LJB", "TJB"):
+        assert f"\nU1 {bearing}, " in result.stdout
+    assert result.stdout.count("4 of 4 segments") == 3
+    assert "N/m" in result.stdout
+
+
+def test_another_calibration_is_told_and_used_only_when_asked_for(
+    plant_path: Path, recording: Path
+) -> None:
+    text = plant_path.read_text()
+    plant_path.write_text(text.replace("sensitivity = 4.0", "sensitivity = 3.9", 1))
+
+    def shaft_x(*options: str) -> tuple[float, str]:
+        result = padwatch("reanalyse", recording, "--plant", plant_path, "--json", *options)
+        readings = json.loads(result.stdout)[0]["readings"]
+        return readings["order1_shaft_x_um_pk"]["value"], result.stderr
+
+    before, told = shaft_x()
+    after, told_again = shaft_x("--calibration", "plant")
+    assert after / before == pytest.approx(4.0 / 3.9, rel=1e-6)
+    words = "channel ujb_shaft_x: unit_per_v was 250 when recorded, is 256.410256 now; used is the"
+    assert told == f"{recording}: {words} recorded one\n"
+    assert told_again == f"{recording}: {words} plant one\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("rate_hz = 600.0", "rate_hz = 500.0", "600 Hz, unit U1 is configured for 500 Hz"),
+        ("ljb_shaft_y", "ljb_shaft_z", "unit U1 needs channel ljb_shaft_z, the recording has ujb_"),
+        (
+            'transducer = "proximity_probe"',
+            'transducer = "displacement"',
+            "channel ujb_shaft_x is recorded as gap_um, unit U1 is configured for displacement_um",
+        ),
+    ],
+)
+def test_a_recording_of_something_else_is_refused_naming_both(
+    plant_path: Path, recording: Path, old: str, new: str, words: str
+) -> None:
+    text = plant_path.read_text()
+    plant_path.write_text(text.replace(old, new))
+    result = padwatch("reanalyse", recording, "--plant", plant_path)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_damaged_recording_is_one_line_and_exit_1(plant_path: Path, recording: Path) -> None:
+    (recording / "samples.parquet").write_bytes(b"PAR1")
+    result = padwatch("reanalyse", recording, "--plant", plant_path)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr.startswith(f"padwatch reanalyse: {recording}/samples.parquet: 4 bytes, ")
+
+
+def test_a_recording_too_short_for_a_segment_says_so(
+    plant: PlantFile, plant_path: Path, tmp_path: Path
+) -> None:
+    with recording_writer(plant.unit[0], tmp_path / "short", "a test") as writer:
+        writer.write(feed_of(plant.unit[0], SystemClock()).advance(4095))
+    result = padwatch("reanalyse", tmp_path / "short", "--plant", plant_path)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "no segment of 4096 samples without a gap" in result.stderr

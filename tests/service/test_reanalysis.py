@@ -1,0 +1,149 @@
+"""A recording analysed gives what was seen live, to the last bit."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.calibration import calibrate
+from acquisition.raw import RawBlock
+from core.assessment import Assessment
+from core.blocks import Rejection
+from core.monitor import UnitMonitor
+from core.settings import AnalysisSettings
+from service.conversion import calibration_of, machine_of
+from service.reanalysis import (
+    LastAverages,
+    assessment_model,
+    assessments,
+    calibration_differences,
+)
+from service.settings.loading import load_plant_file
+from service.settings.units import UnitSettings
+from service.wiring import (
+    recording_of,
+    recording_source,
+    recording_writer,
+    selection_of,
+    simulated_feed,
+)
+
+ANALYSIS = AnalysisSettings(segment_samples=1024, n_segments=4)
+
+
+@pytest.fixture
+def unit(deploy: Path) -> UnitSettings:
+    return load_plant_file(deploy / "demo.toml").unit[0]
+
+
+def rough_ride(unit: UnitSettings, clock) -> Iterator[RawBlock]:
+    """A simulated unit with everything that may happen to its samples on the way."""
+    feed = simulated_feed(unit, clock)
+    for number in range(150):
+        raw = feed.advance(60 if number % 7 else 61)
+        if number == 20:
+            raw.counts[3, 5] = -32768
+        if 30 <= number < 34:
+            raw = replace(raw, ok=(False, *raw.ok[1:]))
+        if 40 <= number < 65:
+            raw = replace(raw, slow=(1e6, math.nan, 1e6, *raw.slow[3:]))
+        if number in (70, 71):
+            continue
+        if number == 72:
+            raw = replace(raw, rejected=(Rejection("torn", 60),))
+        if number >= 110:
+            raw = replace(raw, epoch=raw.epoch + 1, first_index=raw.first_index - 6000)
+        yield raw
+
+
+def bits(value: object) -> object:
+    """A value in a form that is equal only to the same bits."""
+    if dataclasses.is_dataclass(value):
+        return {name: bits(part) for name, part in vars(value).items()}
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, dict):
+        return {key: bits(part) for key, part in value.items()}
+    return value.hex() if isinstance(value, float) else value
+
+
+async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
+    unit: UnitSettings, stepped_clock, tmp_path: Path
+) -> None:
+    machine, calibration = machine_of(unit), calibration_of(unit)
+    live_monitor, live = UnitMonitor(machine, ANALYSIS), []
+    with recording_writer(unit, tmp_path / "run", "a test") as writer:
+        for raw in rough_ride(unit, stepped_clock):
+            block = calibrate(raw, calibration)
+            live += live_monitor.ingest(block)
+            writer.write_calibrated(block)
+
+    recording = recording_of(tmp_path / "run")
+    source = recording_source(recording, selection_of(recording, unit), None, stepped_clock)
+    monitor, n_passed = UnitMonitor(machine, ANALYSIS), []
+    again = [found async for found in assessments(source, monitor, n_passed.append)]
+
+    assert len(live) > 3 * 5
+    assert {reading.quality.reason.value for a in live for reading in a.readings.values()} >= {
+        "sensor_failure",
+        "clipped",
+        "out_of_range",
+    }
+    assert bits(dict(enumerate(again))) == bits(dict(enumerate(live)))
+    assert monitor.account == live_monitor.account
+    assert monitor.drain_gaps() == live_monitor.drain_gaps() != []
+    assert sum(n_passed) == recording.manifest.n_samples
+
+
+def assessment(bearing: str, time_ns: int, n_segments: int, sample: Assessment) -> Assessment:
+    window = replace(sample.window, n_segments=n_segments, n_segments_wanted=4)
+    return replace(sample, bearing=bearing, time_ns=time_ns, window=window)
+
+
+@pytest.fixture
+def sample(unit: UnitSettings, stepped_clock) -> Assessment:
+    monitor, feed = UnitMonitor(machine_of(unit), ANALYSIS), simulated_feed(unit, stepped_clock)
+    return monitor.ingest(calibrate(feed.advance(1024), calibration_of(unit)))[0]
+
+
+@pytest.mark.parametrize(
+    ("n_segments", "kept"), [((1, 2, 3), 2), ((1, 4, 4), 2), ((3, 4, 2), 1), ((4, 4, 0), 1)]
+)
+def test_the_last_full_average_is_kept_and_the_last_of_all_until_there_is_one(
+    sample: Assessment, n_segments: tuple[int, ...], kept: int
+) -> None:
+    last = LastAverages()
+    for number, n in enumerate(n_segments):
+        last.put(assessment("UJB", number, n, sample))
+        last.put(assessment("LJB", 70 + number, 4, sample))
+    assert [(a.bearing, a.time_ns) for a in last.all()] == [("UJB", kept), ("LJB", 72)]
+
+
+def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:
+    found = json.loads(assessment_model(sample).model_dump_json())
+    for name, reading in sample.readings.items():
+        assert found["readings"][name]["value"] == reading.value
+        assert found["readings"][name]["reason"] == reading.quality.reason.value
+    assert set(found) == {
+        "unit", "bearing", "time", "quality", "speed_source", "window", "readings"
+    }  # fmt: skip
+
+
+def test_a_changed_sensitivity_and_range_are_named_with_both_values(unit: UnitSettings) -> None:
+    then = calibration_of(unit)
+    now = replace(
+        then,
+        channels=(replace(then.channels[0], unit_per_v=251.5), *then.channels[1:]),
+        slow=(replace(then.slow[0], maximum=300.0), *then.slow[1:]),
+    )
+    ids = [channel.id for channel in unit.channel]
+    assert calibration_differences(ids, then, now) == [
+        "channel ujb_shaft_x: unit_per_v was 250 when recorded, is 251.5 now",
+        "slow channel speed: range was 0 to 200, is 0 to 300 now",
+    ]
+    assert calibration_differences(ids, then, then) == []
