@@ -172,7 +172,6 @@ class RegisterLink:
         )
         reply: RegisterReply = await self._client.execute(False, request)
         _let_stop_through()
-        _cancel_if_asked()
         if reply.fault:
             raise FrameError(f"{self._where}: {reply.fault}")
         if reply.refusal is not None:
@@ -200,13 +199,3 @@ class RegisterLink:
             f"{self._where}: device answers exception {code} ({names.get(code, 'unknown')})"
             f" to a read of {count} registers at {address}"
         )
-
-
-def _cancel_if_asked() -> None:
-    """Raise a cancellation that came together with a reply.
-
-    pymodbus waits with `asyncio.wait_for`, which on Python 3.11 drops it then.
-    """
-    task = asyncio.current_task()
-    if task is not None and task.cancelling():
-        raise asyncio.CancelledError
