@@ -1,0 +1,107 @@
+"""Budgets add up as the GUM says, and say what each estimator's errors come from."""
+
+import math
+
+import numpy as np
+import pytest
+
+from core.bracket import BracketDynamics
+from core.cross_spectrum import BEARING_X, SHAFT_X, average
+from core.stiffness_budget import ratio_budget, transfer_budgets
+from core.transfer import line_transfer
+from core.uncertainty import (
+    BearingAccuracy,
+    Budget,
+    coverage_factor,
+    random_line,
+    systematic_line,
+)
+
+
+def test_a_half_width_counts_as_a_uniform_distribution() -> None:
+    assert systematic_line("gain", 0.05, 100.0).contribution == pytest.approx(5.0 / math.sqrt(3.0))
+    assert random_line("statistics", 3.0).contribution == 3.0
+
+
+def test_random_and_systematic_stay_apart_and_combine_by_squares() -> None:
+    budget = Budget(
+        100.0,
+        (
+            random_line("statistics", 3.0),
+            systematic_line("a", 4.0 * math.sqrt(3.0), -1.0),
+            systematic_line("b", 12.0 * math.sqrt(3.0), 1.0),
+        ),
+    )
+    assert budget.random == pytest.approx(3.0)
+    assert budget.systematic == pytest.approx(math.hypot(4.0, 12.0))
+    assert budget.combined == pytest.approx(13.0)
+    assert budget.interval == pytest.approx((100.0 - 1.95996 * 13.0, 100.0 + 1.95996 * 13.0))
+    assert budget.random_interval == pytest.approx((100.0 - 1.95996 * 3.0, 100.0 + 1.95996 * 3.0))
+
+
+def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table() -> None:
+    # GUM, table G.2: t_95 of 3, 6 and 20 degrees of freedom
+    for freedoms, factor in ((3.0, 3.18), (6.0, 2.45), (20.0, 2.09)):
+        assert coverage_factor([random_line("a", 1.0, freedoms)]) == pytest.approx(
+            factor, abs=0.005
+        )
+    mixed = [random_line("a", 1.0, 6.0), systematic_line("b", 10.0, 1.0)]
+    assert coverage_factor(mixed) == pytest.approx(1.96, abs=0.01)
+
+
+def test_nothing_uncertain_is_an_interval_of_no_width() -> None:
+    assert Budget(5.0, ()).interval == (5.0, 5.0)
+
+
+@pytest.mark.parametrize("name", ["shaft_gain", "bearing_gain", "bracket_stiffness", "probe_noise"])
+@pytest.mark.parametrize("value", [-0.01, 1.0, math.nan])
+def test_an_accuracy_that_means_nothing_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        BearingAccuracy(**{name: value})
+
+
+@pytest.fixture
+def at_line() -> tuple[Budget, Budget]:
+    """Budgets of `ratio` and of the stiffness of `transfer`, at a line of coherence 0.97."""
+    rng = np.random.default_rng(3)
+    phasors = rng.normal(size=(50, 4, 1)) + 1j * rng.normal(size=(50, 4, 1))
+    phasors[:, 2:] = 0.4 * phasors[:, :2] + 0.07 * phasors[:, 2:]
+    spectrum = average(np.array([1.5]), phasors, np.ones((50, 4), dtype=bool))
+    bracket, accuracy = BracketDynamics(1.18e9, 0.45e5), BearingAccuracy()
+    ratio = ratio_budget(spectrum, 0, SHAFT_X, BEARING_X, bracket, accuracy, runout_um_pk=0.1)
+    transfer = line_transfer(spectrum, 0, SHAFT_X, BEARING_X, bracket)
+    assert ratio is not None
+    assert transfer is not None
+    return ratio, transfer_budgets(transfer, accuracy, runout_um_pk=0.1)[0]
+
+
+def test_each_estimator_names_what_reaches_it(at_line: tuple[Budget, Budget]) -> None:
+    ratio, transfer = ({line.name for line in budget.lines} for budget in at_line)
+    common = {
+        "spectral statistics",
+        "gain of shaft probe",
+        "gain of bearing transducer",
+        "bracket stiffness",
+        "runout",
+    }
+    assert transfer == common
+    assert ratio == common | {"incoherent motion", "bracket inertia left out"}
+
+
+def test_gains_and_bracket_are_what_limits_a_well_excited_line(
+    at_line: tuple[Budget, Budget],
+) -> None:
+    for budget in at_line:
+        lines = {line.name: line.contribution / budget.value for line in budget.lines}
+        assert lines["gain of shaft probe"] == pytest.approx(0.05 / math.sqrt(3.0))
+        assert lines["gain of bearing transducer"] == pytest.approx(0.05 / math.sqrt(3.0))
+        # Slightly more than its share, as the bracket's inertia is taken off.
+        assert lines["bracket stiffness"] == pytest.approx(0.1 / math.sqrt(3.0), rel=0.005)
+
+
+def test_without_coherence_or_motion_there_is_no_budget_of_equation_5() -> None:
+    still = average(
+        np.array([1.5]), np.zeros((9, 4, 1), dtype=complex), np.ones((9, 4), dtype=bool)
+    )
+    nothing = ratio_budget(still, 0, SHAFT_X, BEARING_X, BracketDynamics(1.18e9), BearingAccuracy())
+    assert nothing is None
