@@ -1,0 +1,137 @@
+"""The program as a user runs it: a real process, asked over HTTP."""
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PATIENCE_S = 60.0
+"""Until a test gives up; no test waits that long when all is well."""
+
+
+class Program:
+    """A running `padwatch` and what it has said so far."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self.process = process
+        self.said: list[str] = []
+        self.errors = ""
+        self.url = ""
+        self._reading = asyncio.create_task(self._read_errors())
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    async def wait_for_url(self) -> str:
+        """Read what it prints until the URL comes."""
+        assert self.process.stdout is not None
+        async with asyncio.timeout(PATIENCE_S):
+            while line := (await self.process.stdout.readline()).decode():
+                self.said.append(line)
+                if line.startswith("padwatch: http://"):
+                    self.url = line.removeprefix("padwatch: ").strip().rstrip("/")
+                    return self.url
+        raise AssertionError(f"ended without a URL: {self.said} {self.errors}")
+
+    async def get(self, path: str, **parameters: Any) -> Any:
+        """Ask the API; the answer must be 200."""
+        async with httpx2.AsyncClient(base_url=self.url, trust_env=False) as client:
+            response = await client.get(path, params=parameters)
+        assert response.status_code == 200, response.text
+        return response.json()
+
+    async def until(self, path: str, condition: Callable[[Any], bool]) -> Any:
+        """Ask the API until its answer is as wanted."""
+        answer = None
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                while not condition(answer := await self.get(path)):
+                    await asyncio.sleep(0.1)
+        except TimeoutError:
+            raise AssertionError(f"{path} never came to be so; last: {answer}") from None
+        return answer
+
+    async def end(self, number: int = signal.SIGTERM) -> int:
+        """Send a signal and wait for the end."""
+        if self.process.returncode is None:
+            self.process.send_signal(number)
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                return await self.process.wait()
+        except TimeoutError:
+            self.process.kill()
+            raise AssertionError(f"did not end on signal {number}: {self.errors}") from None
+        finally:
+            await self.process.wait()
+            await self._reading
+
+    async def _read_errors(self) -> None:
+        assert self.process.stderr is not None
+        while line := await self.process.stderr.readline():
+            self.errors += line.decode()
+
+
+Start = Callable[..., Awaitable[Program]]
+
+
+@pytest.fixture
+async def start(tmp_path: Path) -> AsyncIterator[Start]:
+    """Starts `padwatch` with arguments, in an empty folder; ends what a test leaves running."""
+    programs: list[Program] = []
+
+    async def started(*arguments: str) -> Program:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            *("-m", "service.cli.main", *arguments),
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
+        )
+        programs.append(Program(process))
+        return programs[-1]
+
+    yield started
+    for program in programs:
+        await program.end(signal.SIGTERM if program.process.returncode is None else 0)
+
+
+@pytest.fixture
+def demo_file() -> Path:
+    """The plant file that `padwatch demo` runs."""
+    return ROOT / "deploy" / "demo.toml"
+
+
+@pytest.fixture
+def children() -> Callable[[int], list[int]]:
+    """Process ids of the children of a process."""
+    return lambda pid: [
+        int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    ]
+
+
+@pytest.fixture
+def gone() -> Callable[[int], Awaitable[None]]:
+    """Waits until a process has ended, reaped or not."""
+
+    def is_running(pid: int) -> bool:
+        try:
+            stat = Path(f"/proc/{pid}/stat").read_text()
+        except (FileNotFoundError, ProcessLookupError):
+            return False
+        return stat.rpartition(")")[2].split()[0] not in "ZX"
+
+    async def wait(pid: int) -> None:
+        async with asyncio.timeout(PATIENCE_S):
+            while is_running(pid):
+                await asyncio.sleep(0.05)
+
+    return wait
