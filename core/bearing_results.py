@@ -151,7 +151,8 @@ class BearingResults:
         )
         stiffness, budgets = order.stiffness()
         readings = {f"{name}_um_pk": reading for name, reading in order.amplitudes().items()}
-        readings |= {"frequency_hz": self._frequency(line)} | stiffness
+        readings |= {"frequency_hz": self._frequency(line), "roundness": order.roundness()}
+        readings |= stiffness
         return (
             {f"{prefix}_{name}": reading for name, reading in readings.items()},
             {f"{prefix}_{name}": budget for name, budget in budgets.items()},

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
+from core.excitation import LineLimits, line_excitation
 from core.machine import Bearing
 from core.quality import Quality, Reading, Reason, missing
 from core.ratio import effective_stiffness_n_per_m
@@ -13,8 +14,9 @@ from core.segments import ORDER1, VORTEX
 from core.settings import AnalysisSettings
 from core.spectral_statistics import independent_segments
 from core.stiffness_budget import ratio_budget, transfer_budgets
-from core.transfer import LineTransfer, line_transfer
+from core.transfer import line_transfer
 from core.uncertainty import Budget
+from core.whirl import roundness
 
 FLOOR_REACH = 12
 """Bins to each side of a line in which its surroundings are judged."""
@@ -69,6 +71,13 @@ class OrderLine:
         """Amplitude of each channel, by name."""
         return {name: self._amplitude(place) for name, place in AMPLITUDES.items()}
 
+    def roundness(self) -> Reading:
+        """How round the shaft's orbit is at the line, and in which sense."""
+        quality = self.quality(SHAFT_X, SHAFT_Y)
+        if isinstance(quality, Reading):
+            return quality
+        return Reading(roundness(self.orders, self.line), quality)
+
     def stiffness(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
         """Coherence, equation (5) and transfer in both directions, and their budgets."""
         readings: dict[str, Reading] = {}
@@ -90,25 +99,21 @@ class OrderLine:
 
     def _direction(
         self, axes: str, shaft: int, bearing: int, quality: Quality, budgets: dict[str, Budget]
-    ) -> tuple[Reading, Reading, Reading, Reading]:
+    ) -> tuple[Reading, ...]:
         n_segments = int(self.orders.n_segments[shaft, bearing])
         few = n_segments < self.settings.min_segments
         coherence = float(self.orders.coherence(shaft, bearing)[self.line])
         shown = missing(Reason.FEW_SEGMENTS) if few else Reading(coherence, quality)
-        silent = missing(Reason.INSUFFICIENT_EXCITATION)
-        if not self._moves(shaft, bearing):
-            return shown, silent, silent, silent
+        reason = self._why_silent(shaft, bearing, few)
+        if reason is not Reason.OK:
+            return (shown, *[missing(reason)] * 3)
         independent = independent_segments(n_segments, self.settings.overlap)
-        k_eff = silent
-        if self._stands_out(bearing) if few else coherence >= self.settings.min_coherence:
-            k_eff = self._ratio(axes, shaft, bearing, quality, independent, budgets)
-        if few:
-            return shown, k_eff, missing(Reason.FEW_SEGMENTS), missing(Reason.FEW_SEGMENTS)
+        k_eff = self._ratio(axes, shaft, bearing, quality, independent, budgets)
         found = line_transfer(
             self.orders, self.line, shaft, bearing, self.bearing.bracket, independent
         )
-        if found is None or not self._is_certain(found):
-            return shown, k_eff, silent, silent
+        if few or found is None:
+            return shown, k_eff, missing(Reason.FEW_SEGMENTS), missing(Reason.FEW_SEGMENTS)
         of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk)
         budgets[f"transfer_k_{axes}_n_per_m"] = of_k
         budgets[f"transfer_c_{axes}_n_s_per_m"] = of_c
@@ -140,18 +145,22 @@ class OrderLine:
         budgets[f"k_eff_{axes}_n_per_m"] = budget
         return reading_of(budget, quality)
 
-    def _moves(self, shaft: int, bearing: int) -> bool:
-        """Whether there is a line that is worth reading."""
-        few = int(self.orders.n_segments[shaft, bearing]) < self.settings.min_segments
+    def _why_silent(self, shaft: int, bearing: int, few: bool) -> Reason:
+        """Why nothing may be read from the line; OK if something may."""
+        quiet = Reason.INSUFFICIENT_EXCITATION
         if self.orders.power[self.line, shaft, bearing] <= 0.0:
-            return False
+            return quiet
         if self.orders.amplitude_um_pk(bearing)[self.line] < self.settings.min_bearing_um_pk:
-            return False
+            return quiet
         # what is no line must not be read as the vortex's
-        return self._stands_out(shaft) if few or self.line == VORTEX else True
-
-    def _is_certain(self, found: LineTransfer) -> bool:
-        return found.k_std_n_per_m <= self.settings.max_line_uncertainty * abs(found.k_n_per_m)
+        if (few or self.line == VORTEX) and not self._stands_out(shaft):
+            return quiet
+        # few segments are coherent with anything
+        limits = LineLimits(0.0 if few else self.settings.min_coherence, self._runout_um_pk)
+        if few and not self._stands_out(bearing):
+            return quiet
+        reason = line_excitation(self.orders, self.line, shaft, bearing, limits)
+        return Reason.OK if few and reason is Reason.FEW_SEGMENTS else reason
 
     def _stands_out(self, place: int) -> bool:
         """Whether the line stands above its surroundings, less those of the other order line."""

@@ -35,6 +35,7 @@ def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:
         Quantity(f"{prefix}_shaft_y_um_pk", "µm 0-pk", f"Relative shaft vibration y, {words}"),
         Quantity(f"{prefix}_bearing_x_um_pk", "µm 0-pk", f"Absolute bearing vibration x, {words}"),
         Quantity(f"{prefix}_bearing_y_um_pk", "µm 0-pk", f"Absolute bearing vibration y, {words}"),
+        Quantity(f"{prefix}_roundness", "1", f"Roundness of the shaft's orbit, {words}, forward +"),
         Quantity(f"{prefix}_coherence_xx", "1", f"Coherence of shaft and bearing x, {words}"),
         Quantity(f"{prefix}_coherence_yy", "1", f"Coherence of shaft and bearing y, {words}"),
         *_in_both_directions(

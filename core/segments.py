@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.lines import bin_phasors, exact_phasors, peak_frequency_hz, tapered
+from core.cross_spectrum import average
+from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.quality import Level, Quality, Reading, Reason, bad
 from core.ring import Window
@@ -16,6 +17,7 @@ from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
 from core.transducers import displacement_factor
 from core.units import hz_from_rpm
+from core.whirl import vortex_frequency_hz
 
 ORDER1, VORTEX = range(2)
 """Where the two order lines stand in `Segment.order_phasors_um_pk`."""
@@ -75,6 +77,8 @@ class SegmentTransform:
         self._bin_factor = _factors(unit.channels, self.frequency_hz)
         shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
         self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
+        ids = [channel.id for channel in unit.channels]
+        self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
         self.segments: deque[Segment] = deque(maxlen=settings.n_segments)
 
     def clear(self) -> None:
@@ -125,13 +129,27 @@ class SegmentTransform:
             self._unit, window.slow, self.frequency_hz, newest, self._settings.min_speed_fraction
         )
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
-        # the rope wanders and one segment resolves it poorly: the average shows where it is
-        averaged = newest + sum(
-            _power(s.bin_phasors_um_pk, s.usable & self._is_shaft) for s in self.segments
-        )
+        return speed, np.array([turn_hz, self._vortex_hz(turn_hz, bins, usable)])
+
+    def _vortex_hz(
+        self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
+    ) -> float:
+        """Where the bearings share a line: over all segments, for one resolves a rope poorly."""
         low, high = self._settings.vortex_band
-        peak_hz = peak_frequency_hz(averaged, self.frequency_hz, (low * turn_hz, high * turn_hz))
-        return speed, np.array([turn_hz, peak_hz or self._settings.vortex_order * turn_hz])
+        band_hz = (low * turn_hz, high * turn_hz)
+        # a bin more on each side, to tell a peak from the flank of one outside
+        margin_hz = 1.5 * self.frequency_hz[0]
+        near = np.flatnonzero(
+            (self.frequency_hz > band_hz[0] - margin_hz)
+            & (self.frequency_hz < band_hz[1] + margin_hz)
+        )
+        phasors = np.array([*(s.bin_phasors_um_pk[:, near] for s in self.segments), bins[:, near]])
+        counted = np.array([*(s.usable for s in self.segments), usable])
+        spectra = [
+            average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
+            for rows in self._bearing_rows
+        ]
+        return vortex_frequency_hz(spectra, band_hz) or self._settings.vortex_order * turn_hz
 
 
 def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:

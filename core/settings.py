@@ -37,8 +37,6 @@ class AnalysisSettings:
         Bearing amplitude of a line below which equation (5) and `transfer` say nothing: at 1× of
         92.3 r/min, 4 µm are 0.04 mV of a 1000 mV/g accelerometer. The paper's balanced machine
         (Table 8), whose figures it calls unreliable, has 1.9 to 3.4 µm.
-    max_line_uncertainty
-        Random standard uncertainty of `transfer` over its stiffness beyond which it says nothing.
     dynamic
         How all eight coefficients are sought.
     min_speed_fraction
@@ -56,7 +54,6 @@ class AnalysisSettings:
     min_line_to_floor: float = 10.0
     min_coverage: float = 0.5
     min_bearing_um_pk: float = 4.0
-    max_line_uncertainty: float = 0.2
     min_speed_fraction: float = 0.2
     dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 

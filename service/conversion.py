@@ -7,6 +7,7 @@ from core.settings import AnalysisSettings
 from core.uncertainty import BearingAccuracy
 from core.usable_lines import LineSelection
 from service.settings.plant import AnalysisModel
+from service.settings.response import response_of
 from service.settings.units import BearingSettings, UnitSettings
 
 
@@ -16,7 +17,9 @@ def machine_of(settings: UnitSettings) -> Unit:
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
         rate_hz=settings.rate_hz,
-        channels=tuple(Channel(c.id, c.measurand, c.sign) for c in settings.channel),
+        channels=tuple(
+            Channel(c.id, c.measurand, c.sign, response_of(c.response)) for c in settings.channel
+        ),
         bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
         speed_channel=settings.speed_channel,
         power_channel=settings.power_channel,

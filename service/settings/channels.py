@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from core.machine import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, Settings
+from service.settings.response import ResponseSettings
 
 
 class Transducer(StrEnum):
@@ -91,6 +92,10 @@ class ChannelSettings(Settings):
     gain_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
     """Half-width of what the sensitivity may be off, as a share: the transducer's class; example:
     0.05."""
+
+    response: Annotated[tuple[ResponseSettings, ...], Field(max_length=8)] = ()
+    """How the transducer changes the signal with frequency, in parts that work one after the
+    other; nothing is a flat response. Example: [{ kind = "high_pass", corner_hz = 0.5 }]."""
 
     direction: Literal[1, -1] | None = None
     """+1 if a growing reading is motion along the positive bearing axis, -1 if against it. Default:

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from service.settings.mistakes import is_echo, located, sentence
 from service.settings.plant import PlantFile
 from service.settings.positions import line_of
+from service.settings.response import FOLDER
 
 MAX_FILE_BYTES = 4_000_000
 """Far above any plant; keeps a wrong path (a device, a recording) from filling the memory."""
@@ -36,7 +37,9 @@ def load_plant_file(path: Path) -> PlantFile:
     data = _parsed(path, text)
     try:
         # JSON, because only there strict (no text or truth for a number) lets a list be a tuple
-        return PlantFile.model_validate_json(json.dumps(data, default=str), strict=True)
+        return PlantFile.model_validate_json(
+            json.dumps(data, default=str), strict=True, context={FOLDER: path.parent}
+        )
     except ValidationError as error:
         if error.errors()[0]["type"] == "json_invalid":
             raise PlantFileError(f"{path}: {TOO_DEEP}") from error

@@ -114,9 +114,6 @@ class AnalysisModel(Settings):
     """Bearing amplitude of a line, µm zero-to-peak, below which equation (5) and transfer give no
     stiffness; lower it for transducers better than a 1000 mV/g accelerometer."""
 
-    max_line_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
-    """Random standard uncertainty of transfer, as a share, beyond which there is no result."""
-
     dynamic: DynamicModel = DynamicModel()
     """How all eight film coefficients are sought."""
 
