@@ -66,6 +66,19 @@ def estimates(
     return found
 
 
+def amplitudes(spectra: BearingSpectra) -> list[Estimate]:
+    """Compare the amplitudes at 1× with those of the rotor's frequency response."""
+    return [
+        Estimate(
+            f"amplitude {signal}",
+            float(spectra.orders.amplitude_um_pk(channel)[ORDER1] / true - 1.0),
+        )
+        for channel, (signal, true) in enumerate(
+            zip(("u_x", "u_y", "v_x", "v_y"), spectra.order1_um_pk, strict=True)
+        )
+    ]
+
+
 def _dynamic(
     spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool
 ) -> Iterator[Estimate]:

@@ -1,34 +1,44 @@
-"""From a simulated plant to averaged spectra, for the accuracy benchmark and its tests.
+"""From a simulated unit's counts to averaged spectra, for the accuracy benchmark and its tests.
 
-The motion is the real simulator's; transducers, their noise and the real ring and segments follow.
-Pieces stream through, so that an hour takes no more memory than a minute.
+Simulator, converter, calibration, ring and segments are the real ones. Pieces stream through, so
+that an hour takes no more memory than a minute.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.signal
 
-from acquisition.simulated.plant import CHUNK_SAMPLES, SimulatedPlant
-from acquisition.simulated.scenario import Scenario
+from acquisition.calibration import (
+    ChannelCalibration,
+    SlowCalibration,
+    UnitCalibration,
+    calibrate,
+)
+from acquisition.simulated.plant import CHUNK_SAMPLES
+from acquisition.simulated.scenario import ChannelScenario, Scenario, TransducerNoise
+from acquisition.simulated.unit import SimulatedUnit
 from core.arrays import FloatArray
 from core.blocks import SampleBlock
 from core.bracket import BracketDynamics
 from core.cross_spectrum import CrossSpectrum, average
 from core.film import Film
 from core.machine import Bearing, Channel, Measurand, Unit
-from core.quality import GOOD, Reading
 from core.ring import Ring
-from core.rotor_parameters import RotorParameters
+from core.rotor import bearing_response, forward_force, rotor_matrices
+from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
 from core.segments import SegmentTransform
 from core.settings import AnalysisSettings
 from core.transducer_response import Response
-from core.units import STANDARD_GRAVITY_M_S2, hz_from_rpm, ns_from_s
 
 RATE_HZ = 600.0
-PINK_CORNERS_HZ = tuple(0.003 * 10 ** (i / 2) for i in range(11))
-"""One-pole noises, two to a decade, whose sum falls as 1/f within 0.3 dB."""
+START_NS = 1_790_000_000_000_000_000
+PROBE = ChannelCalibration(full_scale_v=20.0, unit_per_v=-250.0, ok_min_v=-18.0, ok_max_v=-2.0)
+BEARING_CHANNEL = {
+    Measurand.ACCELERATION_M_S2: ChannelCalibration(10.0, 0.05, -10.0, 10.0),
+    Measurand.VELOCITY_MM_S: ChannelCalibration(10.0, 0.1, -10.0, 10.0),
+}
+"""Full scale of 0.5 m/s² and 1 mm/s, ten times what the machine does."""
 
 
 @dataclass(frozen=True)
@@ -39,32 +49,30 @@ class Transducers:
     ----------
     probe_um_rms
         White, over the whole band.
-    accelerometer_ug_per_rthz, knee_hz
-        Noise density far above the knee; its power doubles at the knee and grows as 1/f below.
+    accelerometer_ug_per_rthz
+        Noise density above 2 Hz; below, its power grows as 1/f.
     runout_um_pk
         At 1×, 2×, 3× ... of the running speed, with phases drawn for each run.
-    corner_hz
-        First-order high-pass of the bearing channels; none if zero.
+    response
+        Of the bearing channels.
     gain_half_width
         Limits within which the gain of every channel is drawn.
-    dead
-        Channels that show noise alone.
+    blind
+        Channels that show their noise alone.
     """
 
     probe_um_rms: float = 0.0
     accelerometer_ug_per_rthz: float = 0.0
-    knee_hz: float = 0.0
     runout_um_pk: tuple[float, ...] = ()
-    corner_hz: float = 0.0
+    response: Response | None = None
     gain_half_width: float = 0.0
-    dead: tuple[str, ...] = ()
+    blind: tuple[str, ...] = ()
 
 
 IDEAL = Transducers()
 REALISTIC = Transducers(
     probe_um_rms=1.2,
     accelerometer_ug_per_rthz=5.0,
-    knee_hz=2.0,
     runout_um_pk=(10.0, 3.0, 1.5, 1.0, 0.7, 0.5, 0.4, 0.3),
 )
 
@@ -77,6 +85,8 @@ class Run:
     ----------
     bracket_half_width
         Limits within which the true stiffness of the brackets is drawn.
+    speed_rpm
+        Limits within which the speed is drawn, where it is not the scenario's.
     """
 
     scenario: Scenario
@@ -84,6 +94,7 @@ class Run:
     bearing_measurand: Measurand = Measurand.ACCELERATION_M_S2
     duration_s: float = 300.0
     bracket_half_width: float = 0.0
+    speed_rpm: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -96,6 +107,8 @@ class BearingSpectra:
         At the lines of the segments.
     orders
         At exactly 1× and the vortex.
+    order1_um_pk
+        (4,) true amplitudes at 1×, by unbalance alone.
     """
 
     bins: CrossSpectrum
@@ -103,6 +116,7 @@ class BearingSpectra:
     film: Film
     bracket: BracketDynamics
     turn_hz: tuple[float, float]
+    order1_um_pk: FloatArray
 
 
 def machine(bearing_measurand: Measurand, response: Response | None = None) -> Unit:
@@ -140,141 +154,93 @@ def spectra(run: Run, seed: int, response: Response | None = None) -> dict[str, 
     -------
     By bearing.
     """
-    draws, noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
-    nominal = machine(run.bearing_measurand, response)
-    scenario = _with_drawn_brackets(run, draws)
-    plant = SimulatedPlant(machine(run.bearing_measurand), scenario, seed)
-    chain = _Chain(nominal, run.transducers, hz_from_rpm(scenario.speed_rpm), draws, noise)
+    unit = machine(run.bearing_measurand, response)
+    scenario = drawn(run, unit, np.random.default_rng(seed))
     n_chunks = int(run.duration_s * RATE_HZ) // CHUNK_SAMPLES
-    readings = (chain.read(plant.advance().readings) for _ in range(n_chunks))
     settings = AnalysisSettings(n_segments=n_chunks)  # more than there can be: all are averaged
-    transform = _transform(nominal, settings, readings, scenario.speed_rpm)
-    return {b.id: _of_bearing(nominal, b, run, transform) for b in nominal.bearings}
+    transform = _transform(unit, settings, _blocks(unit, scenario, seed, n_chunks))
+    return {b.id: _of_bearing(unit, b, scenario, transform) for b in unit.bearings}
 
 
-class _Chain:
-    """Transducers of one run: response, gain, runout, noise, in this order."""
+def drawn(run: Run, unit: Unit, draws: np.random.Generator) -> Scenario:
+    """Draw gains, brackets, speed and the phases of runout for one run."""
 
-    def __init__(
-        self,
-        unit: Unit,
-        transducers: Transducers,
-        turn_hz: float,
-        draws: np.random.Generator,
-        noise: np.random.Generator,
-    ) -> None:
-        half = transducers.gain_half_width
-        n_channels = len(unit.channels)
-        self._transducers, self._turn_hz, self._noise = transducers, turn_hz, noise
-        self._gain = 1.0 + half * draws.uniform(-1.0, 1.0, n_channels)
-        is_probe = np.array([c.measurand is Measurand.GAP_UM for c in unit.channels])
-        self._probes, self._others = np.flatnonzero(is_probe), np.flatnonzero(~is_probe)
-        self._alive = np.array([c.id not in transducers.dead for c in unit.channels])
-        n_harmonics = len(transducers.runout_um_pk)
-        self._phase = draws.uniform(0.0, 2.0 * np.pi, (self._probes.size, n_harmonics))
-        self._index = 0
-        self._pink = _Pink(self._others.size, transducers, noise)
-        self._high_pass = np.zeros((self._others.size, 1))
+    def within(half_width: float) -> float:
+        return float(1.0 + half_width * draws.uniform(-1.0, 1.0))
 
-    def read(self, motion: FloatArray) -> FloatArray:
-        """Turn a chunk of motion into readings, in place."""
-        n_samples = motion.shape[1]
-        if self._transducers.corner_hz:
-            b, a = scipy.signal.butter(1, self._transducers.corner_hz, "high", fs=RATE_HZ)
-            motion[self._others], self._high_pass = scipy.signal.lfilter(
-                b, a, motion[self._others], axis=1, zi=self._high_pass
-            )
-        motion[self._probes] += self._runout(n_samples)
-        motion *= (self._gain * self._alive)[:, np.newaxis]
-        shape = (self._probes.size, n_samples)
-        motion[self._probes] += self._transducers.probe_um_rms * self._noise.standard_normal(shape)
-        motion[self._others] += self._pink.advance(n_samples)
-        self._index += n_samples
-        return motion
-
-    def _runout(self, n_samples: int) -> FloatArray:
-        amplitudes = np.array(self._transducers.runout_um_pk)
-        turns = self._turn_hz * np.arange(self._index, self._index + n_samples) / RATE_HZ
-        order = np.arange(1, amplitudes.size + 1)
-        basis = np.exp(2j * np.pi * np.outer(order, turns))
-        runout: FloatArray = ((amplitudes * np.exp(1j * self._phase)) @ basis).real
-        return runout
-
-
-class _Pink:
-    """White noise with 1/f below a knee, in the accelerometers' m/s²."""
-
-    def __init__(self, n: int, transducers: Transducers, noise: np.random.Generator) -> None:
-        density = transducers.accelerometer_ug_per_rthz * 1e-6 * STANDARD_GRAVITY_M_S2
-        self._noise, self._white_rms = noise, density * np.sqrt(RATE_HZ / 2.0)
-        # Σ (1/f_i) / (1 + (f/f_i)²) over corners a factor q apart is π / (2 f ln q)
-        scale = transducers.knee_hz * 2.0 * np.log(10.0) / 2.0 / np.pi
-        self._stages = []
-        for corner_hz in PINK_CORNERS_HZ:
-            pole = np.exp(-2.0 * np.pi * corner_hz / RATE_HZ)
-            rms = self._white_rms * np.sqrt(scale / corner_hz) * (1.0 - pole)
-            self._stages.append((pole, rms, np.zeros((n, 1))))
-        self._n = n if transducers.knee_hz and density else 0
-        self._shape = n
-
-    def advance(self, n_samples: int) -> FloatArray:
-        total: FloatArray = self._white_rms * self._noise.standard_normal((self._shape, n_samples))
-        if not self._n:
-            return total
-        stages = []
-        for pole, rms, state in self._stages:
-            push = rms * self._noise.standard_normal((self._shape, n_samples))
-            part, left = scipy.signal.lfilter([1.0], [1.0, -pole], push, axis=1, zi=state)
-            total += part
-            stages.append((pole, rms, left))
-        self._stages = stages
-        return total
-
-
-def _with_drawn_brackets(run: Run, draws: np.random.Generator) -> Scenario:
-    half = run.bracket_half_width
-    rotor = run.scenario.rotor
-    brackets = tuple(
-        replace(b, stiffness_n_per_m=b.stiffness_n_per_m * (1.0 + half * draws.uniform(-1.0, 1.0)))
-        for b in rotor.brackets
+    scenario, transducers = run.scenario, run.transducers
+    bearings = {
+        name: replace(
+            bearing,
+            bracket_stiffness_factor=within(run.bracket_half_width),
+            runout_um_pk=tuple(
+                um_pk * complex(np.exp(2j * np.pi * draws.uniform()))
+                for um_pk in transducers.runout_um_pk
+            ),
+        )
+        for name, bearing in scenario.bearings.items()
+    }
+    low, high = run.speed_rpm or (scenario.speed_rpm, scenario.speed_rpm)
+    return replace(
+        scenario,
+        bearings=bearings,
+        speed_rpm=float(draws.uniform(low, high)),
+        noise=TransducerNoise(
+            gap_um_rms=transducers.probe_um_rms,
+            accelerometer_g_per_sqrt_hz=transducers.accelerometer_ug_per_rthz * 1e-6,
+        ),
+        channels=_channels(unit, transducers, within),
     )
-    return replace(run.scenario, rotor=replace(rotor, brackets=brackets))
+
+
+def _channels(
+    unit: Unit, transducers: Transducers, within: Callable[[float], float]
+) -> Mapping[str, ChannelScenario]:
+    return {
+        channel.id: ChannelScenario(
+            response=None if channel.measurand is Measurand.GAP_UM else transducers.response,
+            gain=0.0 if channel.id in transducers.blind else within(transducers.gain_half_width),
+        )
+        for channel in unit.channels
+    }
+
+
+def _blocks(unit: Unit, scenario: Scenario, seed: int, n_blocks: int) -> Iterator[SampleBlock]:
+    calibration = UnitCalibration(
+        unit.id,
+        unit.rate_hz,
+        tuple(
+            PROBE if c.measurand is Measurand.GAP_UM else BEARING_CHANNEL[c.measurand]
+            for c in unit.channels
+        ),
+        (SlowCalibration("speed", 0.0, 1000.0),),
+    )
+    simulated = SimulatedUnit(unit, calibration, scenario, seed, START_NS)
+    for _ in range(n_blocks):
+        yield calibrate(simulated.advance(CHUNK_SAMPLES), calibration)
 
 
 def _transform(
-    unit: Unit, settings: AnalysisSettings, readings: Iterator[FloatArray], speed_rpm: float
+    unit: Unit, settings: AnalysisSettings, blocks: Iterator[SampleBlock]
 ) -> SegmentTransform:
-    transform, ring = SegmentTransform(unit, settings), Ring(12, 2 * settings.segment_samples)
-    start = index = 0
-    for chunk in readings:
-        ring.write(_block(unit, chunk, index, speed_rpm))
-        index += chunk.shape[1]
+    transform = SegmentTransform(unit, settings)
+    ring = Ring(len(unit.channels), 2 * settings.segment_samples)
+    start = 0
+    for block in blocks:
+        ring.write(block)
         while ring.holds(start, start + settings.segment_samples):
             transform.add(ring.read(start, start + settings.segment_samples))
             start += settings.hop_samples
     return transform
 
 
-def _block(unit: Unit, samples: FloatArray, index: int, speed_rpm: float) -> SampleBlock:
-    return SampleBlock(
-        unit=unit.id,
-        epoch=1,
-        first_index=index,
-        start_ns=ns_from_s(index / RATE_HZ),
-        rate_hz=RATE_HZ,
-        samples=samples.astype(np.float32),
-        channel_quality=(GOOD,) * len(unit.channels),
-        slow={"speed": Reading(speed_rpm)},
-    )
-
-
 def _of_bearing(
-    unit: Unit, bearing: Bearing, run: Run, transform: SegmentTransform
+    unit: Unit, bearing: Bearing, scenario: Scenario, transform: SegmentTransform
 ) -> BearingSpectra:
     ids = [channel.id for channel in unit.channels]
     rows = [ids.index(id_) for id_ in bearing.channels]
     segments = list(transform.segments)
-    usable = np.ones((len(segments), len(rows)), dtype=bool)
+    usable = np.array([s.usable[rows] for s in segments])
     orders_hz = np.array([s.order_frequency_hz for s in segments])
     bins = np.array([s.bin_phasors_um_pk[rows] for s in segments])
     orders = np.array([s.order_phasors_um_pk[rows] for s in segments])
@@ -282,7 +248,20 @@ def _of_bearing(
     return BearingSpectra(
         bins=average(transform.frequency_hz, bins, usable),
         orders=average(orders_hz.mean(axis=0), orders, usable),
-        film=run.scenario.bearings[bearing.id].film,
+        film=scenario.bearings[bearing.id].film,
         bracket=BracketDynamics(bearing.bracket_stiffness_n_per_m, model.mass_kg),
         turn_hz=(float(orders_hz[:, 0].min()), float(orders_hz[:, 0].max())),
+        order1_um_pk=_order1_um_pk(scenario, bearing.id),
     )
+
+
+def _order1_um_pk(scenario: Scenario, bearing: str) -> FloatArray:
+    films = {name: b.film for name, b in scenario.bearings.items()}
+    rotor, speed_rpm = scenario.true_rotor, scenario.speed_rpm
+    force_n = unbalance_force_n(scenario.unbalance_grade_mm_s, speed_rpm)
+    force = forward_force(rotor, ForcePlane.MASS_CENTRE, force_n)
+    matrices = rotor_matrices(rotor, films, speed_rpm)
+    amplitude: FloatArray = 1e6 * np.abs(
+        bearing_response(rotor, matrices, speed_rpm / 60.0, force)[bearing]
+    )
+    return amplitude

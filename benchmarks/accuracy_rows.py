@@ -30,6 +30,8 @@ class Required:
         Shell pattern over ``dynamic k_xx`` and the like.
     mean, scatter
         Relative error of the mean, and standard deviation, over the runs.
+    worst
+        Largest error of any run.
     coverage, random_coverage
         Share of runs whose interval holds the truth.
     silent
@@ -39,6 +41,7 @@ class Required:
     figure: str
     mean: float | None = None
     scatter: float | None = None
+    worst: float | None = None
     coverage: tuple[float, float] | None = None
     random_coverage: tuple[float, float] | None = None
     silent: bool = False
@@ -57,6 +60,7 @@ class Row:
     limits: LineLimits = field(default_factory=LineLimits)
     response: Response | None = None
     c_over_k_xx: bool = False
+    amplitudes: bool = False
     n_runs: int = 200
 
     def limits_of(self, figure: str) -> Required:
@@ -131,6 +135,7 @@ HONEST = Required("dynamic *", coverage=(0.90, 1.0))
 """95 %, less three times the 1.5 % by which chance moves the share of 200 runs."""
 
 SHAFT_AT_VORTEX_UM_PK = 68.0
+CORNER = HighPass(0.5)
 
 
 def _vortex() -> Run:
@@ -145,7 +150,7 @@ def _vortex() -> Run:
         forward_force(scenario.rotor, ForcePlane.RUNNER, 1.0),
     )["UJB"]
     force_n = SHAFT_AT_VORTEX_UM_PK * 1e-6 / abs(per_newton[0])
-    transducers = replace(REALISTIC, accelerometer_ug_per_rthz=1.0, corner_hz=0.5)
+    transducers = replace(REALISTIC, accelerometer_ug_per_rthz=1.0, response=CORNER)
     return Run(replace(scenario, rope=VortexRope(force_n)), transducers, duration_s=20 * MINUTE_S)
 
 
@@ -153,6 +158,15 @@ def _coverage(transducers: Transducers, bracket_half_width: float) -> Run:
     """Film of 1 GN/m, unbalance for the lines, hydraulic noise for the rest; no runout."""
     scenario = _scenario(_same(_isotropic(1.0)), 4.25, HydraulicNoise(20e3, 20.0))
     return Run(scenario, transducers, bracket_half_width=bracket_half_width)
+
+
+def _any_speed() -> Run:
+    scenario = _scenario(_same(_isotropic(1.0)), 4.25, HydraulicNoise())
+    return Run(
+        replace(scenario, speed_wander=0.003),
+        replace(REALISTIC, runout_um_pk=(), accelerometer_ug_per_rthz=1.0),
+        speed_rpm=(60.0, 150.0),
+    )
 
 
 NO_RUNOUT = replace(REALISTIC, runout_um_pk=())
@@ -169,7 +183,7 @@ def _still(grade_mm_s: float, transducers: Transducers, force_kn: float = 0.0) -
 def _dead_probe() -> Run:
     return _still(
         BALANCED_GRADE_MM_S,
-        replace(REALISTIC, dead=("UJB_ux", "LJB_ux", "TJB_ux")),
+        replace(REALISTIC, blind=("UJB_ux", "LJB_ux", "TJB_ux")),
         force_kn=20.0,
     )
 
@@ -203,10 +217,17 @@ ROWS = {
         (Required("transfer vortex *", mean=0.015), Required("dynamic k_??", mean=0.015)),
         bearings=("UJB", "LJB"),
         lines=("vortex",),
-        response=HighPass(0.5),
+        response=CORNER,
     ),
     "corner-uncorrected": Row(
         "the same, not corrected", _vortex(), (), bearings=("UJB", "LJB"), lines=("vortex",)
+    ),
+    "speed": Row(
+        "60 to 150 r/min, wandering by 0.3 %, 1 µg/√Hz: amplitudes at 1×",
+        _any_speed(),
+        (Required("amplitude *", worst=0.01),),
+        lines=(),
+        amplitudes=True,
     ),
     "coverage": Row(
         "gains from ±5 %, brackets from ±10 %",
