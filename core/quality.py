@@ -32,6 +32,12 @@ class Reason(StrEnum):
     INSUFFICIENT_EXCITATION = "insufficient_excitation"
     POOR_FIT = "poor_fit"
     SWITCHED_OFF = "switched_off"
+    DEAD = "dead"
+    STUCK = "stuck"
+    SWAPPED_AXES = "swapped_axes"
+    SPEED_IMPLAUSIBLE = "speed_implausible"
+    NON_STATIONARY = "non_stationary"
+    REDUCED_PROBES = "reduced_probes"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,198 @@
+"""What a record itself says about the transducers and the operation it comes from.
+
+Clipping and OK limits are judged on counts and volts, before calibration; what is judged here
+shows only in a whole segment or in all that are averaged.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
+
+N_PIECES = 8
+"""Pieces of a segment, so that a transducer that stopped in its middle is seen at once."""
+
+
+@dataclass(frozen=True)
+class SensorLimits:
+    """What counts as a failure.
+
+    Parameters
+    ----------
+    min_counts_rms
+        A channel of a turning machine that varies less over an eighth of a segment than this many
+        counts of its converter is dead or stuck; a last count that flickers has 0.8.
+    dead_counts
+        Greatest mean in counts of a channel that gives no voltage at all.
+    max_backward_share
+        Share of an orbit's 1× power that may turn against the shaft: 0 in a circle, 0.5 on a
+        straight line, 1 in a circle whose x and y are swapped.
+    max_speed_fraction
+        Running speed over rated speed that no turbine reaches, not even running away.
+    speed_tolerance
+        Relative difference of speed channel and 1× line.
+    max_speed_change, max_power_change
+        Relative spread over the averaging time, greatest minus least value.
+    min_power_change_mw
+        A smaller spread of power is none.
+    """
+
+    min_counts_rms: float = 1.0
+    dead_counts: float = 3.0
+    max_backward_share: float = 0.7
+    max_speed_fraction: float = 2.5
+    speed_tolerance: float = 0.02
+    max_speed_change: float = 0.02
+    max_power_change: float = 0.1
+    min_power_change_mw: float = 10.0
+
+
+DEFAULT_LIMITS = SensorLimits()
+
+
+def quietest_rms(samples: FloatArray) -> FloatArray:
+    """Least standard deviation of each channel over pieces of a segment.
+
+    Parameters
+    ----------
+    samples : (n_channels, n_samples)
+        At least `N_PIECES` samples.
+
+    Returns
+    -------
+    (n_channels,) in the channels' own units.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer samples than pieces.
+    """
+    n_channels, n_samples = samples.shape
+    length = n_samples // N_PIECES
+    if length == 0:
+        raise ValueError(f"needs {N_PIECES} samples or more, got {n_samples}")
+    # from the end, so that the newest sample is always looked at
+    pieces = samples[:, n_samples - N_PIECES * length :].reshape(n_channels, N_PIECES, length)
+    quietest: FloatArray = pieces.std(axis=2, dtype=np.float64).min(axis=1)
+    return quietest
+
+
+def signal_quality(
+    rms: float, mean: float, unit_per_count: float, turning: bool, limits: SensorLimits
+) -> Quality:
+    """Whether a channel moves at all while the machine turns.
+
+    Parameters
+    ----------
+    rms, mean
+        Least standard deviation (:func:`quietest_rms`) and mean of a segment, channel's unit.
+    unit_per_count
+        The channel's unit per count of its converter, of either sign; zero where it is not known,
+        and then only a signal without any change at all is a failure.
+    turning
+        At standstill nothing need move, and nothing is judged.
+    """
+    count = abs(unit_per_count)
+    if not turning or rms > limits.min_counts_rms * count:
+        return GOOD
+    return bad(Reason.DEAD if abs(mean) <= limits.dead_counts * count else Reason.STUCK)
+
+
+def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
+    """Share of an orbit's power that turns from y to x, against the positive sense.
+
+    With the orbit z = x + iy split into forward and backward circles F and B, |F|² and |B|² are
+    (S_xx + S_yy ± 2 Im S_xy) / 4. It needs no phase reference, and averages like the spectra do.
+
+    Parameters
+    ----------
+    power_x, power_y
+        Mean of |X|² and |Y|² at the line.
+    cross_xy
+        Mean of X · conj(Y).
+
+    Returns
+    -------
+    0 to 1; 0.5 when nothing moves.
+    """
+    total = power_x + power_y
+    if total <= 0.0:
+        return 0.5
+    return float(np.clip(0.5 - cross_xy.imag / total, 0.0, 1.0))
+
+
+def axes_quality(share: float, rotation_sense: int, limits: SensorLimits) -> Quality:
+    """Whether the 1× orbit of a pair of transducers turns with the shaft.
+
+    Unbalance and runout turn with it, whatever the film; an orbit that turns against it has most
+    likely its x and y swapped. Stiffness anisotropy can do it too, between two critical speeds, so
+    that it is no more than a doubt. To be asked only where the line stands out.
+
+    Parameters
+    ----------
+    share
+        From :func:`backward_share`.
+    rotation_sense
+        +1 if the shaft turns from x to y, -1 if it turns from y to x.
+    """
+    against = share if rotation_sense > 0 else 1.0 - share
+    return uncertain(Reason.SWAPPED_AXES) if against > limits.max_backward_share else GOOD
+
+
+def checked_speed(
+    measured: Reading, line_rpm: float | None, rated_rpm: float, limits: SensorLimits
+) -> Reading:
+    """Speed reading as far as it can be true.
+
+    Parameters
+    ----------
+    measured
+        From the speed channel, r/min.
+    line_rpm
+        Speed that the 1× line shows, where it stands out of its surroundings.
+
+    Returns
+    -------
+    The reading itself; doubted where the line says otherwise; missing where no machine turns like
+    that.
+    """
+    if measured.value is None:
+        return measured
+    fraction = measured.value / rated_rpm
+    if not 0.0 <= fraction <= limits.max_speed_fraction:
+        return missing(Reason.SPEED_IMPLAUSIBLE)
+    if line_rpm is None or abs(measured.value / line_rpm - 1.0) <= limits.speed_tolerance:
+        return measured
+    return Reading(measured.value, uncertain(Reason.SPEED_IMPLAUSIBLE))
+
+
+def stationarity(speed_rpm: FloatArray, power_mw: FloatArray, limits: SensorLimits) -> Quality:
+    """Whether speed and load stood still while the averaged segments were recorded.
+
+    Parameters
+    ----------
+    speed_rpm, power_mw : (n_segments,)
+        Mean of each segment; not a number where it was not measured.
+    """
+    speed, power = _spread(speed_rpm), _spread(power_mw)
+    if speed.change > limits.max_speed_change * speed.mean:
+        return uncertain(Reason.NON_STATIONARY)
+    if power.change > max(limits.max_power_change * power.mean, limits.min_power_change_mw):
+        return uncertain(Reason.NON_STATIONARY)
+    return GOOD
+
+
+@dataclass(frozen=True)
+class _Spread:
+    mean: float = 0.0
+    change: float = 0.0
+
+
+def _spread(values: FloatArray) -> _Spread:
+    known = [value for value in values.tolist() if math.isfinite(value)]
+    if not known:
+        return _Spread()
+    return _Spread(abs(sum(known) / len(known)), max(known) - min(known))

@@ -1,0 +1,127 @@
+"""What a record says about its transducers and its operation."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
+from core.sensor_checks import (
+    DEFAULT_LIMITS,
+    axes_quality,
+    backward_share,
+    checked_speed,
+    quietest_rms,
+    signal_quality,
+    stationarity,
+)
+
+RANDOM = np.random.default_rng(5)
+MM_S_PER_COUNT = 10.0 / 32768
+N_SAMPLES = 8192
+
+
+def judged(samples: npt.NDArray[np.floating], turning: bool = True) -> Quality:
+    counts = np.rint(samples / MM_S_PER_COUNT) * MM_S_PER_COUNT
+    rms = float(quietest_rms(counts[np.newaxis])[0])
+    return signal_quality(rms, float(counts.mean()), MM_S_PER_COUNT, turning, DEFAULT_LIMITS)
+
+
+def test_a_healthy_channel_moves_by_more_than_a_count() -> None:
+    time_s = np.arange(N_SAMPLES) / 600.0
+    assert judged(0.002 * np.sin(2 * np.pi * 1.538 * time_s)) == GOOD
+    assert judged(0.001 * RANDOM.standard_normal(N_SAMPLES)) == GOOD
+
+
+def test_a_channel_that_flickers_by_a_count_is_stuck_and_one_at_zero_volts_is_dead() -> None:
+    flicker = MM_S_PER_COUNT * RANDOM.integers(-1, 2, N_SAMPLES)
+    assert judged(flicker + 0.5) == bad(Reason.STUCK)
+    assert judged(flicker) == bad(Reason.DEAD)
+    assert judged(np.zeros(N_SAMPLES)) == bad(Reason.DEAD)
+    assert judged(flicker + 0.5, turning=False) == GOOD
+
+
+@pytest.mark.parametrize("from_sample", [1000, 4000, 7168])
+def test_a_channel_that_stops_within_a_segment_is_seen_in_that_segment(from_sample: int) -> None:
+    signal = 0.1 * RANDOM.standard_normal(N_SAMPLES)
+    signal[from_sample:] = signal[from_sample]
+    assert judged(signal).reason is not Reason.OK
+
+
+def test_without_a_known_resolution_only_perfect_silence_is_a_failure() -> None:
+    assert signal_quality(0.0, 5.0, 0.0, True, DEFAULT_LIMITS) == bad(Reason.STUCK)
+    assert signal_quality(0.0, 0.0, 0.0, True, DEFAULT_LIMITS) == bad(Reason.DEAD)
+    assert signal_quality(1e-9, 5.0, 0.0, True, DEFAULT_LIMITS) == GOOD
+
+
+def test_a_negative_sensitivity_is_judged_by_its_size() -> None:
+    assert signal_quality(0.1, 1900.0, -0.15, True, DEFAULT_LIMITS) == bad(Reason.STUCK)
+    assert signal_quality(0.2, 1900.0, -0.15, True, DEFAULT_LIMITS) == GOOD
+
+
+def test_too_few_samples_for_a_judgement_are_refused() -> None:
+    with pytest.raises(ValueError, match="needs 8 samples or more, got 7"):
+        quietest_rms(np.zeros((1, 7)))
+
+
+def share(x: complex, y: complex) -> float:
+    return backward_share(abs(x) ** 2, abs(y) ** 2, x * y.conjugate())
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "expected"),
+    [(1, -1j, 0.0), (1, 1j, 1.0), (1, 1, 0.5), (1, 0, 0.5), (0, 0, 0.5), (2, -1j, 0.1)],
+)
+def test_the_share_of_an_orbit_that_turns_backward(x: complex, y: complex, expected: float) -> None:
+    turned = np.exp(0.7j)
+    assert share(x, y) == pytest.approx(expected)
+    assert share(x * turned, y * turned) == pytest.approx(expected)
+
+
+def test_swapped_axes_turn_an_orbit_against_the_shaft() -> None:
+    forward, swapped = share(2, -1j), share(-1j, 2)
+    assert axes_quality(forward, 1, DEFAULT_LIMITS) == GOOD
+    assert axes_quality(swapped, 1, DEFAULT_LIMITS) == uncertain(Reason.SWAPPED_AXES)
+    assert axes_quality(swapped, -1, DEFAULT_LIMITS) == GOOD
+    assert axes_quality(forward, -1, DEFAULT_LIMITS) == uncertain(Reason.SWAPPED_AXES)
+    assert axes_quality(share(1, 0.2), 1, DEFAULT_LIMITS) == GOOD
+
+
+@pytest.mark.parametrize("speed_rpm", [-5.0, 300.0, 65535.0])
+def test_a_speed_no_turbine_reaches_is_no_speed(speed_rpm: float) -> None:
+    checked = checked_speed(Reading(speed_rpm), None, 92.3, DEFAULT_LIMITS)
+    assert checked == missing(Reason.SPEED_IMPLAUSIBLE)
+
+
+def test_a_speed_channel_that_contradicts_the_1x_line_is_doubted() -> None:
+    told = Reading(92.3)
+    assert checked_speed(told, 92.0, 92.3, DEFAULT_LIMITS) == told
+    assert checked_speed(told, None, 92.3, DEFAULT_LIMITS) == told
+    doubted = checked_speed(told, 88.0, 92.3, DEFAULT_LIMITS)
+    assert doubted == Reading(92.3, uncertain(Reason.SPEED_IMPLAUSIBLE))
+
+
+def test_a_speed_that_is_missing_stays_missing_for_its_own_reason() -> None:
+    nothing = missing(Reason.NOT_MEASURED)
+    assert checked_speed(nothing, 92.3, 92.3, DEFAULT_LIMITS) == nothing
+
+
+STILL = np.full(24, 92.3)
+FULL = np.full(24, 700.0)
+
+
+def test_ordinary_wander_of_speed_and_load_is_stationary() -> None:
+    swing = np.sin(np.arange(24.0))
+    assert stationarity(92.3 * (1 + 0.003 * swing), FULL + 8 * swing, DEFAULT_LIMITS) == GOOD
+    assert stationarity(STILL, 2.0 * swing, DEFAULT_LIMITS) == GOOD
+    assert stationarity(np.full(24, math.nan), np.full(24, math.nan), DEFAULT_LIMITS) == GOOD
+    assert stationarity(np.array([]), np.array([]), DEFAULT_LIMITS) == GOOD
+
+
+def test_a_load_change_or_a_run_down_is_not_stationary() -> None:
+    moved = uncertain(Reason.NON_STATIONARY)
+    assert stationarity(STILL, np.linspace(320.0, 400.0, 24), DEFAULT_LIMITS) == moved
+    assert stationarity(np.linspace(92.3, 80.0, 24), FULL, DEFAULT_LIMITS) == moved
+    some = np.array([math.nan, 700.0, 500.0])
+    assert stationarity(STILL, some, DEFAULT_LIMITS) == moved
