@@ -22,6 +22,7 @@ from core.quality import (
     worst,
 )
 from core.segments import ORDER1, VORTEX, Segment
+from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
 from core.shaft_centre import shaft_centre
 from core.uncertainty import Budget
@@ -67,6 +68,8 @@ class BearingResults:
         self._bins = np.array([segment.bin_phasors_um_pk[self._rows] for segment in segments])
         self.spectrum = average(frequency_hz, self._bins, self._usable)
         self._orders = self._average_orders()
+        axes_quality = self._order_line(ORDER1).axes_quality(unit.rotation_sense)
+        self._doubts = worst((self._steadiness(), axes_quality))
         self.n_segments = int(self._whole.sum())
         self.coverage = self.n_segments / n_expected
         self.budgets: Mapping[str, Budget] = {}
@@ -140,15 +143,19 @@ class BearingResults:
             ]
         )
 
+    def _steadiness(self) -> Quality:
+        """Whether speed and load stood still over the averaging window."""
+        power = self._unit.power_channel
+        speeds = [segment.speed.rpm for segment in self._segments]
+        powers = [segment.slow[power] for segment in self._segments] if power else []
+        return stationarity(_numbers(speeds), _numbers(powers), self._settings.sensors)
+
+    def _order_line(self, line: int) -> OrderLine:
+        read = self._line_quality if line == ORDER1 or self._unit.has_vortex else _switched_off
+        return OrderLine(self._bearing, self._settings, self._orders, self.spectrum, line, read)
+
     def _order(self, prefix: str, line: int) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
-        order = OrderLine(
-            self._bearing,
-            self._settings,
-            self._orders,
-            self.spectrum,
-            line,
-            self._line_quality if line == ORDER1 or self._unit.has_vortex else _switched_off,
-        )
+        order = self._order_line(line)
         stiffness, budgets = order.stiffness()
         readings = {f"{name}_um_pk": reading for name, reading in order.amplitudes().items()}
         readings |= {"frequency_hz": self._frequency(line), "roundness": order.roundness()}
@@ -191,7 +198,9 @@ class BearingResults:
         """Quality of what is read off a line of these channels, or the reason why nothing is."""
         newest = self._segments[-1]
         rows = [self._rows[place] for place in places]
-        now = worst([newest.speed.rpm.quality, *(newest.channel_quality[row] for row in rows)])
+        now = worst(
+            [newest.speed.rpm.quality, self._doubts, *(newest.channel_quality[row] for row in rows)]
+        )
         if newest.speed.rpm.value is None or not newest.usable[rows].all():
             return missing(now.reason)
         n_segments = int(self._orders.n_segments[places[0], places[-1]])
@@ -200,6 +209,10 @@ class BearingResults:
         if self.coverage < self._settings.min_coverage:
             return worst([now, uncertain(Reason.LOW_COVERAGE)])
         return now
+
+
+def _numbers(readings: Sequence[Reading]) -> FloatArray:
+    return np.array([np.nan if r.value is None else r.value for r in readings])
 
 
 def _switched_off(*places: int) -> Reading:  # noqa: ARG001  the same whatever is asked for

@@ -8,9 +8,10 @@ import numpy as np
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.excitation import LineLimits, line_excitation
 from core.machine import Bearing
-from core.quality import Quality, Reading, Reason, missing
+from core.quality import Quality, Reading, Reason, missing, worst
 from core.ratio import effective_stiffness_n_per_m
 from core.segments import ORDER1, VORTEX
+from core.sensor_checks import axes_quality, backward_share
 from core.settings import AnalysisSettings
 from core.spectral_statistics import independent_segments
 from core.stiffness_budget import ratio_budget, transfer_budgets
@@ -70,6 +71,20 @@ class OrderLine:
     def amplitudes(self) -> dict[str, Reading]:
         """Amplitude of each channel, by name."""
         return {name: self._amplitude(place) for name, place in AMPLITUDES.items()}
+
+    def axes_quality(self, rotation_sense: int) -> Quality:
+        """Whether shaft and bearing whirl with the rotation, where their line stands out."""
+        limits = self.settings.sensors
+        return worst(
+            axes_quality(self._backward_share(x, y), rotation_sense, limits)
+            for x, y in ((SHAFT_X, SHAFT_Y), (BEARING_X, BEARING_Y))
+            if self.orders.n_segments[x, y] and self._stands_out(x) and self._stands_out(y)
+        )
+
+    def _backward_share(self, x: int, y: int) -> float:
+        power = self.orders.power[self.line]
+        cross = complex(self.orders.matrix[self.line, x, y])
+        return backward_share(float(power[x, y]), float(power[y, x]), cross)
 
     def roundness(self) -> Reading:
         """How round the shaft's orbit is at the line, and in which sense."""

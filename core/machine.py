@@ -29,12 +29,15 @@ class Channel:
         probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1.
     response
         How the transducer changes the signal with frequency; none if it does not.
+    unit_per_count
+        The channel's unit per count of its converter; zero where it is not known.
     """
 
     id: str
     measurand: Measurand
     direction: int = 1
     response: Response | None = None
+    unit_per_count: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,8 @@ class Unit:
 
     Parameters
     ----------
+    rotation_sense
+        +1 if the shaft turns from x to y, -1 if it turns from y to x.
     has_vortex
         Whether a part-load vortex can occur: in Francis turbines, not in Kaplan turbines.
     """
@@ -121,4 +126,5 @@ class Unit:
     bearings: tuple[Bearing, ...]
     speed_channel: str | None = None
     power_channel: str | None = None
+    rotation_sense: int = 1
     has_vortex: bool = True

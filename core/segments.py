@@ -11,8 +11,9 @@ from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import average
 from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
-from core.quality import Level, Quality, Reading, Reason, bad
+from core.quality import Level, Quality, Reading, Reason, bad, worst
 from core.ring import Window
+from core.sensor_checks import quietest_rms, signal_quality
 from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
 from core.transducers import displacement_factor
@@ -56,7 +57,7 @@ class Segment:
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
         """(n_channels,) whether each channel may be believed."""
-        return np.array([quality.level is not Level.BAD for quality in self.channel_quality])
+        return _usable(self.channel_quality)
 
 
 class SegmentTransform:
@@ -95,8 +96,10 @@ class SegmentTransform:
         samples = np.where(finite[:, np.newaxis], window.samples, 0.0).astype(np.float64)
         prepared = tapered(samples)
         bins = bin_phasors(prepared, self.frequency_hz.size) * self._bin_factor
-        usable = np.array([q.level is not Level.BAD for q in quality])
-        speed, order_hz = self._orders(window, bins, usable)
+        mean = samples.mean(axis=1)
+        speed = self._speed(window, bins, _usable(quality))
+        quality = self._judged(quality, samples, mean, turning=speed.rpm.value is not None)
+        order_hz = self._order_frequencies(speed, bins, _usable(quality))
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
@@ -104,7 +107,7 @@ class SegmentTransform:
             stop_ns=window.stop_ns,
             channel_quality=quality,
             slow=window.slow,
-            mean=samples.mean(axis=1),
+            mean=mean,
             speed=speed,
             bin_phasors_um_pk=bins,
             order_frequency_hz=order_hz,
@@ -120,16 +123,30 @@ class SegmentTransform:
         while self.segments[0].first_index <= segment.first_index - span:
             self.segments.popleft()
 
-    def _orders(
-        self, window: Window, bins: ComplexArray, usable: npt.NDArray[np.bool_]
-    ) -> tuple[Speed, FloatArray]:
-        """Measure the speed, and locate the two order lines with it."""
-        newest = _power(bins, usable & self._is_shaft)
-        speed = running_speed(
-            self._unit, window.slow, self.frequency_hz, newest, self._settings.min_speed_fraction
+    def _judged(
+        self,
+        quality: tuple[Quality, ...],
+        samples: FloatArray,
+        mean: FloatArray,
+        *,
+        turning: bool,
+    ) -> tuple[Quality, ...]:
+        """Take out channels that do not move although the machine turns."""
+        moved = zip(self._unit.channels, quietest_rms(samples), mean, strict=True)
+        return tuple(
+            worst((q, signal_quality(rms, at, c.unit_per_count, turning, self._settings.sensors)))
+            for q, (c, rms, at) in zip(quality, moved, strict=True)
         )
+
+    def _speed(self, window: Window, bins: ComplexArray, usable: npt.NDArray[np.bool_]) -> Speed:
+        power = _power(bins, usable & self._is_shaft)
+        return running_speed(self._unit, window.slow, self.frequency_hz, power, self._settings)
+
+    def _order_frequencies(
+        self, speed: Speed, bins: ComplexArray, usable: npt.NDArray[np.bool_]
+    ) -> FloatArray:
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
-        return speed, np.array([turn_hz, self._vortex_hz(turn_hz, bins, usable)])
+        return np.array([turn_hz, self._vortex_hz(turn_hz, bins, usable)])
 
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
@@ -150,6 +167,10 @@ class SegmentTransform:
             for rows in self._bearing_rows
         ]
         return vortex_frequency_hz(spectra, band_hz) or self._settings.vortex_order * turn_hz
+
+
+def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
+    return np.array([quality.level is not Level.BAD for quality in qualities])
 
 
 def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:

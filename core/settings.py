@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from core.dynamic_settings import DynamicSettings
+from core.sensor_checks import SensorLimits
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class AnalysisSettings:
         Bearing amplitude of a line below which equation (5) and `transfer` say nothing: at 1× of
         92.3 r/min, 4 µm are 0.04 mV of a 1000 mV/g accelerometer. The paper's balanced machine
         (Table 8), whose figures it calls unreliable, has 1.9 to 3.4 µm.
+    sensors
+        What counts as a failed transducer or an unsteady record.
     dynamic
         How all eight coefficients are sought.
     min_speed_fraction
@@ -55,6 +58,7 @@ class AnalysisSettings:
     min_coverage: float = 0.5
     min_bearing_um_pk: float = 4.0
     min_speed_fraction: float = 0.2
+    sensors: SensorLimits = field(default_factory=SensorLimits)
     dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 
     @property

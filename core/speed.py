@@ -4,14 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from core.arrays import FloatArray
 from core.lines import peak_frequency_hz
 from core.machine import Unit
 from core.quality import Reading, Reason, missing, uncertain
+from core.sensor_checks import checked_speed
+from core.settings import AnalysisSettings
 from core.units import hz_from_rpm, rpm_from_hz
 
 LINE_SEARCH = (0.85, 1.15)
-"""Where the 1× line is looked for without a speed channel, in multiples of the rated speed."""
+"""Where the 1× line is looked for, in multiples of the speed that is expected."""
 
 
 class SpeedSource(StrEnum):
@@ -35,9 +39,12 @@ def running_speed(
     slow: Mapping[str, Reading],
     frequency_hz: FloatArray,
     shaft_power: FloatArray,
-    min_speed_fraction: float,
+    settings: AnalysisSettings,
 ) -> Speed:
     """Take the best speed there is: the speed channel, else the 1× line, else the rated value.
+
+    A speed channel that the 1× line contradicts is doubted; one that no machine reaches is not
+    used.
 
     Parameters
     ----------
@@ -45,18 +52,36 @@ def running_speed(
         Slow readings of the same time.
     frequency_hz, shaft_power : (n_lines,)
         Power of the shaft channels together, in which the 1× line is looked for.
-    min_speed_fraction
-        Share of the rated speed below which the machine counts as standing.
     """
     measured = slow.get(unit.speed_channel) if unit.speed_channel else None
     if measured is not None and measured.value is not None:
-        if measured.value < min_speed_fraction * unit.rated_speed_rpm:
+        if 0.0 <= measured.value < settings.min_speed_fraction * unit.rated_speed_rpm:
             return Speed(missing(Reason.STANDSTILL), SpeedSource.SLOW_CHANNEL)
-        return Speed(measured, SpeedSource.SLOW_CHANNEL)
-    rated_hz = hz_from_rpm(unit.rated_speed_rpm)
-    band_hz = (LINE_SEARCH[0] * rated_hz, LINE_SEARCH[1] * rated_hz)
-    line_hz = peak_frequency_hz(shaft_power, frequency_hz, band_hz)
+        line_rpm = _line_rpm(measured.value, frequency_hz, shaft_power, settings)
+        checked = checked_speed(measured, line_rpm, unit.rated_speed_rpm, settings.sensors)
+        if checked.value is not None:
+            return Speed(checked, SpeedSource.SLOW_CHANNEL)
     doubtful = uncertain(Reason.SPEED_UNKNOWN)
-    if line_hz is not None:
-        return Speed(Reading(rpm_from_hz(line_hz), doubtful), SpeedSource.LINE)
+    line_rpm = _line_rpm(unit.rated_speed_rpm, frequency_hz, shaft_power, settings)
+    if line_rpm is not None:
+        return Speed(Reading(line_rpm, doubtful), SpeedSource.LINE)
     return Speed(Reading(unit.rated_speed_rpm, doubtful), SpeedSource.RATED)
+
+
+def _line_rpm(
+    about_rpm: float,
+    frequency_hz: FloatArray,
+    shaft_power: FloatArray,
+    settings: AnalysisSettings,
+) -> float | None:
+    """Speed that a line near an expected one shows, if it stands above its surroundings."""
+    about_hz = hz_from_rpm(about_rpm)
+    band_hz = (LINE_SEARCH[0] * about_hz, LINE_SEARCH[1] * about_hz)
+    line_hz = peak_frequency_hz(shaft_power, frequency_hz, band_hz)
+    if line_hz is None:
+        return None
+    around = (frequency_hz > 0.5 * about_hz) & (frequency_hz < 1.5 * about_hz)
+    top = shaft_power[np.argmin(np.abs(frequency_hz - line_hz))]
+    if top <= settings.min_line_to_floor * np.median(shaft_power[around]):
+        return None
+    return rpm_from_hz(line_hz)

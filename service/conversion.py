@@ -6,6 +6,7 @@ from core.machine import Bearing, Channel, Unit
 from core.settings import AnalysisSettings
 from core.uncertainty import BearingAccuracy
 from core.usable_lines import LineSelection
+from service.settings.channels import ChannelSettings
 from service.settings.plant import AnalysisModel
 from service.settings.response import response_of
 from service.settings.units import BearingSettings, UnitSettings
@@ -23,7 +24,24 @@ def machine_of(settings: UnitSettings) -> Unit:
         bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
         speed_channel=settings.speed_channel,
         power_channel=settings.power_channel,
+        rotation_sense=1 if settings.rotation == "x_to_y" else -1,
         has_vortex=settings.turbine == "francis",
+    )
+
+
+def _channel(settings: ChannelSettings) -> Channel:
+    return Channel(
+        id=settings.id,
+        measurand=settings.measurand,
+        direction=settings.sign,
+        response=response_of(settings.response),
+        unit_per_count=_calibration(settings).unit_per_count,
+    )
+
+
+def _calibration(settings: ChannelSettings) -> ChannelCalibration:
+    return ChannelCalibration(
+        settings.full_scale_v, settings.unit_per_v, settings.ok_min_v, settings.ok_max_v
     )
 
 
@@ -49,10 +67,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
     return UnitCalibration(
         unit=settings.id,
         rate_hz=settings.rate_hz,
-        channels=tuple(
-            ChannelCalibration(c.full_scale_v, c.unit_per_v, c.ok_min_v, c.ok_max_v)
-            for c in settings.channel
-        ),
+        channels=tuple(_calibration(c) for c in settings.channel),
         slow=tuple(SlowCalibration(c.id, c.minimum, c.maximum) for c in settings.slow_channel),
     )
 

@@ -138,6 +138,10 @@ class UnitSettings(Settings):
     turbine: Literal["francis", "kaplan"] = "francis"
     """"francis" or "kaplan". A Kaplan turbine has no part-load vortex: that order is off."""
 
+    rotation: Literal["x_to_y", "y_to_x"] = "x_to_y"
+    """Which way the shaft turns, seen in the bearings' axes: "x_to_y" or "y_to_x". An orbit that
+    turns the other way is a sign of exchanged transducers."""
+
     speed_channel: Identifier | None = None
     """Slow channel (r/min) of the running speed; without it the 1× line is used."""
 
