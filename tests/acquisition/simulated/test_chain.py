@@ -89,6 +89,23 @@ def test_runout_passes_each_probe_in_turn_and_shakes_no_bearing(
     assert np.abs(runout[2:12]).max() == 0.0
 
 
+def test_a_bump_is_a_smaller_gap_and_a_shaft_that_seems_nearer(
+    machine: Unit, quiet: Scenario
+) -> None:
+    rough = with_bearing(quiet, runout_um_pk=(10.0,))
+    bare = replace(
+        machine, channels=(Channel("UJB_ux", Measurand.DISPLACEMENT_UM), *machine.channels[1:])
+    )
+
+    gap = readings(machine, rough)[0] - readings(machine, quiet)[0]
+    displacement = readings(bare, rough)[0] - readings(bare, quiet)[0]
+
+    # the plant has turned 25.6 times while it warmed up
+    turns = 25.6 + np.arange(gap.size) / TURN
+    assert gap == pytest.approx(-10.0 * np.cos(2 * np.pi * turns), abs=1e-9)
+    assert displacement == pytest.approx(-gap)
+
+
 def test_a_gain_error_leaves_the_reference_gap_as_it_is(machine: Unit, quiet: Scenario) -> None:
     wrong = {"UJB_ux": ChannelScenario(gain=1.05), "UJB_vy": ChannelScenario(gain=0.97)}
 
