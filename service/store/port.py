@@ -6,7 +6,8 @@ from typing import Protocol
 
 from core.account import Gap
 from core.assessment import Assessment
-from core.quality import Level
+from core.quality import Level, Reading
+from service.store.gap_reference import GapReference
 
 
 class StoreError(Exception):
@@ -80,6 +81,14 @@ class Trend:
     series: Mapping[str, TrendSeries]
 
 
+@dataclass(frozen=True)
+class StoredReadings:
+    """Readings of one bearing at one time; those of quantities that it was stored with."""
+
+    time_ns: int
+    readings: Mapping[str, Reading]
+
+
 class Store(Protocol):
     """Durable results. What `append` has returned from is on the disk."""
 
@@ -93,6 +102,22 @@ class Store(Protocol):
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> Sequence[Gap]:
         """Read the recorded gaps whose end lies in a range of time, oldest first."""
+        ...
+
+    def newest(self, unit: str, bearing: str) -> StoredReadings | None:
+        """Read the newest readings of a bearing; None if there are none."""
+        ...
+
+    def add_reference(self, reference: GapReference) -> None:
+        """Write a reference, which rules its bearing from now on; older ones are kept."""
+        ...
+
+    def references(self) -> Sequence[GapReference]:
+        """Read the reference that was set last for each bearing that has one."""
+        ...
+
+    def reference_history(self, unit: str, bearing: str) -> Sequence[GapReference]:
+        """Read what was ever set for a bearing, newest first; at most the newest thousand."""
         ...
 
     def close(self) -> None:

@@ -50,6 +50,27 @@ MIGRATIONS = (
     ALTER TABLE assessment ADD COLUMN estimator_xx TEXT;
     ALTER TABLE assessment ADD COLUMN estimator_yy TEXT;
     """,
+    """
+    CREATE TABLE gap_reference (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        unit TEXT NOT NULL,
+        bearing TEXT NOT NULL,
+        set_ns INTEGER NOT NULL,
+        author TEXT NOT NULL,
+        x_um REAL NOT NULL CHECK (x_um > 0 AND x_um <= 10000),
+        y_um REAL NOT NULL CHECK (y_um > 0 AND y_um <= 10000),
+        opposite_x_um REAL CHECK (opposite_x_um > 0 AND opposite_x_um <= 10000),
+        opposite_y_um REAL CHECK (opposite_y_um > 0 AND opposite_y_um <= 10000),
+        source TEXT NOT NULL CHECK (source IN ('given', 'measured')),
+        note TEXT NOT NULL,
+        CHECK ((opposite_x_um IS NULL) = (opposite_y_um IS NULL))
+    ) STRICT;
+    CREATE INDEX gap_reference_of ON gap_reference (unit, bearing, id);
+    CREATE TRIGGER gap_reference_kept_as_set BEFORE UPDATE ON gap_reference
+    BEGIN SELECT RAISE(ABORT, 'references are kept as they were set'); END;
+    CREATE TRIGGER gap_reference_kept BEFORE DELETE ON gap_reference
+    BEGIN SELECT RAISE(ABORT, 'references are kept'); END;
+    """,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -14,13 +14,17 @@ from core.quality import Level
 from core.quantities import CATALOGUE
 from service.store.buckets import Readings, bucket_width_ns, bucketed, single_points
 from service.store.codec import Layout, columns_of
+from service.store.gap_reference import GapReference
+from service.store.newest import select_newest
 from service.store.port import (
     QueryTooLargeError,
+    StoredReadings,
     StoreError,
     Trend,
     TrendQuery,
     UnitGap,
 )
+from service.store.references import insert_reference, select_history, select_in_force
 from service.store.schema import migrate
 
 MAX_ROWS = 1_000_000
@@ -114,6 +118,32 @@ class SqliteStore:
                 (unit, _storable(start_ns), _storable(end_ns)),
             )
             return [Gap(*row) for row in rows]
+
+    def newest(self, unit: str, bearing: str) -> StoredReadings | None:
+        """Read the newest readings of a bearing; None if there are none."""
+        with self._reader() as reader:
+            return select_newest(reader, unit, bearing)
+
+    def add_reference(self, reference: GapReference) -> None:
+        """Write a reference; durable when this returns.
+
+        Raises
+        ------
+        StoreError
+            If it was not written; the message is the database's.
+        """
+        with self._lock, self._renamed_errors(), self._transaction():
+            insert_reference(self._writer, reference)
+
+    def references(self) -> list[GapReference]:
+        """Read the reference that was set last for each bearing that has one."""
+        with self._reader() as reader:
+            return select_in_force(reader)
+
+    def reference_history(self, unit: str, bearing: str) -> list[GapReference]:
+        """Read what was ever set for a bearing, newest first."""
+        with self._reader() as reader:
+            return select_history(reader, unit, bearing)
 
     def _row(self, assessment: Assessment) -> tuple[object, ...]:
         values, qualities = self._layout.encode(assessment.readings)

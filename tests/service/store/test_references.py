@@ -1,0 +1,192 @@
+"""References are kept as they were set, and the one set last rules."""
+
+import math
+import sqlite3
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from core.assessment import Assessment
+from core.quality import Reading, Reason, missing, uncertain
+from service.store import schema, sqlite
+from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Assessment]
+At = Callable[[int], int]
+
+T0 = 1_767_225_600_000_000_000
+
+
+def reference(n: int = 0, **changes: object) -> GapReference:
+    given = GapReference(
+        "U1", "UJB", T0 + n, "A. Name", (1998.5 + n, 2003.1), None, ReferenceSource.GIVEN
+    )
+    return replace(given, **changes)  # type: ignore[arg-type]
+
+
+def test_a_reference_is_read_back_to_the_last_bit(store: SqliteStore) -> None:
+    written = [
+        reference(),
+        reference(
+            bearing="LJB",
+            author="Müller, Ö. (maintenance)",
+            gap_reference_um=(0.1 + 0.2, 10_000.0),
+            opposite_reference_um=(5e-324, 1999.0),
+            source=ReferenceSource.MEASURED,
+            note="after the overhaul; shaft wedged, 21 °C",
+        ),
+    ]
+    for each in written:
+        store.add_reference(each)
+
+    assert store.references() == sorted(written, key=lambda r: r.bearing)
+    assert [store.reference_history("U1", r.bearing) for r in written] == [[r] for r in written]
+
+
+def test_the_reference_set_last_rules_and_all_are_kept(store: SqliteStore) -> None:
+    for n in range(3):
+        store.add_reference(reference(n))
+        store.add_reference(reference(n, bearing="LJB"))
+        store.add_reference(reference(n, unit="U2"))
+
+    assert store.references() == [
+        reference(2, bearing="LJB"),
+        reference(2),
+        reference(2, unit="U2"),
+    ]
+    assert store.reference_history("U1", "UJB") == [reference(n) for n in (2, 1, 0)]
+    assert store.reference_history("U1", "TJB") == []
+
+
+def test_a_clock_that_was_put_back_makes_the_last_reference_no_older(store: SqliteStore) -> None:
+    store.add_reference(reference(1))
+    store.add_reference(reference(0))
+
+    assert store.references() == [reference(0)]
+    assert store.reference_history("U1", "UJB")[0] == reference(0)
+
+
+@pytest.mark.parametrize(
+    "change", ["UPDATE gap_reference SET x_um = 1.0", "DELETE FROM gap_reference"]
+)
+def test_nobody_rewrites_a_reference(store: SqliteStore, path: Path, change: str) -> None:
+    store.add_reference(reference())
+    connection = sqlite3.connect(path)
+    with pytest.raises(sqlite3.IntegrityError, match="references are kept"):
+        connection.execute(change)
+    connection.close()
+
+    assert store.references() == [reference()]
+
+
+def test_references_are_there_after_a_restart(path: Path) -> None:
+    for n in range(3):
+        store = SqliteStore(path)
+        store.add_reference(reference(n))
+        store.close()
+    store = SqliteStore(path)
+    assert store.reference_history("U1", "UJB") == [reference(n) for n in (2, 1, 0)]
+    store.close()
+
+
+def test_what_another_process_has_set_is_seen(store: SqliteStore, path: Path) -> None:
+    assert store.references() == []
+    other = SqliteStore(path)
+    other.add_reference(reference())
+    other.close()
+
+    assert store.references() == [reference()]
+
+
+def test_a_database_without_references_gets_room_for_them_and_keeps_its_data(
+    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as at_that_time:
+        at_that_time.setattr(schema, "MIGRATIONS", schema.MIGRATIONS[:2])
+        old = SqliteStore(path)
+        old.append([assessment(gap_x_um=1998.5)], [])
+        old.close()
+
+    new = SqliteStore(path)
+    new.add_reference(reference())
+    newest = new.newest("U1", "UJB")
+    in_force = new.references()
+    new.close()
+
+    assert in_force == [reference()]
+    assert newest is not None
+    assert newest.readings["gap_x_um"] == Reading(1998.5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"gap_reference_um": (math.nan, 2000.0)}, "gap x is nan µm, must be above 0 and at most"),
+        ({"gap_reference_um": (2000.0, 0.0)}, "gap y is 0 µm, must be above 0 and at most 10000"),
+        ({"gap_reference_um": (-1.0, 2000.0)}, "gap x is -1 µm"),
+        ({"gap_reference_um": (10_000.1, 2000.0)}, "gap x is 10000.1 µm"),
+        ({"gap_reference_um": (math.inf, 2000.0)}, "gap x is inf µm"),
+        ({"opposite_reference_um": (2000.0, math.nan)}, "opposite gap y is nan µm"),
+        ({"author": ""}, "author '' is empty"),
+        ({"author": "  "}, "author '  ' is empty"),
+        ({"author": "a" * 81}, "author has 81 characters, must be at most 80"),
+        ({"author": "A\nB"}, r"author 'A\\nB' must be printable characters on one line"),
+        ({"note": "n" * 501}, "note has 501 characters, must be at most 500"),
+        ({"note": "\x1b[2J"}, r"note '\\x1b\[2J' must be printable"),
+    ],
+)
+def test_a_reference_outside_its_limits_is_refused_with_value_and_limit(
+    changes: dict[str, object], said: str
+) -> None:
+    with pytest.raises(ValueError, match=said):
+        reference(**changes)
+
+
+def test_a_damaged_reference_is_an_error_of_the_store(store: SqliteStore, path: Path) -> None:
+    store.add_reference(reference())
+    connection = sqlite3.connect(path)
+    connection.execute(
+        "INSERT INTO gap_reference SELECT 7, unit, bearing, set_ns, '', x_um, y_um, NULL, NULL,"
+        " source, note FROM gap_reference"
+    )
+    connection.commit()
+    connection.close()
+
+    with pytest.raises(StoreError, match="unit U1 bearing UJB: author '' is empty"):
+        store.references()
+
+
+def test_the_newest_readings_come_with_their_qualities(
+    store: SqliteStore, assessment: Build, at: At
+) -> None:
+    doubtful = Reading(1998.5, uncertain(Reason.NON_STATIONARY))
+    store.append([assessment(at(2), gap_x_um=doubtful, gap_y_um=2003.1)], [])
+    store.append([assessment(at(1), gap_x_um=7.0)], [])
+    store.append([assessment(at(3), bearing="LJB", gap_x_um=8.0)], [])
+
+    newest = store.newest("U1", "UJB")
+
+    assert newest is not None
+    assert newest.time_ns == at(2)
+    assert newest.readings["gap_x_um"] == doubtful
+    assert newest.readings["gap_y_um"] == Reading(2003.1)
+    assert newest.readings["speed_rpm"] == missing(Reason.NOT_MEASURED)
+    assert set(newest.readings) == {quantity.name for quantity in sqlite.CATALOGUE}
+    assert store.newest("U2", "UJB") is None
+
+
+def test_only_the_newest_thousand_of_a_history_are_handed_out(store: SqliteStore) -> None:
+    with store._transaction():
+        store._writer.executemany(
+            "INSERT INTO gap_reference"
+            " VALUES (NULL,'U1','UJB',?,'A. Name',2000.0,2000.0,NULL,NULL,'given','')",
+            [(T0 + n,) for n in range(1001)],
+        )
+
+    history = store.reference_history("U1", "UJB")
+
+    assert (len(history), history[0].set_ns, history[-1].set_ns) == (1000, T0 + 1000, T0 + 1)
