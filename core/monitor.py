@@ -1,6 +1,7 @@
 """`UnitMonitor`: sample blocks of one unit in, assessments of its bearings out."""
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 
@@ -9,6 +10,8 @@ from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.bearing_results import BearingResults
 from core.blocks import SampleBlock
 from core.machine import Bearing, Unit
+from core.position_results import measured_growth
+from core.probe_axes import Growth
 from core.quality import worst
 from core.ring import Ring
 from core.segments import Segment, SegmentTransform
@@ -44,11 +47,32 @@ class UnitMonitor:
         self._first_start = 0
         self._n_voided = 0
         self._gaps: list[Gap] = []
+        self._growth: dict[str, Growth] = {}
 
     @property
     def account(self) -> SampleAccount:
         """Where every sample went that the unit's device offered."""
         return self._ring.account
+
+    def adopt(self, unit: Unit) -> None:
+        """Take a new description of the same unit, from the next assessment on.
+
+        Parameters
+        ----------
+        unit
+            The bearings' references, clearances and brackets may differ; what the segments that
+            are being averaged were made with may not.
+
+        Raises
+        ------
+        ValueError
+            If it does; the message says where, and gives both.
+        """
+        here, there = _fixed_parts(self.unit), _fixed_parts(unit)
+        for name, value in here.items():
+            if there[name] != value:
+                raise ValueError(f"{name} is {there[name]!r}, is {value!r} here")
+        self.unit = unit
 
     def drain_gaps(self) -> list[Gap]:
         """Hand over the gaps found since the last call, to be recorded."""
@@ -119,8 +143,12 @@ class UnitMonitor:
             segments,
             self._transform.frequency_hz,
             min(settings.n_segments, n_possible),
+            self._growth.get(bearing.id),
         )
         readings = results.readings
+        growth = measured_growth(readings)
+        if growth is not None:
+            self._growth[bearing.id] = growth
         n_samples = newest.stop_index - segments[0].first_index
         return Assessment(
             unit=self.unit.id,
@@ -157,6 +185,12 @@ class UnitMonitor:
         traces = signs * window.samples[rows]
         traces -= traces.mean(axis=1, keepdims=True)
         return OrbitTrace(window.start_ns, window.rate_hz, traces[0], traces[1])
+
+
+def _fixed_parts(unit: Unit) -> dict[str, object]:
+    """What stays as long as a monitor lives, by name."""
+    fixed: dict[str, object] = {field.name: getattr(unit, field.name) for field in fields(unit)}
+    return fixed | {"bearings": tuple((b.id, b.channels) for b in unit.bearings)}
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:
