@@ -6,11 +6,13 @@ import pytest
 from playwright.async_api import Page, expect
 
 BEARING = "#/units/U1/bearings/LJB"
-STIFFNESS = "[data-reading=order1_k_eff_xx_n_per_m] .number"
+STIFFNESS = "[data-reading=stiffness_xx_n_per_m] .number"
 A_NUMBER = re.compile(r"\d")
 LINK_MS = 60_000
 
-NO_NUMBER = "() => [...document.querySelectorAll('.number')].every(n => n.textContent === '—')"
+NO_NUMBER = """() => [...document.querySelectorAll('.number')].every(n => n.textContent === '—')
+    && [...document.querySelectorAll('.spread')].every(n => n.hidden)
+    && [...document.querySelectorAll('.interval')].every(n => n.textContent === '')"""
 
 AGE_ABOVE = """limit => {
     const words = document.querySelector('.source .data-age').textContent;

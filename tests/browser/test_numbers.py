@@ -8,11 +8,21 @@ from playwright.async_api import Page, Route, expect
 BEARING = "#/units/U1/bearings/UJB"
 A_NUMBER = re.compile(r"\d")
 HAS_STIFFNESS_MS = 60_000
-N_NUMBERS = 27
-"""Speed, power, oil, two gaps, four of the shaft centre, nine for each of two orders."""
+N_NUMBERS = 48
+"""Two preferred, seven of operation and gaps, four of the shaft centre, 13 for each of two orders
+(amplitudes, coherence, frequency, equation (5), transfer), and dynamic's 13 less two by axis."""
+
+WORDS = {
+    "dynamic": "dynamic",
+    "transfer_order1": "transfer at 1×",
+    "transfer_vortex": "transfer at vortex",
+    "ratio_order1": "equation (5) at 1×",
+    "ratio_vortex": "equation (5) at vortex",
+}
 
 DECIMALS = {
     "_n_per_m": (1e9, 3),
+    "_n_s_per_m": (1e6, 2),
     "_um_pk": (1, 2),
     "_um": (1, 2),
     "_rpm": (1, 2),
@@ -23,6 +33,11 @@ DECIMALS = {
     "_ratio": (1, 3),
     "_xx": (1, 3),
     "_yy": (1, 3),
+    "coherence_x": (1, 3),
+    "coherence_y": (1, 3),
+    "_lack_of_fit_x": (1, 2),
+    "_lack_of_fit_y": (1, 2),
+    "_n_lines": (1, 0),
 }
 
 
@@ -53,9 +68,25 @@ async def numbers_in(page: Page, selector: str) -> dict[str, str]:
     )
 
 
+async def spreads_in(page: Page, selector: str) -> dict[str, str]:
+    """Everything that stands behind a ± and can be seen."""
+    return await page.eval_on_selector_all(
+        f"{selector} [data-reading]:has(.spread:not([hidden]))",
+        "nodes => Object.fromEntries(nodes.map("
+        "node => [node.dataset.reading, node.querySelector('.spread').textContent]))",
+    )
+
+
+def spread(name: str, reading: dict) -> str:
+    value, uncertainty = reading["value"], reading["uncertainty"]
+    half = max(uncertainty["high_95"] - value, value - uncertainty["low_95"])
+    return f"± {shown(name, half)}"
+
+
 async def await_stiffness(page: Page) -> None:
-    number = page.locator("[data-reading=order1_k_eff_xx_n_per_m] .number").first
-    await expect(number).to_have_text(A_NUMBER, timeout=HAS_STIFFNESS_MS)
+    for name in ("stiffness_xx_n_per_m", "order1_k_eff_xx_n_per_m"):
+        number = page.locator(f"[data-reading={name}] .number").first
+        await expect(number).to_have_text(A_NUMBER, timeout=HAS_STIFFNESS_MS)
 
 
 async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(
@@ -70,10 +101,32 @@ async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(
     stiffness = page.locator("[data-reading=order1_k_eff_xx_n_per_m] .number")
     value = readings["order1_k_eff_xx_n_per_m"]["value"]
     await expect(stiffness).to_have_text(shown("order1_k_eff_xx_n_per_m", value))
-    numbers = await numbers_in(page, ".tiles")
+    numbers = await numbers_in(page, ".bearing")
     assert numbers == {name: shown(name, readings[name]["value"]) for name in numbers}
     assert len(numbers) >= N_NUMBERS
     await picture_of(page, "bearing")
+
+
+async def test_the_preferred_stiffness_states_its_interval_and_its_estimator(
+    running_plant, page
+) -> None:
+    await page.goto(running_plant.url + BEARING)
+    await await_stiffness(page)
+    overview = await freeze(page, running_plant.url)
+    latest = overview["units"][0]["bearings"][0]
+    await page.reload()
+    for axes in ("xx", "yy"):
+        name = f"stiffness_{axes}_n_per_m"
+        reading = latest["readings"][name]
+        tile = page.locator(f".preferred-axis:has([data-reading={name}])")
+        await expect(tile.locator(".number")).to_have_text(shown(name, reading["value"]))
+        low, high = (shown(name, reading["uncertainty"][end]) for end in ("low_95", "high_95"))
+        await expect(tile.locator(".interval")).to_have_text(f"95 %: {low} to {high},")
+        await expect(tile.locator(".estimator")).to_have_text(WORDS[latest["estimators"][axes]])
+    spreads = await spreads_in(page, ".bearing")
+    known = {name: r for name, r in latest["readings"].items() if r["uncertainty"]}
+    assert spreads == {name: spread(name, known[name]) for name in spreads}
+    assert {"stiffness_xx_n_per_m", "order1_k_eff_yy_n_per_m"} <= spreads.keys()
 
 
 async def test_the_overview_shows_the_numbers_of_every_bearing(
@@ -90,6 +143,13 @@ async def test_the_overview_shows_the_numbers_of_every_bearing(
         await expect(number).to_have_text(shown("order1_k_eff_yy_n_per_m", stiffness))
         for name, text in (await numbers_in(page, row)).items():
             assert text == shown(name, latest["readings"][name]["value"]), name
+        preferred = [f"stiffness_{axes}_n_per_m" for axes in ("xx", "yy")]
+        assert await spreads_in(page, row) == {
+            name: spread(name, latest["readings"][name]) for name in preferred
+        }
+        named = [WORDS[name] for name in latest["estimators"].values()]
+        origin = named[0] if len(set(named)) == 1 else f"xx {named[0]}, yy {named[1]}"
+        await expect(page.locator(f"{row} .preferred .from")).to_have_text(origin)
     await picture_of(page, "overview")
 
 

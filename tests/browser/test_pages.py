@@ -68,7 +68,7 @@ async def test_an_operator_needs_no_mouse(running_plant, page) -> None:
 
 
 async def focus_by_tab(page: Page, wanted: str) -> None:
-    for _ in range(30):
+    for _ in range(60):
         await page.keyboard.press("Tab")
         words = "document.activeElement.value || document.activeElement.textContent"
         if await page.evaluate(words) == wanted:

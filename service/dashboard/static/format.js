@@ -2,6 +2,7 @@
 
 const KINDS = [
   { name: /_n_per_m$/, scale: 1e9, decimals: 3, unit: "GN/m" },
+  { name: /_n_s_per_m$/, scale: 1e6, decimals: 2, unit: "MN·s/m" },
   { name: /_um_pk$/, scale: 1, decimals: 2, unit: "µm 0-pk" },
   { name: /_um$/, scale: 1, decimals: 2, unit: "µm" },
   { name: /_rpm$/, scale: 1, decimals: 2, unit: "r/min" },
@@ -10,6 +11,8 @@ const KINDS = [
   { name: /_deg$/, scale: 1, decimals: 1, unit: "°" },
   { name: /_hz$/, scale: 1, decimals: 4, unit: "Hz" },
   { name: /_ratio$|_coherence_/, scale: 1, decimals: 3, unit: "" },
+  { name: /_lack_of_fit_/, scale: 1, decimals: 2, unit: "" },
+  { name: /_n_lines$/, scale: 1, decimals: 0, unit: "" },
 ];
 
 /** Scale, decimals and unit that a quantity is shown with; its name carries its unit. */
@@ -25,10 +28,25 @@ export function formatFixed(value, decimals) {
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
-/** The digits of a reading, without unit. */
-export function formatQuantity(quantity, value) {
+/** The digits of a reading, without unit; `moreDecimals` for what is small beside it. */
+export function formatQuantity(quantity, value, moreDecimals = 0) {
   const kind = kindOf(quantity);
-  return formatFixed(value / kind.scale, kind.decimals);
+  return formatFixed(value / kind.scale, kind.decimals + moreDecimals);
+}
+
+/** From a value to the farther end of its 95 % interval, in the digits of its quantity: ± 0.098. */
+export function formatSpread(quantity, value, { low_95: low, high_95: high }) {
+  return `± ${formatQuantity(quantity, Math.max(high - value, value - low))}`;
+}
+
+/** The 95 % interval in the digits of its quantity: 0.592 to 0.788. */
+export function formatInterval(quantity, { low_95: low, high_95: high }) {
+  return `${formatQuantity(quantity, low)} to ${formatQuantity(quantity, high)}`;
+}
+
+/** A number of any size that has no quantity's name: three digits that count. */
+export function formatSignificant(value) {
+  return value.toPrecision(3).replace(/e\+?(-?)(\d+)$/, "·10^$1$2").replaceAll("-", "−");
 }
 
 /** Whole numbers in groups of three: 1 234 567. */

@@ -5,6 +5,9 @@ export const CURRENT_LIMIT_S = 10;
 
 const NOT_REACHABLE = { level: "bad", reason: "service_not_reachable" };
 
+/** What a bearing is without a current answer, beside its readings. */
+const NOTHING_KNOWN = { quality: NOT_REACHABLE, speed_source: null, estimators: { xx: null, yy: null } };
+
 /** Nothing has been heard yet. */
 export const SILENCE = { overview: null, heard: null, failure: null, failedSince: null };
 
@@ -56,12 +59,12 @@ function agedUnit(unit, silenceS, current) {
 
 function agedLatest(latest, silenceS, current) {
   const shown = { ...latest, age_s: aged(latest.age_s, silenceS) };
-  return current ? shown : { ...shown, quality: NOT_REACHABLE, speed_source: null, readings: withheld(latest.readings) };
+  return current ? shown : { ...shown, ...NOTHING_KNOWN, readings: withheld(latest.readings) };
 }
 
 function withheld(readings) {
   return Object.fromEntries(
-    Object.entries(readings).map(([name, reading]) => [name, { ...reading, value: null, ...NOT_REACHABLE }]),
+    Object.entries(readings).map(([name, reading]) => [name, { ...reading, value: null, uncertainty: null, ...NOT_REACHABLE }]),
   );
 }
 

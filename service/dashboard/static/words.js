@@ -15,6 +15,14 @@ const REASONS = {
   few_segments: ["short record", "Few segments have been averaged yet; the numbers scatter more."],
   low_coverage: ["gaps in the record", "Samples are missing in the averaged window."],
   insufficient_excitation: ["not enough excitation", "The motion is too small to tell stiffness from noise."],
+  poor_fit: ["poor fit", "One constant film does not explain the motion at all frequencies; see the lack of fit."],
+  switched_off: ["switched off", "This estimate is switched off for this bearing in the plant file."],
+  dead: ["no signal", "A transducer’s output rests at zero while the machine turns; its cable or supply may be broken."],
+  stuck: ["signal stuck", "A transducer’s output does not move while the machine turns."],
+  swapped_axes: ["x and y swapped?", "The shaft seems to whirl against its rotation: two probes may be exchanged."],
+  speed_implausible: ["speed implausible", "The measured speed does not agree with the vibration or with the rated speed."],
+  non_stationary: ["operation changing", "Speed or load moved during the averaged window."],
+  reduced_probes: ["fewer probes", "A probe has failed; the shaft centre comes from the remaining ones, less certain."],
   service_not_reachable: ["service not reachable", "The padwatch service does not answer this browser."],
 };
 
@@ -22,7 +30,15 @@ const REASONS = {
 export const NOT_CURRENT = new Set(["not_connected", "stale", "waiting_for_data", "service_not_reachable"]);
 
 /** Reasons for a missing number that belong to ordinary operation: nobody needs to get up for them. */
-const ORDINARY = new Set(["waiting_for_data", "not_measured", "standstill", "few_segments", "insufficient_excitation"]);
+const ORDINARY = new Set([
+  "waiting_for_data",
+  "not_measured",
+  "standstill",
+  "few_segments",
+  "insufficient_excitation",
+  "switched_off",
+  "non_stationary",
+]);
 
 /** How a quality looks: `good`, `uncertain`, `bad`, or a quiet `absent` for an ordinary absence. */
 export function lookOf(level, reason) {
@@ -46,6 +62,26 @@ export function reasonWords(reason) {
 /** A sentence for the bearing page. */
 export function reasonSentence(reason) {
   return REASONS[reason]?.[1] ?? `${reasonWords(reason)}.`;
+}
+
+const ESTIMATORS = {
+  dynamic: "dynamic",
+  transfer_order1: "transfer at 1×",
+  transfer_vortex: "transfer at vortex",
+  ratio_order1: "equation (5) at 1×",
+  ratio_vortex: "equation (5) at vortex",
+};
+
+/** An estimator of film stiffness in words; nothing for none. */
+export function estimatorWords(name) {
+  return name === null ? "" : (ESTIMATORS[name] ?? name.replaceAll("_", " "));
+}
+
+/** Which estimator the preferred stiffness comes from, in one go if it is the same in both axes. */
+export function preferredOrigin({ estimators }) {
+  const chosen = Object.entries(estimators ?? {}).filter(([, name]) => name !== null);
+  if (new Set(chosen.map(([, name]) => name)).size === 1 && chosen.length === 2) return estimatorWords(chosen[0][1]);
+  return chosen.map(([axes, name]) => `${axes} ${estimatorWords(name)}`).join(", ");
 }
 
 const SPEED_SOURCES = {

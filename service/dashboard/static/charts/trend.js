@@ -3,6 +3,9 @@
 import { formatTime, kindOf } from "../format.js";
 import { DOUBT_COLOUR, X_BAND, X_COLOUR, Y_BAND, Y_COLOUR, axis, baseLayout } from "./style.js";
 
+/** Half-width of the interval that holds 95 % of a normal distribution, over its standard deviation. */
+const NORMAL_95 = 1.96;
+
 const LOOKS = {
   x: { colour: X_COLOUR, band: X_BAND, dash: "solid" },
   y: { colour: Y_COLOUR, band: Y_BAND, dash: "dash" },
@@ -39,16 +42,42 @@ function bucketAt(series, index, timeS, scale) {
     minimum: series.min[index] / scale,
     maximum: series.max[index] / scale,
     mean: series.mean[index] / scale,
+    random: series.u_random?.[index] == null ? null : (NORMAL_95 * series.u_random[index]) / scale,
     level: series.worst_level[index],
   };
 }
 
 const at = (bucket) => formatTime(bucket.timeS * 1000);
 
-/** Traces for one series: the band and the mean. */
+/** Traces for one series: the band, the mean, and the random uncertainty about it where it is known. */
 export function trendTraces(pieces, name, label, axisLetter, changes = {}) {
   const look = { ...LOOKS[axisLetter], ...changes };
-  return [bandTrace(pieces, look, label), meanTrace(pieces, look, name, label)];
+  return [bandTrace(pieces, look, label), ...randomTraces(pieces, look, label), meanTrace(pieces, look, name, label)];
+}
+
+const isKnown = (bucket) => bucket.random !== null;
+
+/** Two fine dotted lines, so that nobody takes them for the band of what was read. */
+function randomTraces(pieces, look, label) {
+  const known = pieces.map((piece) => piece.filter(isKnown)).filter((piece) => piece.length > 0);
+  if (known.length === 0) return [];
+  const edge = (sign) => (piece) => [
+    ...piece.map((bucket) => [at(bucket), bucket.mean + sign * bucket.random]),
+    [null, null],
+  ];
+  return [
+    {
+      ...column([...known.flatMap(edge(1)), ...known.flatMap(edge(-1))]),
+      type: "scatter",
+      mode: "lines",
+      line: { color: look.colour, width: 1, dash: "dot" },
+      connectgaps: false,
+      hoverinfo: "skip",
+      legendgroup: label,
+      showlegend: false,
+      meta: "random",
+    },
+  ];
 }
 
 function bandTrace(pieces, look, label) {
@@ -109,21 +138,25 @@ function column(points) {
 }
 
 /** Layout with the whole asked-for span on the time axis, however little of it has data. */
-export function trendLayout(trends, title, revision) {
+export function trendLayout(trends, title, revision, rangemode) {
   const range = [trends.start, trends.end].map((time) => formatTime(Date.parse(time)));
   return baseLayout(revision, {
     xaxis: axis("", { type: "date", range, hoverformat: "%Y-%m-%d %H:%M:%S" }),
-    yaxis: axis(title, { rangemode: "tozero" }),
+    yaxis: axis(title, { rangemode }),
     yaxis2: { overlaying: "y", range: [0, 1], visible: false, fixedrange: true },
     hovermode: "x unified",
   });
 }
 
+const RANDOM_WORDS =
+  " Dotted: random uncertainty of a result, 95 %; what transducers and bracket add stays the same and is left out.";
+
 /** From when to when there are data, and how to read the chart. */
 export function trendCaption(allPieces) {
   const times = allPieces.flat(2).map((bucket) => bucket.timeS * 1000);
   const span = `Data from ${formatTime(earliest(times))} to ${formatTime(latest(times))}.`;
-  return `${span} Band: smallest to largest; line: mean.`;
+  const random = allPieces.flat(2).some(isKnown) ? RANDOM_WORDS : "";
+  return `${span} Band: smallest to largest; line: mean.${random}`;
 }
 
 const earliest = (times) => times.reduce((a, b) => Math.min(a, b));

@@ -8,6 +8,8 @@ import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
 import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
+import { estimatorTable } from "./estimator_table.js";
+import { filmMatrices } from "./film_matrices.js";
 import { windowFacts } from "./window_facts.js";
 
 /** Returns `{ draw(view), close() }`. */
@@ -16,7 +18,9 @@ export function bearingPage(main, unitId, bearingId) {
   const missing = element("p", { class: "sentence" });
   const content = element("div", { class: "bearing", hidden: "" });
   main.append(missing, content);
-  const parts = [headPart(unitId, bearingId), bearingNumbers(), bearingCharts(unitId, bearingId), windowFacts()];
+  const path = ["units", unitId, "bearings", bearingId];
+  const numbers = [bearingNumbers(path), estimatorTable(path), filmMatrices(path)];
+  const parts = [headPart(unitId, bearingId), ...numbers, bearingCharts(path), windowFacts()];
   content.append(...parts.map((part) => part.node));
   return {
     draw(view) {

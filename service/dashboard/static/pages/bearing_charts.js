@@ -15,8 +15,7 @@ import { centreTrail, trendPanels } from "./trend_panels.js";
 const PERIOD_S = 5;
 
 /** Returns `{ node, draw(latest, unit, view), close() }`. */
-export function bearingCharts(unitId, bearingId) {
-  const path = ["units", unitId, "bearings", bearingId];
+export function bearingCharts(path) {
   const trends = trendPanels(path);
   const pictures = [orbitChart(path), centreChart(path, trends), spectrumChart(path)];
   const node = element("div", { class: "charts" }, ...trends.nodes, ...pictures.map((picture) => picture.node));

@@ -21,12 +21,18 @@ const SPANS = [
   [30 * 86400, "30 d"],
   [365 * 86400, "1 y"],
 ];
+const STIFFNESSES = [
+  ["stiffness", "Preferred"],
+  ["order1_k_eff", "Eq. (5), 1×"],
+  ["vortex_k_eff", "Eq. (5), vortex"],
+];
 const ORDERS = [["order1", "1×"], ["vortex", "Vortex"]];
+const SCALES = [["tozero", "From 0"], ["normal", "To fit"]];
 const CENTRE = ["shaft_centre_x_um", "shaft_centre_y_um"];
 
-const stiffnessLines = (order) => [
-  [`${order}_k_eff_xx_n_per_m`, "xx", "x", {}],
-  [`${order}_k_eff_yy_n_per_m`, "yy", "y", {}],
+const stiffnessLines = (which) => [
+  [`${which}_xx_n_per_m`, "xx", "x", {}],
+  [`${which}_yy_n_per_m`, "yy", "y", {}],
 ];
 const amplitudeLines = (order) => [
   [`${order}_shaft_x_um_pk`, "shaft x", "x", {}],
@@ -42,18 +48,21 @@ export function trendPanels(path) {
   let trends = null;
   const refresh = () => questions.again();
   const span = choice("Span", SPANS, 900, refresh);
+  const scale = choice("Scale", SCALES, "tozero", refresh);
+  const which = choice("Estimate", STIFFNESSES, "stiffness", refresh);
   const order = choice("Order", ORDERS, "order1", refresh);
-  const stiffness = panel("Film stiffness k_eff", "stiffness-trend");
-  const amplitude = panel("Vibration amplitude", "amplitude-trend");
+  const stiffness = panel("Film stiffness", "stiffness-trend", which.node);
+  const amplitude = panel("Vibration amplitude", "amplitude-trend", order.node);
   const boxes = [stiffness, amplitude];
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
     try {
-      trends = await askTrends(path, order.value(), span.value(), view.serviceTimeMs, signal);
-      const asked = { trends, refreshS: view.refreshS, span, latest };
-      await showTrends(stiffness, asked, stiffnessLines(order.value()), "GN/m");
-      await showTrends(amplitude, asked, amplitudeLines(order.value()), "µm 0-pk");
+      const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
+      trends = await askTrends(path, lines.flat(), span.value(), view.serviceTimeMs, signal);
+      const asked = { trends, refreshS: view.refreshS, span, scale: scale.value(), latest };
+      await showTrends(stiffness, asked, lines[0], "GN/m");
+      await showTrends(amplitude, asked, lines[1], "µm 0-pk");
     } catch (failure) {
       if (signal.aborted) return;
       const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
@@ -62,7 +71,7 @@ export function trendPanels(path) {
   }, () => periodS(trends));
 
   return {
-    nodes: [element("div", { class: "choices" }, span.node, order.node, hint()), ...boxes.map((box) => box.node)],
+    nodes: [element("div", { class: "choices" }, span.node, scale.node, hint()), ...boxes.map((box) => box.node)],
     draw(newest, now, notCurrent) {
       const first = view?.serviceTimeMs == null && now.serviceTimeMs !== null;
       [latest, view] = [newest, now];
@@ -81,15 +90,14 @@ function periodS(trends) {
   return Math.min(Math.max(trends?.bucket_s ?? 0, SHORTEST_PERIOD_S), LONGEST_PERIOD_S);
 }
 
-function askTrends(path, order, spanS, endMs, signal) {
-  const names = [...stiffnessLines(order), ...amplitudeLines(order)].map(([name]) => name);
-  const query = [...names, ...CENTRE].map((name) => ["quantity", name]);
+function askTrends(path, lines, spanS, endMs, signal) {
+  const query = [...lines.map(([name]) => name), ...CENTRE].map((name) => ["quantity", name]);
   query.push(["start", new Date(endMs - spanS * 1000).toISOString()], ["end", new Date(endMs).toISOString()]);
   query.push(["max_points", String(MAX_POINTS)]);
   return ask([...path, "trends"], query, signal);
 }
 
-async function showTrends(box, { trends, refreshS, span, latest }, lines, title) {
+async function showTrends(box, { trends, refreshS, span, scale, latest }, lines, title) {
   const all = lines.map(([name]) => piecesOf(trends, name, refreshS));
   if (all.flat().length === 0) {
     const { value, reason } = readingOf(latest, lines[0][0]);
@@ -100,7 +108,8 @@ async function showTrends(box, { trends, refreshS, span, latest }, lines, title)
   const traces = lines.flatMap(([name, label, letter, changes], index) =>
     trendTraces(all[index], name, label, letter, changes),
   );
-  await box.show([...traces, doubtTrace(all)], trendLayout(trends, title, `${span.value()} ${title}`), trendCaption(all));
+  const layout = trendLayout(trends, title, `${span.value()} ${scale} ${title}`, scale);
+  await box.show([...traces, doubtTrace(all)], layout, trendCaption(all));
 }
 
 /** Means of the shaft centre over the chosen span, oldest first; without gaps' empty buckets. */

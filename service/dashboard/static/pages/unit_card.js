@@ -6,16 +6,18 @@ import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { sourceView } from "../parts/source.js";
 import { bearingAddress } from "../route.js";
-import { qualityOf, speedOrigin } from "../words.js";
+import { preferredOrigin, qualityOf, speedOrigin } from "../words.js";
 
-const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "") });
-const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "") });
+const NO_SPREAD = () => null;
+const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "", NO_SPREAD) });
+const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "", null) });
 
 const COLUMNS = [
+  { head: "Stiffness ± 95 %", unit: "GN/m, preferred estimator", view: preferredView },
   PAIR("Shaft 1×", "µm 0-pk", ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"]),
   PAIR("Bearing 1×", "µm 0-pk", ["order1_bearing_x_um_pk", "order1_bearing_y_um_pk"], ["x", "y"]),
-  PAIR("Stiffness 1×", "GN/m", ["order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"], ["xx", "yy"]),
-  PAIR("Stiffness vortex", "GN/m", ["vortex_k_eff_xx_n_per_m", "vortex_k_eff_yy_n_per_m"], ["xx", "yy"]),
+  PAIR("k_eff 1×", "GN/m, eq. (5)", ["order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"], ["xx", "yy"]),
+  PAIR("k_eff vortex", "GN/m, eq. (5)", ["vortex_k_eff_xx_n_per_m", "vortex_k_eff_yy_n_per_m"], ["xx", "yy"]),
   SINGLE("Eccentricity", "ratio", "eccentricity_ratio"),
   SINGLE("Oil", "°C", "oil_temperature_c"),
 ];
@@ -75,6 +77,19 @@ function bearingRow(unit, bearing) {
       for (const cell of cells) cell.draw(latest, whole.reason);
       drawQuality(quality, whole);
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
+    },
+  };
+}
+
+/** The stiffness that alarms and trends use, and the estimator it comes from. */
+function preferredView() {
+  const pair = pairView(["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"], ["xx", "yy"], "");
+  const from = element("span", { class: "from" });
+  return {
+    node: element("div", { class: "preferred" }, pair.node, from),
+    draw(latest, saidReason) {
+      pair.draw(latest, saidReason);
+      setText(from, preferredOrigin(latest));
     },
   };
 }

@@ -4,9 +4,10 @@ import { element, setAttribute, setText } from "../dom.js";
 import { formatQuantity, kindOf } from "../format.js";
 import { lookOf, reasonWords } from "../words.js";
 import { markShape } from "./mark.js";
+import { spreadView } from "./spread.js";
 
 const DASH = "—";
-const ABSENT = { value: null, level: "bad", reason: "not_measured" };
+const ABSENT = { value: null, level: "bad", reason: "not_measured", uncertainty: null };
 
 /** Readings of a bearing by name; one that the service does not report is not measured. */
 export function readingOf(latest, name) {
@@ -18,20 +19,22 @@ export function readingOf(latest, name) {
  *
  * Returns `{ node, draw(latest, saidReason) }`. What `saidReason` beside it says already is not said
  * again loudly: a doubted number stands alone, a missing one gives its reason without a shape.
+ * `spread` shows the uncertainty after the number; null for none.
  */
-export function readingView(name, label, unit = kindOf(name).unit) {
+export function readingView(name, label, unit = kindOf(name).unit, spread = spreadView(name)) {
   const number = element("span", { class: "number" });
   const why = element("span", { class: "why" });
   const suffix = element("span", { class: "suffix" }, unit);
   const node = element("span", { class: "reading", "data-reading": name });
   if (label) node.append(element("span", { class: "axis" }, label));
-  node.append(number, suffix, why);
+  node.append(number, ...(spread ? [spread.node] : []), suffix, why);
   return {
     node,
     draw(latest, saidReason = null) {
       const reading = readingOf(latest, name);
       const absent = reading.value === null;
       setText(number, absent ? DASH : formatQuantity(name, reading.value));
+      spread?.draw(reading);
       suffix.hidden = absent || unit === "";
       setAttribute(node, "data-level", reading.level);
       drawReason(why, reading, saidReason);
@@ -50,16 +53,20 @@ function drawReason(why, reading, saidReason) {
 }
 
 /** Two readings in one cell; when both are missing for one reason, one dash stands for both. */
-export function pairView(names, labels, unit) {
-  const views = names.map((name, index) => readingView(name, labels[index], unit));
+export function pairView(names, labels, unit, spreadOf = spreadView) {
+  const views = names.map((name, index) => readingView(name, labels[index], unit, spreadOf(name)));
   const node = element("span", { class: "pair" }, ...views.map((view) => view.node));
   return {
     node,
     draw(latest, saidReason = null) {
       for (const view of views) view.draw(latest, saidReason);
-      const [first, second] = names.map((name) => readingOf(latest, name));
-      const alike = first.value === null && second.value === null && first.reason === second.reason;
-      node.classList.toggle("merged", alike);
+      node.classList.toggle("merged", missingAlike(latest, names));
     },
   };
+}
+
+/** Whether both of two readings are missing for one and the same reason. */
+export function missingAlike(latest, names) {
+  const [first, second] = names.map((name) => readingOf(latest, name));
+  return first.value === null && second.value === null && first.reason === second.reason;
 }

@@ -1,0 +1,107 @@
+/** Where the uncertainty of one result comes from, asked for only while somebody looks. */
+
+import { ask } from "../api.js";
+import { element, setText } from "../dom.js";
+import { formatInterval, formatQuantity, formatSignificant, formatTime, kindOf } from "../format.js";
+import { poll } from "../poll.js";
+
+const PERIOD_S = 5;
+const MORE_DECIMALS = 2;
+const HEADS = ["Contribution", "Kind", "Distribution", "Width", "Standard uncertainty"];
+const READING_HELP =
+  "Random parts differ from one result to the next; systematic ones stay. Width: standard uncertainty if normal, " +
+  "half-width if uniform, of what contributes: relative for gains, stiffness and noise, µm for runout.";
+
+let nPanels = 0;
+
+/** Returns `{ node, id, toggle(quantity, label, opener), close() }`; one budget at a time. */
+export function budgetPanel(path) {
+  const id = `budget-${(nPanels += 1)}`;
+  const title = element("h3");
+  const closing = element("button", { type: "button", class: "closing" }, "Close");
+  const sentence = element("p", { class: "sentence", role: "status" });
+  const rows = element("tbody", { role: "rowgroup" });
+  const table = budgetTable(rows);
+  const help = element("p", { class: "help" }, READING_HELP);
+  const head = element("div", { class: "panel-head" }, title, closing);
+  const node = element("section", { class: "budget", id, hidden: "" }, head, sentence, table, help);
+  let open = null;
+
+  function close() {
+    open?.questions.stop();
+    open?.opener.setAttribute("aria-expanded", "false");
+    open = null;
+    node.hidden = true;
+  }
+
+  function show(budget) {
+    table.hidden = help.hidden = budget === null;
+    if (budget === null) return;
+    setText(sentence, budgetSentence(budget));
+    rows.replaceChildren(...budget.lines.map((line) => budgetRow(budget.quantity, line)));
+  }
+
+  async function refresh(quantity, signal) {
+    try {
+      show(await ask([...path, "budgets", quantity], [], signal));
+    } catch (failure) {
+      if (signal.aborted) return;
+      show(null);
+      setText(sentence, `No budget now. ${failure.message}`);
+    }
+  }
+
+  function toggle(quantity, label, opener) {
+    const same = open?.opener === opener;
+    close();
+    if (same) return;
+    setText(title, `Uncertainty budget: ${label}`);
+    show(null);
+    setText(sentence, "Asking the service.");
+    node.hidden = false;
+    node.dataset.quantity = quantity;
+    opener.setAttribute("aria-expanded", "true");
+    open = { opener, questions: poll((signal) => refresh(quantity, signal), () => PERIOD_S) };
+  }
+
+  closing.addEventListener("click", () => {
+    const opener = open?.opener;
+    close();
+    opener?.focus();
+  });
+  return { node, id, toggle, close };
+}
+
+function budgetTable(rows) {
+  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
+  const headRow = element("tr", { role: "row" }, ...heads);
+  return element("table", { role: "table" }, element("thead", { role: "rowgroup" }, headRow), rows);
+}
+
+function budgetRow(quantity, line) {
+  const cells = [line.kind, line.distribution, widthWords(quantity, line), contributionWords(quantity, line)];
+  return element(
+    "tr",
+    { role: "row", "data-kind": line.kind },
+    element("th", { scope: "row", role: "rowheader" }, line.name),
+    ...cells.map((words, index) => element("td", { role: "cell", "data-head": HEADS[index + 1] }, words)),
+  );
+}
+
+const withUnit = (quantity, value) => `${formatQuantity(quantity, value, MORE_DECIMALS)} ${kindOf(quantity).unit}`;
+
+/** Spectral statistics are stated in the unit of the result itself: nothing lies between. */
+function widthWords(quantity, { kind, width }) {
+  return kind === "random" ? withUnit(quantity, width) : formatSignificant(width);
+}
+
+const contributionWords = (quantity, { contribution }) => withUnit(quantity, contribution);
+
+function budgetSentence({ quantity, value, uncertainty, time }) {
+  const { unit } = kindOf(quantity);
+  return (
+    `${formatQuantity(quantity, value)} ${unit}, 95 %: ${formatInterval(quantity, uncertainty)} ${unit}. ` +
+    `Standard uncertainty: random ${withUnit(quantity, uncertainty.random)}, ` +
+    `systematic ${withUnit(quantity, uncertainty.systematic)}. Samples up to ${formatTime(Date.parse(time))}.`
+  );
+}

@@ -1,0 +1,32 @@
+/** The ± after a number: half its 95 % interval, as text or as the button that opens its budget. */
+
+import { element, setAttribute, setText } from "../dom.js";
+import { formatSpread } from "../format.js";
+
+/** Returns `{ node, draw(reading) }`; hidden while there is no number or no uncertainty. */
+export function spreadView(name, node = element("span", { class: "spread" })) {
+  node.hidden = true;
+  return {
+    node,
+    draw({ value, uncertainty }) {
+      node.hidden = value === null || !uncertainty;
+      if (!node.hidden) setText(node, formatSpread(name, value, uncertainty));
+    },
+  };
+}
+
+/** The same as a button that shows and hides the budget in `panel`, below the numbers. */
+export function budgetSpread(name, panel) {
+  const node = element("button", { type: "button", class: "spread", "aria-expanded": "false", "aria-controls": panel.id });
+  const spread = spreadView(name, node);
+  let label = name;
+  node.addEventListener("click", () => panel.toggle(name, label, node));
+  return {
+    node,
+    draw(reading) {
+      spread.draw(reading);
+      label = reading.label ?? name;
+      setAttribute(node, "title", `Uncertainty budget: ${label}`);
+    },
+  };
+}

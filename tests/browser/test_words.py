@@ -1,0 +1,34 @@
+"""Nobody at a machine should have to read a code: everything the API may say has words."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from core.estimators import Estimator
+from core.quality import Reason
+
+SOURCE = Path(__file__).parents[2] / "service" / "dashboard" / "static" / "words.js"
+ONLY_THE_PAGE_KNOWS = {"service_not_reachable"}
+ENTRY = re.compile(r"^  (\w+): (.+),$", re.MULTILINE)
+WORDS_AND_SENTENCE = re.compile(r"\[\"[^\"]{2,25}\", \"[A-Z][^\"]+[.]\"\]")
+"""A few words that fit a table's cell, and a sentence for the bearing page."""
+
+
+def entries(table: str) -> dict[str, str]:
+    body = re.search(rf"^const {table} = {{$(.*?)^}};$", SOURCE.read_text(), re.M | re.S)
+    assert body is not None, f"words.js has no table {table}"
+    return dict(ENTRY.findall(body[1]))
+
+
+@pytest.mark.parametrize("reason", list(Reason))
+def test_every_reason_has_words_and_a_sentence(reason) -> None:
+    assert WORDS_AND_SENTENCE.fullmatch(entries("REASONS")[reason])
+
+
+def test_no_words_are_kept_for_reasons_that_nobody_gives() -> None:
+    assert entries("REASONS").keys() == {reason.value for reason in Reason} | ONLY_THE_PAGE_KNOWS
+
+
+def test_every_estimator_has_words() -> None:
+    assert entries("ESTIMATORS").keys() == {estimator.value for estimator in Estimator}
