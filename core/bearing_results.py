@@ -6,17 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum, average
+from core.cross_spectrum import CrossSpectrum, average
 from core.estimators import Estimator, preferred_stiffness
 from core.film_results import film_results
 from core.line_results import OrderLine
-from core.machine import Bearing, Measurand, Unit
+from core.machine import Bearing, Unit
+from core.position_results import mean_slow, position_results
+from core.probe_axes import Growth
 from core.quality import (
     Quality,
     Reading,
     Reason,
     bad,
-    mean_reading,
     missing,
     uncertain,
     worst,
@@ -24,7 +25,6 @@ from core.quality import (
 from core.segments import ORDER1, VORTEX, Segment
 from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
-from core.shaft_centre import shaft_centre
 from core.uncertainty import Budget
 
 
@@ -39,6 +39,8 @@ class BearingResults:
         (n_lines,) of the segments' bins.
     n_expected
         How many segments there could have been.
+    last_growth
+        Thermal growth of the gaps when it was last measured.
 
     Attributes
     ----------
@@ -58,7 +60,9 @@ class BearingResults:
         segments: Sequence[Segment],
         frequency_hz: FloatArray,
         n_expected: int,
+        last_growth: Growth | None = None,
     ) -> None:
+        self._last_growth = last_growth
         self._unit, self._bearing, self._settings = unit, bearing, settings
         self._segments = segments
         ids = [channel.id for channel in unit.channels]
@@ -87,16 +91,19 @@ class BearingResults:
         order1, budgets1 = self._order("order1", ORDER1)
         vortex, budgets_v = self._order("vortex", VORTEX)
         film, budgets_f = self._film()
+        position, budgets_p = position_results(
+            self._unit, self._bearing, self._segments, self._last_growth
+        )
         readings = {
             "speed_rpm": self._segments[-1].speed.rpm,
             "power_mw": self._slow(self._unit.power_channel),
             "oil_temperature_c": self._slow(self._bearing.oil_temperature),
-            **self._position(),
+            **position,
             **order1,
             **vortex,
             **film,
         }
-        self.budgets = {**budgets1, **budgets_v, **budgets_f}
+        self.budgets = {**budgets1, **budgets_v, **budgets_f, **budgets_p}
         chosen = {
             axes: preferred_stiffness(readings, self._bearing.preference, axes)
             for axes in ("xx", "yy")
@@ -105,43 +112,7 @@ class BearingResults:
         return readings | {f"stiffness_{a}_n_per_m": reading for a, (reading, _) in chosen.items()}
 
     def _slow(self, channel: str | None) -> Reading:
-        if channel is None:
-            return missing(Reason.NOT_MEASURED)
-        return mean_reading([segment.slow[channel] for segment in self._segments])
-
-    def _position(self) -> dict[str, Reading]:
-        gap_x, gap_y = (
-            self._gap(SHAFT_X, self._bearing.gap_x),
-            self._gap(SHAFT_Y, self._bearing.gap_y),
-        )
-        centre = shaft_centre(
-            (gap_x, gap_y), self._bearing.gap_reference_um, self._bearing.clearance_um
-        )
-        return {
-            "gap_x_um": gap_x,
-            "gap_y_um": gap_y,
-            "shaft_centre_x_um": centre.x_um,
-            "shaft_centre_y_um": centre.y_um,
-            "eccentricity_ratio": centre.eccentricity_ratio,
-            "attitude_angle_deg": centre.attitude_angle_deg,
-        }
-
-    def _gap(self, place: int, slow_channel: str | None) -> Reading:
-        """Mean gap over the averaging window, from the slow channel or a DC-coupled probe."""
-        if slow_channel is not None:
-            gap_mm = self._slow(slow_channel)
-            return gap_mm if gap_mm.value is None else Reading(1e3 * gap_mm.value, gap_mm.quality)
-        row = self._rows[place]
-        if self._unit.channels[row].measurand is not Measurand.GAP_UM:
-            return missing(Reason.NOT_MEASURED)
-        return mean_reading(
-            [
-                Reading(float(segment.mean[row]), segment.channel_quality[row])
-                if segment.usable[row]
-                else missing(segment.channel_quality[row].reason)
-                for segment in self._segments
-            ]
-        )
+        return mean_slow(self._segments, channel)
 
     def _steadiness(self) -> Quality:
         """Whether speed and load stood still over the averaging window."""

@@ -5,6 +5,7 @@ from enum import StrEnum
 
 from core.bracket import BracketDynamics
 from core.estimators import PREFERENCE, Estimator
+from core.probe_axes import GapAccuracy
 from core.transducer_response import Response
 from core.uncertainty import BearingAccuracy
 
@@ -66,6 +67,8 @@ class Bearing:
         out, the other estimators take them in.
     runout_um_pk
         Largest runout of the shaft's surface at 1×, as far as it is not taken off.
+    gap_accuracy
+        How well gaps, references, thermal growth and clearance are known.
     accuracy
         How well transducers and bracket are known.
     preference
@@ -91,6 +94,7 @@ class Bearing:
     bracket_mass_kg: float = 0.0
     bracket_damping_n_s_per_m: float = 0.0
     runout_um_pk: float = 0.0
+    gap_accuracy: GapAccuracy = field(default_factory=GapAccuracy)
     accuracy: BearingAccuracy = field(default_factory=BearingAccuracy)
     preference: tuple[Estimator, ...] = PREFERENCE
 

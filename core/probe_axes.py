@@ -11,7 +11,7 @@ from itertools import chain
 import numpy as np
 
 from core.arrays import FloatArray
-from core.quality import Quality, Reading, Reason, missing, uncertain, worst
+from core.quality import Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
 NEAR_X, FAR_X, NEAR_Y, FAR_Y, GROWTH, ASYMMETRY = range(6)
@@ -131,15 +131,18 @@ class ProbeAxes:
         self.values_um: FloatArray = np.array([*x.changes_um, *y.changes_um, outside_um, 0.0])
         self.weights: FloatArray = np.array([self._displacement(0), self._displacement(1)])
 
-    def growth_um(self) -> Reading:
-        """Growth as four probes, or the two of one axis, measure it now."""
+    @property
+    def growth_quality(self) -> Quality:
+        """Of the growth that is measured now."""
+        return worst(axis.quality for axis in self._axes if axis.has_both)
+
+    def growth_budget(self) -> Budget | None:
+        """Growth as four probes, or the two of one axis, measure it now; None if none can."""
         both = [axis for axis in (0, 1) if self._axes[axis].has_both]
         if not both:
-            return missing(Reason.NOT_MEASURED)
+            return None
         weights = np.mean([self._own_growth(axis) for axis in both], axis=0)
-        budget = Budget(float(weights @ self.values_um), self.lines(weights))
-        quality = worst(self._axes[axis].quality for axis in both)
-        return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
+        return Budget(float(weights @ self.values_um), self.lines(weights))
 
     def lines(self, weights: FloatArray) -> tuple[BudgetLine, ...]:
         """Uncertainty of a weighted sum of `values_um` (GUM, equation 10)."""

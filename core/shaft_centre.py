@@ -1,19 +1,20 @@
 """Where the shaft runs in its bearing: centre, eccentricity ratio and attitude angle from gaps."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from core.arrays import FloatArray
 from core.probe_axes import GapAccuracy, Growth, ProbeAxes, ProbeAxis
-from core.quality import Level, Quality, Reading, missing, worst
-from core.uncertainty import Budget, BudgetLine, systematic_line
+from core.quality import Level, Quality, Reading, Reason, missing, worst
+from core.uncertainty import Budget, systematic_line
 
 CLEARANCE = "clearance"
 
-ANY_ANGLE_DEG = 180.0 / math.sqrt(3.0)
-"""Standard uncertainty of an angle of which nothing is known."""
+HALF_CIRCLE_DEG = 180.0
+"""Half-width of an angle of which nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ class ShaftCentre:
     gap_growth_um
         What all gaps have widened since their references were read; only an axis with two probes
         tells it.
+    budgets
+        Of position and eccentricity ratio, under the names of the fields.
     """
 
     x_um: Reading
@@ -38,6 +41,7 @@ class ShaftCentre:
     eccentricity_ratio: Reading
     attitude_angle_deg: Reading
     gap_growth_um: Reading
+    budgets: Mapping[str, Budget] = field(default_factory=dict)
 
 
 def shaft_centre(
@@ -95,23 +99,32 @@ def locate_shaft(
     accuracy = accuracy or GapAccuracy()
     axes = ProbeAxes(x, y, accuracy, last_growth)
     position_um = axes.weights @ axes.values_um
-    x_um, y_um = (
-        _reading(axes.lines(weights), float(value), axis.quality)
-        for weights, value, axis in zip(axes.weights, position_um, (x, y), strict=True)
+    of_x, of_y = (
+        Budget(float(value), axes.lines(weights))
+        for weights, value in zip(axes.weights, position_um, strict=True)
     )
-    quality, growth_um = worst((x.quality, y.quality)), axes.growth_um()
+    x_um, y_um = _reading(of_x, x.quality), _reading(of_y, y.quality)
+    quality, growth_um = worst((x.quality, y.quality)), missing(Reason.NOT_MEASURED)
+    budgets = {"x_um": of_x, "y_um": of_y}
+    of_growth = axes.growth_budget()
+    if of_growth is not None:
+        budgets["gap_growth_um"] = of_growth
+        growth_um = _reading(of_growth, axes.growth_quality)
     if x_um.value is None or y_um.value is None:
         nowhere = missing(quality.reason)
-        return ShaftCentre(x_um, y_um, nowhere, nowhere, growth_um)
+        return ShaftCentre(x_um, y_um, nowhere, nowhere, growth_um, budgets)
     radius_um = math.hypot(x_um.value, y_um.value)
     angle_rad = math.atan2(y_um.value, x_um.value)
     outward = np.array([math.cos(angle_rad), math.sin(angle_rad)])
+    of_ratio = _eccentricity(axes, outward, radius_um, clearance_um, accuracy)
+    of_angle = _angle(axes, outward, radius_um, math.degrees(angle_rad))
     return ShaftCentre(
         x_um,
         y_um,
-        _eccentricity(axes, outward, radius_um, clearance_um, accuracy, quality),
-        _angle(axes, outward, radius_um, math.degrees(angle_rad), quality),
+        _not_below_zero(_reading(of_ratio, quality)),
+        _reading(of_angle, quality),
         growth_um,
+        budgets | {"eccentricity_ratio": of_ratio, "attitude_angle_deg": of_angle},
     )
 
 
@@ -121,32 +134,27 @@ def _eccentricity(
     radius_um: float,
     clearance_um: float,
     accuracy: GapAccuracy,
-    quality: Quality,
-) -> Reading:
+) -> Budget:
     ratio = radius_um / clearance_um
     lines = axes.lines(outward @ axes.weights / clearance_um)
-    width = systematic_line(CLEARANCE, accuracy.clearance, ratio)
-    reading = _reading((*lines, width), ratio, quality)
-    if reading.interval_95 is None:
-        return reading
-    low, high = reading.interval_95
-    return Reading(ratio, quality, reading.u_random, reading.u_systematic, (max(low, 0.0), high))
+    return Budget(ratio, (*lines, systematic_line(CLEARANCE, accuracy.clearance, ratio)))
 
 
-def _angle(
-    axes: ProbeAxes, outward: FloatArray, radius_um: float, angle_deg: float, quality: Quality
-) -> Reading:
+def _not_below_zero(reading: Reading) -> Reading:
+    low, high = reading.interval_95 or (0.0, 0.0)
+    return replace(reading, interval_95=(max(low, 0.0), high))
+
+
+def _angle(axes: ProbeAxes, outward: FloatArray, radius_um: float, angle_deg: float) -> Budget:
     """Angle with the uncertainty of the motion across it; near the centre any angle may be true."""
     across = np.array([-outward[1], outward[0]]) @ axes.weights
-    budget = Budget(angle_deg, axes.lines(across))
-    if math.degrees(budget.combined) >= ANY_ANGLE_DEG * radius_um:
-        whole_circle = (angle_deg - 180.0, angle_deg + 180.0)
-        return Reading(angle_deg, quality, 0.0, ANY_ANGLE_DEG, whole_circle)
-    return _reading(axes.lines(math.degrees(1.0) / radius_um * across), angle_deg, quality)
+    along_um = Budget(angle_deg, axes.lines(across)).combined
+    if math.degrees(along_um) >= HALF_CIRCLE_DEG / math.sqrt(3.0) * radius_um:
+        return Budget(angle_deg, (systematic_line("no direction", HALF_CIRCLE_DEG, 1.0),))
+    return Budget(angle_deg, axes.lines(math.degrees(1.0) / radius_um * across))
 
 
-def _reading(lines: tuple[BudgetLine, ...], value: float, quality: Quality) -> Reading:
+def _reading(budget: Budget, quality: Quality) -> Reading:
     if quality.level is Level.BAD:
         return missing(quality.reason)
-    budget = Budget(value, lines)
-    return Reading(value, quality, budget.random, budget.systematic, budget.interval)
+    return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
