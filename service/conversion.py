@@ -3,13 +3,24 @@
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.dynamic_settings import DynamicSettings
 from core.machine import Bearing, Channel, Unit
+from core.probe_axes import GapAccuracy
 from core.settings import AnalysisSettings
 from core.uncertainty import BearingAccuracy
 from core.usable_lines import LineSelection
+from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings
 from service.settings.plant import AnalysisModel
 from service.settings.response import response_of
-from service.settings.units import BearingSettings, UnitSettings
+from service.settings.units import UnitSettings
+
+ACCURACY_KEYS = {
+    "bracket_stiffness_uncertainty",
+    "gap_reference_uncertainty_um",
+    "thermal_growth_um",
+    "thermal_growth_change_um",
+    "clearance_uncertainty",
+}
+"""Keys of a bearing that say how well something is known."""
 
 
 def machine_of(settings: UnitSettings) -> Unit:
@@ -47,14 +58,30 @@ def _calibration(settings: ChannelSettings) -> ChannelCalibration:
 
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     return Bearing(
-        **settings.model_dump(exclude={"bracket_stiffness_uncertainty"}),
+        **settings.model_dump(exclude=ACCURACY_KEYS),
         accuracy=_accuracy(settings, unit),
+        gap_accuracy=_gap_accuracy(settings, unit),
     )
+
+
+def _gap_accuracy(settings: BearingSettings, unit: UnitSettings) -> GapAccuracy:
+    gain = _gains(unit)
+    return GapAccuracy(
+        gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
+        reference_um=settings.gap_reference_uncertainty_um,
+        growth_um=settings.thermal_growth_um,
+        growth_change_um=settings.thermal_growth_change_um,
+        clearance=settings.clearance_uncertainty,
+    )
+
+
+def _gains(unit: UnitSettings) -> dict[str, float]:
+    return {channel.id: channel.gain_uncertainty for channel in unit.channel}
 
 
 def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
     """The worse of two transducers stands for both directions."""
-    gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
+    gain = _gains(unit)
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),

@@ -9,7 +9,8 @@ from fastapi import Path
 from acquisition.clock import Clock
 from service.api.problems import ProblemError
 from service.live import LiveView
-from service.settings.units import BearingSettings, UnitSettings
+from service.settings.bearings import BearingSettings
+from service.settings.units import UnitSettings
 from service.store.port import Store
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]

@@ -5,75 +5,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from core.estimators import PREFERENCE, Estimator
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
+from service.settings.bearings import (
+    CHANNEL_KEYS,
+    GAP_KEYS,
+    OPTIONAL_CHANNEL_KEYS,
+    BearingSettings,
+)
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.simulation import SimulationSettings
-
-MicrometrePair = tuple[
-    Annotated[float, Field(gt=0.0, le=10_000.0)], Annotated[float, Field(gt=0.0, le=10_000.0)]
-]
-
-
-CHANNEL_KEYS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
-"""The keys of a bearing that name waveform channels."""
-
-
-class BearingSettings(Settings):
-    """A guide bearing: its bracket, its clearance and the channels that watch it."""
-
-    id: Identifier
-    """Unique within the unit: "UJB", "LJB", "TJB" for upper, lower and turbine journal bearing."""
-
-    bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)]
-    """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every result
-    of equation (5) is proportional to it."""
-
-    clearance_um: Annotated[float, Field(ge=20.0, le=5000.0)]
-    """Radial clearance in operation in µm, 20 to 5000; example: 200.0."""
-
-    gap_reference_um: MicrometrePair
-    """Probe gaps [x, y] in µm with the shaft centred; example: [2000.0, 1950.0]."""
-
-    shaft_x: Identifier
-    """Channel of the shaft's relative vibration in x."""
-
-    shaft_y: Identifier
-    """Channel of the shaft's relative vibration in y."""
-
-    bearing_x: Identifier
-    """Channel of the bearing's absolute vibration in x."""
-
-    bearing_y: Identifier
-    """Channel of the bearing's absolute vibration in y."""
-
-    oil_temperature: Identifier | None = None
-    """Slow channel (degC) of the oil temperature, if measured."""
-
-    gap_x: Identifier | None = None
-    """Slow channel (mm) of the x gap; without it the mean of a proximity probe is the gap."""
-
-    gap_y: Identifier | None = None
-    """Slow channel (mm) of the y gap."""
-
-    bracket_stiffness_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.10
-    """Half-width of what the bracket's stiffness may be off, as a share; example: 0.10."""
-
-    bracket_mass_kg: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
-    """Effective mass of bracket and bearing in kg; 0 if not known. Equation (5) leaves it out,
-    the other estimators take its inertia in. Example: 45.0e3."""
-
-    bracket_damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=1e10)] = 0.0
-    """Damping of the bracket in N·s/m; 0 if not known."""
-
-    runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
-    """Largest runout of the shaft's surface at 1×, µm zero-to-peak; widens the uncertainty of what
-    is read at 1×. Example: 10.0."""
-
-    preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
-    """Estimators that the stiffness for trends and alarms is taken from, best first: the first
-    that has a number. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
-    "ratio_order1"."""
 
 
 class ModbusRingSettings(Settings):
@@ -175,8 +115,8 @@ class UnitSettings(Settings):
         for n, bearing in enumerate(self.bearing):
             self._check_channels(n, bearing)
             self._check_slow(bearing.oil_temperature, "degC", "bearing", n, "oil_temperature")
-            self._check_slow(bearing.gap_x, "mm", "bearing", n, "gap_x")
-            self._check_slow(bearing.gap_y, "mm", "bearing", n, "gap_y")
+            for key in GAP_KEYS:
+                self._check_slow(getattr(bearing, key), "mm", "bearing", n, key)
         self._check_slow(self.speed_channel, "r/min", "speed_channel")
         self._check_slow(self.power_channel, "MW", "power_channel")
         self._check_simulation()
@@ -184,7 +124,8 @@ class UnitSettings(Settings):
 
     def _check_channels(self, number: int, bearing: BearingSettings) -> None:
         known = [channel.id for channel in self.channel]
-        used = [(key, getattr(bearing, key)) for key in CHANNEL_KEYS]
+        keys = [*CHANNEL_KEYS, *(k for k in OPTIONAL_CHANNEL_KEYS if getattr(bearing, k))]
+        used = [(key, getattr(bearing, key)) for key in keys]
         for key, id_ in used:
             if id_ not in known:
                 raise MisfitError(_not_among(known), "bearing", number, key)

@@ -1,0 +1,116 @@
+"""A guide bearing in the plant file."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from core.estimators import PREFERENCE, Estimator
+from service.settings.base import Identifier, MisfitError, Settings
+
+MicrometrePair = tuple[
+    Annotated[float, Field(gt=0.0, le=10_000.0)], Annotated[float, Field(gt=0.0, le=10_000.0)]
+]
+
+CHANNEL_KEYS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
+"""The keys of a bearing that name waveform channels."""
+
+OPTIONAL_CHANNEL_KEYS = ("opposite_x", "opposite_y")
+"""Those that may be absent."""
+
+GAP_KEYS = ("gap_x", "gap_y", "opposite_gap_x", "opposite_gap_y")
+"""The keys that name slow channels of gaps."""
+
+
+class BearingSettings(Settings):
+    """A guide bearing: its bracket, its clearance and the channels that watch it."""
+
+    id: Identifier
+    """Unique within the unit: "UJB", "LJB", "TJB" for upper, lower and turbine journal bearing."""
+
+    bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)]
+    """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every result
+    of equation (5) is proportional to it."""
+
+    clearance_um: Annotated[float, Field(ge=20.0, le=5000.0)]
+    """Radial clearance in operation in µm, 20 to 5000; example: 200.0."""
+
+    gap_reference_um: MicrometrePair
+    """Probe gaps [x, y] in µm with the shaft centred; example: [2000.0, 1950.0]."""
+
+    shaft_x: Identifier
+    """Channel of the shaft's relative vibration in x."""
+
+    shaft_y: Identifier
+    """Channel of the shaft's relative vibration in y."""
+
+    bearing_x: Identifier
+    """Channel of the bearing's absolute vibration in x."""
+
+    bearing_y: Identifier
+    """Channel of the bearing's absolute vibration in y."""
+
+    oil_temperature: Identifier | None = None
+    """Slow channel (degC) of the oil temperature, if measured."""
+
+    gap_x: Identifier | None = None
+    """Slow channel (mm) of the x gap; without it the mean of a proximity probe is the gap."""
+
+    gap_y: Identifier | None = None
+    """Slow channel (mm) of the y gap."""
+
+    opposite_x: Identifier | None = None
+    """Proximity probe across the shaft from shaft_x, if there is one: with it the shaft's motion
+    is told from thermal growth."""
+
+    opposite_y: Identifier | None = None
+    """Proximity probe across the shaft from shaft_y, if there is one."""
+
+    opposite_gap_x: Identifier | None = None
+    """Slow channel (mm) of the gap opposite x; without it the mean of opposite_x is the gap."""
+
+    opposite_gap_y: Identifier | None = None
+    """Slow channel (mm) of the gap opposite y."""
+
+    opposite_reference_um: MicrometrePair | None = None
+    """Gaps [x, y] in µm of the opposite probes with the shaft centred."""
+
+    gap_reference_uncertainty_um: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
+    """Half-width of what a reference gap may be off, µm."""
+
+    thermal_growth_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 50.0
+    """Half-width of what all gaps may have grown alike since the reference, µm; counts where
+    opposite probes do not measure it."""
+
+    thermal_growth_change_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 20.0
+    """Half-width of what growth may have changed since opposite probes last measured it, µm."""
+
+    clearance_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
+    """Half-width of what the clearance may be off, as a share."""
+
+    bracket_stiffness_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.10
+    """Half-width of what the bracket's stiffness may be off, as a share; example: 0.10."""
+
+    bracket_mass_kg: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
+    """Effective mass of bracket and bearing in kg; 0 if not known. Equation (5) leaves it out,
+    the other estimators take its inertia in. Example: 45.0e3."""
+
+    bracket_damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=1e10)] = 0.0
+    """Damping of the bracket in N·s/m; 0 if not known."""
+
+    runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    """Largest runout of the shaft's surface at 1×, µm zero-to-peak; widens the uncertainty of what
+    is read at 1×. Example: 10.0."""
+
+    preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
+    """Estimators that the stiffness for trends and alarms is taken from, best first: the first
+    that has a number. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
+    "ratio_order1"."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        probes = (self.opposite_x, self.opposite_y)
+        if any(probes) != (self.opposite_reference_um is not None):
+            raise MisfitError(
+                "opposite probes and their reference need each other", "opposite_reference_um"
+            )
+        return self
