@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from benchmarks.accuracy_plant import BearingSpectra
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.dynamic import dynamic_stiffness
-from core.dynamic_settings import DynamicSettings
 from core.excitation import LineLimits, line_excitation
 from core.quality import Reason
 from core.segments import ORDER1, VORTEX
@@ -83,7 +82,7 @@ def _dynamic(
     spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool
 ) -> Iterator[Estimate]:
     film = spectra.film
-    result = dynamic_stiffness(spectra.bins, spectra.bracket, spectra.turn_hz, DynamicSettings())
+    result = dynamic_stiffness(spectra.bins, spectra.bracket, spectra.turn_hz, spectra.dynamic)
     budgets = {} if isinstance(result, Reason) else dynamic_budgets(result, accuracy)
     omega = 2.0 * math.pi * float(spectra.orders.frequency_hz[ORDER1])
     for letter, truth in (("k", film.stiffness_n_per_m), ("c", film.damping_n_s_per_m)):

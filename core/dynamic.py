@@ -14,13 +14,21 @@ from core.arrays import FloatArray
 from core.bracket import BracketDynamics
 from core.cross_spectrum import BEARING_X, CrossSpectrum
 from core.dynamic_settings import DynamicSettings
-from core.film_fit import explained_share, lack_of_fit, line_weights, signal_share, smoother
+from core.film_fit import (
+    explained_share,
+    film_phase,
+    inflation_of,
+    lack_of_fit,
+    line_weights,
+    signal_share,
+    smoother,
+)
 from core.normal_equations import NormalEquations, normal_equations
 from core.probe_noise import probe_noise_power
 from core.quality import Reason
 from core.spectral_statistics import (
+    SMEAR_BINS_SQUARED,
     independent_segments,
-    neighbour_inflation,
     phasor_power_per_density,
 )
 from core.usable_lines import between_harmonics, little_leakage
@@ -113,7 +121,7 @@ def dynamic_stiffness(
     weight = line_weights(equations, spectrum.matrix[index], smoothing, settings.n_iterations)
     if weight is None:
         return Reason.INSUFFICIENT_EXCITATION
-    found = _result(spectrum, lines, bracket, equations, weight, noise_power, n_segments)
+    found = _result(spectrum, lines, bracket, equations, weight, noise_power, settings)
     return found if _convinces(found, settings) else Reason.INSUFFICIENT_EXCITATION
 
 
@@ -158,12 +166,16 @@ def _result(
     equations: NormalEquations,
     weight: FloatArray,
     noise_power: FloatArray,
-    n_segments: float,
+    settings: DynamicSettings,
 ) -> DynamicStiffness:
+    n_averaged = int(spectrum.n_segments.max())
+    n_segments = independent_segments(n_averaged, settings.overlap)
     unknowns = equations.solve(weight, equations.force)
     per_bracket = bracket.stiffness_n_per_m * equations.solve(weight, equations.spring)
     residual = equations.residual(unknowns)
-    inflation = neighbour_inflation(lines)[lines]
+    smear = equations.force_power * _smear_share(spectrum, lines, settings.n_integrations)
+    part = np.minimum(np.divide(smear, residual, out=np.ones_like(smear), where=residual > 0), 1.0)
+    inflation = inflation_of(lines, part, film_phase(equations, unknowns))
     scale = np.array([1.0, 1.0, 1.0 / equations.omega_unit, 1.0 / equations.omega_unit])
     covariance = equations.covariance(weight, residual, inflation, n_segments)
     bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
@@ -178,8 +190,18 @@ def _result(
         frequency_hz=spectrum.frequency_hz[lines],
         probe_noise_um2_per_hz=noise_power / phasor_power_per_density(bin_hz),
         noise_share=1.0 - signal_share(equations, weight),
-        n_segments=int(spectrum.n_segments.max()),
+        n_segments=n_averaged,
     )
+
+
+def _smear_share(
+    spectrum: CrossSpectrum, lines: npt.NDArray[np.bool_], n_integrations: int
+) -> FloatArray:
+    """Share of a bearing line that is integrated with a wrong frequency, (n_used, 1)."""
+    bin_hz = spectrum.frequency_hz[1] - spectrum.frequency_hz[0]
+    slope = n_integrations * bin_hz / spectrum.frequency_hz[lines, np.newaxis]
+    share: FloatArray = SMEAR_BINS_SQUARED * slope**2
+    return share
 
 
 def _convinces(found: DynamicStiffness, settings: DynamicSettings) -> bool:

@@ -32,6 +32,8 @@ class NormalEquations:
     spring : (n_lines, 2, 4)
         The same for a bracket of 1 N/m without mass and damping.
     force_power : (n_lines, 2)
+    ratio : (n_lines,)
+        Angular frequency over `omega_unit`.
     omega_unit
         Damping is counted in N/m at this angular frequency, to be as large as stiffness.
     """
@@ -41,6 +43,7 @@ class NormalEquations:
     force: FloatArray
     spring: FloatArray
     force_power: FloatArray
+    ratio: FloatArray
     omega_unit: float
 
     @cached_property
@@ -78,15 +81,15 @@ class NormalEquations:
         Parameters
         ----------
         weight, residual : (n_lines, 2)
-        inflation : (n_lines,)
-            For the correlation of neighbouring lines.
+        inflation : (n_lines, 2, 4)
+            For the correlation of neighbouring lines, for each unknown.
         n_segments
             Independent segments.
         """
         inverse = np.linalg.inv(_weighted(weight, self.true_gram))
-        spread = weight**2 * residual * inflation[:, np.newaxis]
+        spread = np.sqrt(weight**2 * residual)[..., np.newaxis] * np.sqrt(inflation)
         # real part of conj(x) e with circular e: half of its power (Bendat and Piersol, 9.2)
-        score = _weighted(spread, self.gram) / (2.0 * n_segments)
+        score = np.einsum("lra,lab,lrb->rab", spread, self.gram, spread) / (2.0 * n_segments)
         covariance: FloatArray = inverse @ score @ inverse
         return covariance
 
@@ -122,6 +125,7 @@ def normal_equations(
         force=_moment(bracket_n_per_m[:, np.newaxis, np.newaxis] * cross, ratio),
         spring=_moment(cross, ratio),
         force_power=np.abs(bracket_n_per_m[:, np.newaxis]) ** 2 * power,
+        ratio=ratio,
         omega_unit=omega_unit,
     )
 

@@ -46,25 +46,42 @@ def independent_segments(n_segments: int, overlap: float) -> float:
     return n_segments / (1.0 + excess)
 
 
-def neighbour_inflation(used: npt.NDArray[np.bool_]) -> FloatArray:
-    """Factor by which correlated neighbours raise the variance of a sum over lines.
+WHITE_PRODUCTS = tuple(rho**2 for rho in BIN_CORRELATION[1:])
+"""Correlation, 1 and 2 bins apart, of products of two independent white noises."""
 
-    Products of two independent signals, each correlated between bins, correlate with the square of
-    that. A line without used neighbours counts once.
+SMEARED_PRODUCTS = (0.0, -1.0 / 12.0)
+SMEARED_IN_PHASE = (1.0 / 3.0, 1.0 / 12.0)
+"""The same of white noise times what it leaves in a line when each of its parts is integrated with
+the line's frequency instead of its own, d times its share in the bins d = -1, 0, 1 of the taper.
+The second is taken off for the part in phase with the noise and added for the part in quadrature,
+by the cosine of twice the phase."""
+
+SMEAR_BINS_SQUARED = 1.0 / 3.0
+"""Variance of the frequency, in bins, that a line of broadband noise holds."""
+
+
+def neighbour_inflation(
+    used: npt.NDArray[np.bool_], products: tuple[float, ...] = WHITE_PRODUCTS
+) -> FloatArray:
+    """Factor by which correlated neighbours change the variance of a sum over lines.
+
+    A line without used neighbours counts once.
 
     Parameters
     ----------
     used : (n_lines,)
+    products
+        Correlation of the summands 1, 2, ... bins apart.
 
     Returns
     -------
-    (n_lines,) 1 to 1.94.
+    (n_lines,) 1 to 1.94 for white noise.
     """
     counted = used.astype(np.float64)
     inflation = np.ones_like(counted)
-    for distance, correlation in enumerate(BIN_CORRELATION[1:], start=1):
-        inflation[distance:] += correlation**2 * counted[:-distance]
-        inflation[:-distance] += correlation**2 * counted[distance:]
+    for distance, correlation in enumerate(products, start=1):
+        inflation[distance:] += correlation * counted[:-distance]
+        inflation[:-distance] += correlation * counted[distance:]
     return inflation
 
 

@@ -19,7 +19,8 @@ TURN_HZ = (92.3 / 60.0, 92.3 / 60.0)
 BRACKET = BracketDynamics(1.18e9, 0.45e5)
 STIFFNESS = np.array([[1.2e9, -0.33e9], [-0.25e9, 0.7e9]])
 DAMPING = np.array([[1.5e7, 2.0e6], [-1.0e6, 0.9e7]])
-NOISE_FREE = DynamicSettings(probe_noise_um2_per_hz=(0.0, 0.0))
+# These phasors are displacement from the start: nothing is integrated.
+NOISE_FREE = DynamicSettings(probe_noise_um2_per_hz=(0.0, 0.0), n_integrations=0)
 BIN_HZ = float(FREQUENCY_HZ[0])
 
 Recording = Callable[..., ComplexArray]
@@ -152,6 +153,59 @@ def test_the_estimated_floor_is_that_of_the_probes(recording: Recording) -> None
     np.testing.assert_allclose(result.probe_noise_um2_per_hz, 0.05, rtol=0.1)
 
 
+def test_the_floor_of_few_segments_is_not_low(recording: Recording) -> None:
+    probe_um = np.sqrt(0.05 * phasor_power_per_density(BIN_HZ))
+
+    floors = [
+        found(recording(seed, probe_um=probe_um, n_segments=6), DynamicSettings())
+        for seed in range(20)
+    ]
+
+    # Two of six freedoms go into what shaft and bearing share: without them it would be 33 % low.
+    mean = np.mean([result.probe_noise_um2_per_hz for result in floors])
+    assert mean == pytest.approx(0.05, rel=0.08)
+
+
+def test_noise_share_is_the_part_of_the_shafts_motion_that_is_not_motion(
+    recording: Recording,
+) -> None:
+    small = replace(NOISE_FREE, band_hz=(0.6, 3.0))  # where the motion is flat
+    probe_um = 0.5
+    density = probe_um**2 / phasor_power_per_density(BIN_HZ)
+    known = replace(small, probe_noise_um2_per_hz=(density, density))
+
+    assert found(recording(), small).noise_share == 0.0
+    # 0.25 of noise on 1 of motion; the motion falls a little within the band
+    noisy = found(recording(n_segments=400, probe_um=probe_um), known)
+    assert noisy.noise_share == pytest.approx(0.2, abs=0.015)
+
+
+def test_loud_lines_do_not_spoil_what_quiet_ones_know(recording: Recording) -> None:
+    phasors = recording(bearing_um=0.01)
+    rng = np.random.default_rng(8)
+    phasors[:, 2:, :40] += 5.0 * hann_noise(rng, 24, 2)[..., :40]  # below 3 Hz
+
+    spoilt = found(phasors)
+
+    np.testing.assert_allclose(spoilt.k_n_per_m, STIFFNESS, atol=0.005 * STIFFNESS[0, 0])
+
+
+@pytest.mark.parametrize(
+    "stricter",
+    [{"min_signal_share": 0.999}, {"max_relative_uncertainty": 1e-4}, {"min_coherence": 0.9999}],
+)
+def test_each_demand_on_the_evidence_can_refuse_alone(
+    recording: Recording, stricter: dict[str, float]
+) -> None:
+    spectrum = averaged(recording(probe_um=0.1, bearing_um=0.1))
+    base = DynamicSettings(n_integrations=0)
+
+    assert isinstance(dynamic_stiffness(spectrum, BRACKET, TURN_HZ, base), DynamicStiffness)
+    strict = replace(base, **stricter)
+    result = dynamic_stiffness(spectrum, BRACKET, TURN_HZ, strict)
+    assert result is Reason.INSUFFICIENT_EXCITATION
+
+
 def scatter_over_stated(results: list[DynamicStiffness]) -> FloatArray:
     k = np.array([result.k_n_per_m for result in results])
     stated = np.array([result.k_std_n_per_m for result in results])
@@ -232,6 +286,7 @@ def test_channels_of_different_segments_are_refused(recording: Recording) -> Non
         ({"quiet_band_hz": (25.0, 15.0)}, "quiet band"),
         ({"min_segments": 2}, "3 segments"),
         ({"min_lines": 0}, "at least 1"),
+        ({"n_integrations": 3}, "0, 1 or 2"),
     ],
 )
 def test_settings_that_mean_nothing_are_refused(wrong: dict[str, object], message: str) -> None:

@@ -68,8 +68,9 @@ def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude() 
     assert ratio > 1.1 * K_N_PER_M
 
 
-def test_the_stated_uncertainty_is_the_scatter() -> None:
-    results = [found(motion(seed, noise_um=0.5)) for seed in range(400)]
+@pytest.mark.parametrize("n_segments", [3, 24])
+def test_the_stated_uncertainty_is_the_scatter(n_segments: int) -> None:
+    results = [found(motion(seed, n_segments, noise_um=0.5)) for seed in range(400)]
 
     for value, stated in (("k_n_per_m", "k_std_n_per_m"), ("c_n_s_per_m", "c_std_n_s_per_m")):
         scatter = np.std([getattr(result, value) for result in results])

@@ -60,6 +60,9 @@ def test_an_accuracy_that_means_nothing_is_refused(name: str, value: float) -> N
         BearingAccuracy(**{name: value})
 
 
+SHAFT_UM_PK = 1.45  # root mean square of 50 phasors of variance 2
+
+
 @pytest.fixture
 def at_line() -> tuple[Budget, Budget]:
     """Budgets of `ratio` and of the stiffness of `transfer`, at a line of coherence 0.97."""
@@ -95,6 +98,7 @@ def test_gains_and_bracket_are_what_limits_a_well_excited_line(
         lines = {line.name: line.contribution / budget.value for line in budget.lines}
         assert lines["gain of shaft probe"] == pytest.approx(0.05 / math.sqrt(3.0))
         assert lines["gain of bearing transducer"] == pytest.approx(0.05 / math.sqrt(3.0))
+        assert lines["runout"] == pytest.approx(0.1 / SHAFT_UM_PK / math.sqrt(3.0), rel=0.03)
         # Slightly more than its share, as the bracket's inertia is taken off.
         assert lines["bracket stiffness"] == pytest.approx(0.1 / math.sqrt(3.0), rel=0.005)
 

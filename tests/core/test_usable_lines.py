@@ -8,6 +8,9 @@ from core.lines import bin_phasors, tapered
 from core.spectral_statistics import (
     BIN_CORRELATION,
     CORRELATED_LINES,
+    SMEAR_BINS_SQUARED,
+    SMEARED_IN_PHASE,
+    SMEARED_PRODUCTS,
     independent_segments,
     leakage_kernel,
     neighbour_inflation,
@@ -114,3 +117,32 @@ def test_overlapping_segments_count_for_less_as_welch_found() -> None:
     taper = signal.get_window("hann", 1024)
     three_quarters = float(taper[256:] @ taper[:-256]) / float(taper @ taper)
     assert independent_segments(2, 0.75) == pytest.approx(2.0 / (1.0 + three_quarters**2), rel=1e-3)
+
+
+def test_what_integration_leaves_behind_hangs_together_as_stated() -> None:
+    """White acceleration, integrated twice at the bins and in time, differs by the smear."""
+    rng = np.random.default_rng(6)
+    n_segments, bins = 400, np.arange(60, 160)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(16384, 1.0 / 600.0)[1:]
+    tones = rng.normal(size=(2, n_segments, omega.size))
+    spectrum = np.pad(tones[0] + 1j * tones[1], ((0, 0), (1, 0)))
+    acceleration = np.fft.irfft(spectrum)[:, 4096:12288]
+    spectrum[:, 1:] /= -(omega**2)
+    spectrum[:, :30] = 0.0  # far below the bins looked at; their leakage is another matter
+    displacement = np.fft.irfft(spectrum)[:, 4096:12288]
+    moved = bin_phasors(tapered(displacement), 200)[:, bins]
+    at_bins = bin_phasors(tapered(acceleration), 200)[:, bins]
+    at_bins = at_bins / -((2.0 * np.pi * (bins + 1) * BIN_HZ) ** 2)
+
+    left = at_bins - moved
+
+    share = (np.abs(left) ** 2).mean(axis=0) / (np.abs(moved) ** 2).mean(axis=0)
+    stated = SMEAR_BINS_SQUARED * (2.0 / (bins + 1)) ** 2
+    assert np.mean(share / stated) == pytest.approx(1.0, abs=0.1)
+    product = left * moved.conj() / (np.abs(moved) ** 2).mean(axis=0) * (bins + 1)
+    for distance, (apart, in_phase) in enumerate(
+        zip(SMEARED_PRODUCTS, SMEARED_IN_PHASE, strict=True), start=1
+    ):
+        for part, stated in ((product.real, apart - in_phase), (product.imag, apart + in_phase)):
+            found = (part[:, :-distance] * part[:, distance:]).mean() / (part**2).mean()
+            assert found == pytest.approx(stated, abs=0.03)
