@@ -14,6 +14,7 @@ from service.api.context import Context
 from service.conversion import analysis_of
 from service.live import LiveView
 from service.recorder import Recorder
+from service.references import ReferencesInForce
 from service.runner import Runner
 from service.settings.plant import PlantFile
 from service.store.port import Store
@@ -90,7 +91,11 @@ async def _run(
     refresh_s = _refresh_s(plant)
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s)
     recorder = Recorder(store, live, clock)
-    runner = Runner(watched_units(plant, clock), live, recorder, clock)
+    units = watched_units(plant, clock)
+    runner = Runner(units, live, recorder, clock)
+    monitors = {unit: watched.monitor for unit, watched in units.items()}
+    references = ReferencesInForce(monitors, store, clock)
+    await references.look()  # before the first result
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -98,6 +103,7 @@ async def _run(
         store=store,
         clock=clock,
         refresh_s=refresh_s,
+        references=references,
     )
     config = uvicorn.Config(
         create_app(context),
@@ -111,12 +117,13 @@ async def _run(
     try:
         async with asyncio.TaskGroup() as tasks:
             running = tasks.create_task(runner.run(), name="run")
+            looking = tasks.create_task(references.run(), name="references")
             serving = tasks.create_task(server.serve([listener]), name="serve")
             announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
             await stopped.wait()
             server.should_exit = True
-            running.cancel()
-            announcing.cancel()
+            for task in (running, looking, announcing):
+                task.cancel()
             await asyncio.wait([serving])
     finally:
         await recorder.flush()  # also when a bug ends the program

@@ -13,6 +13,7 @@ from service.api.problems import (
     install_problem_handlers,
     refuse_unknown_parameters,
 )
+from service.api.reference_routes import reference_router
 from service.dashboard.routes import dashboard_router
 
 DESCRIPTION = """
@@ -40,6 +41,7 @@ def create_app(context: Context) -> FastAPI:
         plant_router(context),
         gap_router(context),
         bearing_router(context),
+        reference_router(context),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     app.include_router(dashboard_router())

@@ -10,9 +10,10 @@ from pydantic import BeforeValidator
 from core.estimators import STIFFNESS_OF
 from core.quantities import BY_NAME
 from core.units import ns_from_s
+from service.api.bearing_models import BearingModel
+from service.api.bearing_views import bearing_model
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.models import (
-    BearingModel,
     BudgetModel,
     GapModel,
     LatestModel,
@@ -89,12 +90,12 @@ def bearing_router(context: Context) -> APIRouter:
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
     async def bearings(unit: UnitId) -> list[BearingModel]:
-        """The unit's guide bearings as configured."""
+        """The unit's guide bearings as configured, with their references in force."""
         return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
 
     @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
     async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
-        """Bracket, clearance, reference and channels."""
+        """Bracket, clearance, channels, and the reference in force with where it comes from."""
         return _bearing(context, unit, bearing)
 
     @router.get("/{bearing}/latest", summary="One bearing now", responses=unknown)
@@ -195,20 +196,10 @@ def gap_router(context: Context) -> APIRouter:
 
 
 def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
-    settings = context.bearing(unit, bearing)
-    return BearingModel(
-        unit=unit,
-        id=bearing,
-        bracket_stiffness_n_per_m=settings.bracket_stiffness_n_per_m,
-        clearance_um=settings.clearance_um,
-        gap_reference_um=list(settings.gap_reference_um),
-        channels={
-            "shaft_x": settings.shaft_x,
-            "shaft_y": settings.shaft_y,
-            "bearing_x": settings.bearing_x,
-            "bearing_y": settings.bearing_y,
-        },
-    )
+    context.bearing(unit, bearing)
+    references = context.references
+    watched = references.bearing(unit, bearing)
+    return bearing_model(unit, watched, references.of(unit, bearing))
 
 
 def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:

@@ -9,6 +9,7 @@ from fastapi import Path
 from acquisition.clock import Clock
 from service.api.problems import ProblemError
 from service.live import LiveView
+from service.references import ReferencesInForce
 from service.settings.bearings import BearingSettings
 from service.settings.units import UnitSettings
 from service.store.port import Store
@@ -36,6 +37,7 @@ class Context:
     store: Store
     clock: Clock
     refresh_s: float
+    references: ReferencesInForce
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

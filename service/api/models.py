@@ -241,28 +241,6 @@ class OverviewModel(ApiModel):
     """All units."""
 
 
-class BearingModel(ApiModel):
-    """A bearing as configured."""
-
-    unit: str
-    """Unit."""
-
-    id: str
-    """Bearing."""
-
-    bracket_stiffness_n_per_m: float
-    """Radial stiffness of the bracket."""
-
-    clearance_um: float
-    """Radial clearance in operation."""
-
-    gap_reference_um: list[float]
-    """Probe gaps [x, y] with the shaft centred."""
-
-    channels: dict[str, str]
-    """Channel ids of shaft_x, shaft_y, bearing_x and bearing_y."""
-
-
 class QuantityModel(ApiModel):
     """A quantity that trends can be asked for."""
 

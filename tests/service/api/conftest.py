@@ -15,6 +15,7 @@ from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.live import LinkState, LiveView
+from service.references import ReferencesInForce
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
@@ -67,6 +68,7 @@ class Service:
     live: LiveView
     store: SqliteStore
     clock: SetClock
+    references: ReferencesInForce
     client: httpx2.AsyncClient
     document: dict[str, Any]
 
@@ -114,6 +116,9 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
     """A service that has just started: nothing is connected, nothing stored."""
     clock = SetClock()
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
+    analysis = analysis_of(plant.analysis)
+    monitors = {unit.id: UnitMonitor(machine_of(unit), analysis) for unit in plant.unit}
+    references = ReferencesInForce(monitors, store, clock)
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -121,11 +126,12 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
         store=store,
         clock=clock,
         refresh_s=11.95,
+        references=references,
     )
     app = create_app(context)
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
-        yield Service(live, store, clock, client, app.openapi())
+        yield Service(live, store, clock, references, client, app.openapi())
 
 
 @pytest.fixture

@@ -100,6 +100,8 @@ async def test_a_bearing_is_described_as_configured(running: Any) -> None:
         "bracket_stiffness_n_per_m": 1.18e9,
         "clearance_um": 200.0,
         "gap_reference_um": [2000.0, 2000.0],
+        "opposite_reference_um": None,
+        "reference": {"source": "plant_file", "set": None, "author": None, "note": None},
         "channels": {
             "shaft_x": "ujb_shaft_x",
             "shaft_y": "ujb_shaft_y",

@@ -12,6 +12,7 @@ from core.account import Gap
 from service.api.app import create_app
 from service.api.context import Context
 from service.recorder import Findings
+from service.references import ReferencesInForce
 from service.store.port import TrendQuery, UnitGap
 
 Make = Callable[..., Any]
@@ -87,7 +88,8 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
 ) -> None:
     break_store(plant)
     source = scripted([block(number) for number in range(36)], ends=False)
-    app = create_app(Context("Plant", {}, plant.live, plant.store, plant.clock, 9.0))
+    references = ReferencesInForce({}, plant.store, plant.clock)
+    app = create_app(Context("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references))
     running = asyncio.create_task(plant.runner(U1=source).run())
     client = httpx2.AsyncClient(transport=httpx2.ASGITransport(app), base_url="http://padwatch")
 
