@@ -20,11 +20,12 @@ Key = tuple[str, str]
 """Unit and bearing."""
 
 
-def has_opposite_probes(bearing: Bearing) -> bool:
-    """Whether the gap is also measured across the shaft, on either axis."""
-    probes = (bearing.opposite_x, bearing.opposite_y)
-    slow = (bearing.opposite_gap_x, bearing.opposite_gap_y)
-    return any(channel is not None for channel in (*probes, *slow))
+def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
+    """Whether the gap is also measured across the shaft, in x and in y."""
+    return (
+        (bearing.opposite_x or bearing.opposite_gap_x) is not None,
+        (bearing.opposite_y or bearing.opposite_gap_y) is not None,
+    )
 
 
 def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
@@ -33,7 +34,7 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
     A reference without gaps of the opposite probes leaves those of the plant file as they are.
     """
     opposite = reference.opposite_reference_um
-    if opposite is None or not has_opposite_probes(bearing):
+    if opposite is None or not any(opposite_axes(bearing)):
         opposite = bearing.opposite_reference_um
     return replace(
         bearing,

@@ -158,9 +158,14 @@ def recording_source(
     return RecordingSource(recording, clock, selection)
 
 
+def database_path(plant: PlantFile) -> Path:
+    """Where the plant's database is, or would be."""
+    return Path(plant.service.data_folder) / DATABASE
+
+
 def open_store(plant: PlantFile) -> Store:
     """The plant's database, created if need be."""
-    return SqliteStore(Path(plant.service.data_folder) / DATABASE)
+    return SqliteStore(database_path(plant))
 
 
 def scenario_of(simulation: SimulationSettings) -> Scenario:

@@ -6,7 +6,7 @@ import traceback
 
 import typer
 
-from service.cli import config
+from service.cli import config, reference
 from service.cli.daq import daq
 from service.cli.demo import demo
 from service.cli.logs import set_up_logging
@@ -25,6 +25,7 @@ app.command()(record)
 app.command()(reanalyse)
 app.command()(validate)
 app.add_typer(config.app, name="config")
+app.add_typer(reference.app, name="reference")
 
 
 @app.callback()

@@ -1,0 +1,143 @@
+"""`padwatch reference`: set and list the probe gaps with the shaft centred."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from typing import Annotated
+
+import typer
+from pydantic import TypeAdapter
+
+from acquisition.clock import SystemClock
+from core.machine import Bearing
+from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.cli.reference_listing import BearingReferences, bearing_references, text_lines
+from service.cli.units import UnitOption, one_unit
+from service.conversion import machine_of
+from service.reference_setting import (
+    Gaps,
+    ReferenceRefusedError,
+    doubts,
+    given_gaps,
+    measured_gaps,
+)
+from service.settings.plant import PlantFile
+from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.port import Store, StoreError
+from service.wiring import database_path, open_store
+
+app = typer.Typer(
+    no_args_is_help=True, help="Set or list references: the probe gaps with the shaft centred."
+)
+
+Gap = Annotated[float | None, typer.Option(help="Gap in µm, above 0 up to 10000.")]
+
+
+@app.command("set")
+def set_reference(
+    plant_file: PlantPath,
+    bearing: Annotated[str, typer.Option(help="Bearing of the unit.")],
+    author: Annotated[str, typer.Option(help="Who sets it, at most 80 characters.")],
+    unit: UnitOption = None,
+    x_um: Gap = None,
+    y_um: Gap = None,
+    opposite_x_um: Gap = None,
+    opposite_y_um: Gap = None,
+    measured: Annotated[
+        bool, typer.Option("--measured", help="Take the mean gaps of the newest stored result.")
+    ] = False,
+    note: Annotated[str, typer.Option(help="At most 500 characters.")] = "",
+    json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Set the reference of a bearing, from now on; a running service takes it over in seconds.
+
+    Earlier references are kept. Results that are stored already do not change.
+    """
+    plant = read_plant_file(plant_file)
+    machine = machine_of(one_unit(plant, unit, plant_file))
+    found = _one_bearing(machine.bearings, bearing, machine.id)
+    given = ((x_um, y_um), (opposite_x_um, opposite_y_um))
+    if measured and given != ((None, None), (None, None)):
+        fail("padwatch reference set: give gaps or --measured, not both", code=2)
+    try:
+        gaps = _measured(plant, machine.id, found) if measured else given_gaps(found, *given)
+        reference = GapReference(
+            unit=machine.id,
+            bearing=found.id,
+            set_ns=SystemClock().now_ns(),
+            author=author.strip(),
+            gap_reference_um=gaps[0],
+            opposite_reference_um=gaps[1],
+            source=ReferenceSource.MEASURED if measured else ReferenceSource.GIVEN,
+            note=note.strip(),
+        )
+        now = bearing_references(machine.id, found, _add(plant, reference))
+    except (ReferenceRefusedError, ValueError) as error:
+        fail(f"padwatch reference set: unit {machine.id} bearing {found.id}: {error}", code=2)
+    except StoreError as error:
+        fail(f"padwatch reference set: {error}")
+    typer.echo(now.model_dump_json(indent=1) if json_output else "\n".join(text_lines(now)))
+
+
+@app.command("list")
+def list_references(
+    plant_file: PlantPath,
+    json_output: Annotated[
+        bool, typer.Option("--json", help="Print a JSON array instead of lines.")
+    ] = False,
+) -> None:
+    """List the reference in force of every bearing, and those before it."""
+    plant = read_plant_file(plant_file)
+    try:
+        found = list(_all_references(plant))
+    except StoreError as error:
+        fail(f"padwatch reference list: {error}")
+    if json_output:
+        typer.echo(TypeAdapter(list[BearingReferences]).dump_json(found, indent=1).decode())
+    else:
+        typer.echo("\n".join(line for references in found for line in text_lines(references)))
+
+
+def _all_references(plant: PlantFile) -> Iterator[BearingReferences]:
+    with _existing_store(plant) as store:
+        for settings in plant.unit:
+            machine = machine_of(settings)
+            for bearing in machine.bearings:
+                history = store.reference_history(machine.id, bearing.id) if store else ()
+                yield bearing_references(machine.id, bearing, history)
+
+
+def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
+    """Store a reference and return its bearing's history."""
+    path = database_path(plant)
+    if not path.exists():  # its folder may be relative to another one than this
+        typer.echo(f"{path.absolute()}: a new database; is that where the service runs?", err=True)
+    with closing(open_store(plant)) as store:
+        store.add_reference(reference)
+        return store.reference_history(reference.unit, reference.bearing)
+
+
+@contextmanager
+def _existing_store(plant: PlantFile) -> Iterator[Store | None]:
+    """The plant's database; looking at one that is not there must not create it."""
+    if not database_path(plant).exists():
+        yield None
+        return
+    with closing(open_store(plant)) as store:
+        yield store
+
+
+def _measured(plant: PlantFile, unit: str, bearing: Bearing) -> Gaps:
+    with _existing_store(plant) as store:
+        newest = store.newest(unit, bearing.id) if store else None
+    gaps = measured_gaps(bearing, newest, SystemClock().now_ns())
+    for doubt in doubts(newest) if newest else ():
+        typer.echo(f"unit {unit} bearing {bearing.id}: {doubt}", err=True)
+    return gaps
+
+
+def _one_bearing(bearings: tuple[Bearing, ...], id_: str, unit: str) -> Bearing:
+    chosen = [bearing for bearing in bearings if bearing.id == id_]
+    if not chosen:
+        known = ", ".join(bearing.id for bearing in bearings)
+        fail(f"padwatch reference set: unit {unit} has no bearing {id_}, it has {known}", code=2)
+    return chosen[0]
