@@ -7,6 +7,7 @@ from core.arrays import SampleArray
 from core.cross_spectrum import CrossSpectrum
 from core.estimators import Estimator
 from core.quality import Quality, Reading
+from core.runout import RunoutVerdict
 from core.speed import SpeedSource
 from core.uncertainty import Budget
 
@@ -73,6 +74,9 @@ class Assessment:
         Where `stiffness` came from, by axes "xx" and "yy"; None if there is none.
     spectrum
         At the bins; displacement, µm.
+    runout
+        Whether the slow-roll vector was taken off 1× of the newest segment, by "shaft_x" and
+        "shaft_y".
     """
 
     unit: str
@@ -86,3 +90,4 @@ class Assessment:
     estimators: Mapping[str, Estimator | None]
     spectrum: CrossSpectrum
     orbit: OrbitTrace | None
+    runout: Mapping[str, RunoutVerdict]

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.cross_spectrum import CrossSpectrum, average
+from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum, average
 from core.estimators import Estimator, preferred_stiffness
 from core.film_results import film_results
 from core.line_results import OrderLine
@@ -22,6 +22,7 @@ from core.quality import (
     uncertain,
     worst,
 )
+from core.runout import RunoutVerdict
 from core.segments import ORDER1, VORTEX, Segment
 from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
@@ -123,7 +124,21 @@ class BearingResults:
 
     def _order_line(self, line: int) -> OrderLine:
         read = self._line_quality if line == ORDER1 or self._unit.has_vortex else _switched_off
-        return OrderLine(self._bearing, self._settings, self._orders, self.spectrum, line, read)
+        return OrderLine(
+            self._bearing,
+            self._settings,
+            self._orders,
+            self.spectrum,
+            line,
+            read,
+            frozenset(place for place in (SHAFT_X, SHAFT_Y) if self._is_round(place)),
+        )
+
+    def _is_round(self, place: int) -> bool:
+        """Whether runout was taken off all that is averaged; one segment with it is too much."""
+        channel = self._bearing.channels[place]
+        counted = zip(self._segments, self._usable[:, place], strict=True)
+        return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
 
     def _order(self, prefix: str, line: int) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
         order = self._order_line(line)

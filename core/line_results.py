@@ -54,6 +54,8 @@ class OrderLine:
         Which of the order lines.
     quality
         Of what is read from some channels at an order line; without a number, why.
+    round_shafts
+        Shaft channels whose runout was taken off at 1×.
     """
 
     bearing: Bearing
@@ -62,11 +64,12 @@ class OrderLine:
     bins: CrossSpectrum
     line: int
     quality: Callable[..., Quality | Reading]
+    round_shafts: frozenset[int] = frozenset()
 
-    @property
-    def _runout_um_pk(self) -> float:
+    def _runout_um_pk(self, shaft: int) -> float:
         """Runout is locked to the shaft, so that the vortex is free of it."""
-        return self.bearing.runout_um_pk if self.line == ORDER1 else 0.0
+        free = self.line != ORDER1 or shaft in self.round_shafts
+        return 0.0 if free else self.bearing.runout_um_pk
 
     def amplitudes(self) -> dict[str, Reading]:
         """Amplitude of each channel, by name."""
@@ -129,7 +132,7 @@ class OrderLine:
         )
         if few or found is None:
             return shown, k_eff, missing(Reason.FEW_SEGMENTS), missing(Reason.FEW_SEGMENTS)
-        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk)
+        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk(shaft))
         budgets[f"transfer_k_{axes}_n_per_m"] = of_k
         budgets[f"transfer_c_{axes}_n_s_per_m"] = of_c
         return shown, k_eff, reading_of(of_k, quality), reading_of(of_c, quality)
@@ -153,7 +156,7 @@ class OrderLine:
             self.bearing.bracket,
             self.bearing.accuracy,
             n_segments,
-            self._runout_um_pk,
+            self._runout_um_pk(shaft),
         )
         if budget is None:
             return Reading(k_eff, quality)
@@ -171,7 +174,8 @@ class OrderLine:
         if (few or self.line == VORTEX) and not self._stands_out(shaft):
             return quiet
         # few segments are coherent with anything
-        limits = LineLimits(0.0 if few else self.settings.min_coherence, self._runout_um_pk)
+        runout_um_pk = self._runout_um_pk(shaft)
+        limits = LineLimits(0.0 if few else self.settings.min_coherence, runout_um_pk)
         if few and not self._stands_out(bearing):
             return quiet
         reason = line_excitation(self.orders, self.line, shaft, bearing, limits)

@@ -6,6 +6,7 @@ from enum import StrEnum
 from core.bracket import BracketDynamics
 from core.estimators import PREFERENCE, Estimator
 from core.probe_axes import GapAccuracy
+from core.runout import SlowRollVector
 from core.transducer_response import Response
 from core.uncertainty import BearingAccuracy
 
@@ -17,6 +18,7 @@ class Measurand(StrEnum):
     DISPLACEMENT_UM = "displacement_um"
     VELOCITY_MM_S = "velocity_mm_s"
     ACCELERATION_M_S2 = "acceleration_m_s2"
+    KEY_PHASE_V = "key_phase_v"
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,16 @@ class Channel:
     ----------
     direction
         +1 if a growing reading means motion along the positive bearing axis, -1 if against it. A
-        probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1.
+        probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1. Of a
+        key-phase, -1 if its pulses fall.
     response
         How the transducer changes the signal with frequency; none if it does not.
     unit_per_count
         The channel's unit per count of its converter; zero where it is not known.
+    probe
+        Serial number or mark of the probe that is there; empty where it is not known.
+    slow_roll
+        Runout of the shaft under it, where it was measured.
     """
 
     id: str
@@ -39,6 +46,8 @@ class Channel:
     direction: int = 1
     response: Response | None = None
     unit_per_count: float = 0.0
+    probe: str = ""
+    slow_roll: SlowRollVector | None = None
 
 
 @dataclass(frozen=True)
@@ -121,6 +130,8 @@ class Unit:
         +1 if the shaft turns from x to y, -1 if it turns from y to x.
     has_vortex
         Whether a part-load vortex can occur: in Francis turbines, not in Kaplan turbines.
+    key_phase
+        Waveform channel with one pulse a turn, where there is one.
     """
 
     id: str
@@ -132,3 +143,4 @@ class Unit:
     power_channel: str | None = None
     rotation_sense: int = 1
     has_vortex: bool = True
+    key_phase: str | None = None

@@ -171,6 +171,10 @@ class UnitMonitor:
             estimators=results.estimators,
             spectrum=results.spectrum,
             orbit=self._orbit(bearing, newest),
+            runout={
+                "shaft_x": newest.runout[bearing.shaft_x],
+                "shaft_y": newest.runout[bearing.shaft_y],
+            },
         )
 
     def _orbit(self, bearing: Bearing, newest: Segment) -> OrbitTrace | None:

@@ -9,10 +9,13 @@ import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import average
+from core.key_phase import KeyPhase, read_key_phase
 from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.quality import Level, Quality, Reading, Reason, bad, worst
 from core.ring import Window
+from core.runout import RunoutVerdict
+from core.segment_runout import without_runout
 from core.sensor_checks import quietest_rms, signal_quality
 from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
@@ -39,7 +42,10 @@ class Segment:
     order_frequency_hz
         (2,) exact frequencies of 1× and of the vortex.
     order_phasors_um_pk
-        (n_channels, 2) displacement phasors at exactly these.
+        (n_channels, 2) displacement phasors at exactly these, 1× without runout where that can be
+        taken off.
+    runout
+        Whether it was, by shaft channel.
     """
 
     epoch: int
@@ -53,6 +59,7 @@ class Segment:
     bin_phasors_um_pk: ComplexArray
     order_frequency_hz: FloatArray
     order_phasors_um_pk: ComplexArray
+    runout: Mapping[str, RunoutVerdict]
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
@@ -79,6 +86,7 @@ class SegmentTransform:
         shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
         self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
         ids = [channel.id for channel in unit.channels]
+        self._key_phase_row = ids.index(unit.key_phase) if unit.key_phase else None
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
         self.segments: deque[Segment] = deque(maxlen=settings.n_segments)
 
@@ -97,9 +105,11 @@ class SegmentTransform:
         prepared = tapered(samples)
         bins = bin_phasors(prepared, self.frequency_hz.size) * self._bin_factor
         mean = samples.mean(axis=1)
-        speed = self._speed(window, bins, _usable(quality))
+        key_phase = self._key_phase(samples, window.rate_hz, _usable(quality))
+        speed = self._speed(window, bins, _usable(quality), key_phase)
         quality = self._judged(quality, samples, mean, turning=speed.rpm.value is not None)
         order_hz = self._order_frequencies(speed, bins, _usable(quality))
+        orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
@@ -111,8 +121,8 @@ class SegmentTransform:
             speed=speed,
             bin_phasors_um_pk=bins,
             order_frequency_hz=order_hz,
-            order_phasors_um_pk=exact_phasors(prepared, window.rate_hz, order_hz)
-            * _factors(self._unit.channels, order_hz),
+            order_phasors_um_pk=orders,
+            runout=runout,
         )
         self._keep(segment)
         return segment
@@ -138,9 +148,42 @@ class SegmentTransform:
             for q, (c, rms, at) in zip(quality, moved, strict=True)
         )
 
-    def _speed(self, window: Window, bins: ComplexArray, usable: npt.NDArray[np.bool_]) -> Speed:
+    def _key_phase(
+        self, samples: FloatArray, rate_hz: float, usable: npt.NDArray[np.bool_]
+    ) -> KeyPhase | None:
+        row = self._key_phase_row
+        if row is None or not usable[row]:
+            return None
+        found = read_key_phase(self._unit.channels[row].direction * samples[row], rate_hz)
+        return found if isinstance(found, KeyPhase) else None
+
+    def _speed(
+        self,
+        window: Window,
+        bins: ComplexArray,
+        usable: npt.NDArray[np.bool_],
+        key_phase: KeyPhase | None,
+    ) -> Speed:
         power = _power(bins, usable & self._is_shaft)
-        return running_speed(self._unit, window.slow, self.frequency_hz, power, self._settings)
+        return running_speed(
+            self._unit, window.slow, self.frequency_hz, power, self._settings, key_phase
+        )
+
+    def _orders(
+        self,
+        prepared: FloatArray,
+        rate_hz: float,
+        order_hz: FloatArray,
+        speed: Speed,
+        key_phase: KeyPhase | None,
+    ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
+        phasors = exact_phasors(prepared, rate_hz, order_hz)
+        phasors *= _factors(self._unit.channels, order_hz)
+        rows = np.flatnonzero(self._is_shaft).tolist()
+        phasors[:, ORDER1], runout = without_runout(
+            phasors[:, ORDER1], self._unit, rows, speed, key_phase
+        )
+        return phasors, runout
 
     def _order_frequencies(
         self, speed: Speed, bins: ComplexArray, usable: npt.NDArray[np.bool_]

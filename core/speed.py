@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from core.arrays import FloatArray
+from core.key_phase import KeyPhase
 from core.lines import peak_frequency_hz
 from core.machine import Unit
 from core.quality import Reading, Reason, missing, uncertain
@@ -21,6 +22,7 @@ LINE_SEARCH = (0.85, 1.15)
 class SpeedSource(StrEnum):
     """Where the running speed came from; shown with every result."""
 
+    KEY_PHASE = "key_phase"
     SLOW_CHANNEL = "slow_channel"
     LINE = "line"
     RATED = "rated"
@@ -40,11 +42,12 @@ def running_speed(
     frequency_hz: FloatArray,
     shaft_power: FloatArray,
     settings: AnalysisSettings,
+    key_phase: KeyPhase | None = None,
 ) -> Speed:
-    """Take the best speed there is: the speed channel, else the 1× line, else the rated value.
+    """Take the best speed there is: key-phase, else speed channel, else 1× line, else rated value.
 
-    A speed channel that the 1× line contradicts is doubted; one that no machine reaches is not
-    used.
+    One that the 1× line contradicts is doubted, and so is a key-phase that the speed channel
+    contradicts; one that no machine reaches is not used.
 
     Parameters
     ----------
@@ -52,20 +55,41 @@ def running_speed(
         Slow readings of the same time.
     frequency_hz, shaft_power : (n_lines,)
         Power of the shaft channels together, in which the 1× line is looked for.
+    key_phase
+        What the pulses say, if they are one a turn.
     """
-    measured = slow.get(unit.speed_channel) if unit.speed_channel else None
-    if measured is not None and measured.value is not None:
+    slow_rpm = slow.get(unit.speed_channel) if unit.speed_channel else None
+    for source, measured in (
+        (SpeedSource.KEY_PHASE, _pulsed(key_phase, slow_rpm, settings)),
+        (SpeedSource.SLOW_CHANNEL, slow_rpm),
+    ):
+        if measured is None or measured.value is None:
+            continue
         if 0.0 <= measured.value < settings.min_speed_fraction * unit.rated_speed_rpm:
-            return Speed(missing(Reason.STANDSTILL), SpeedSource.SLOW_CHANNEL)
+            return Speed(missing(Reason.STANDSTILL), source)
         line_rpm = _line_rpm(measured.value, frequency_hz, shaft_power, settings)
         checked = checked_speed(measured, line_rpm, unit.rated_speed_rpm, settings.sensors)
         if checked.value is not None:
-            return Speed(checked, SpeedSource.SLOW_CHANNEL)
+            return Speed(checked, source)
     doubtful = uncertain(Reason.SPEED_UNKNOWN)
     line_rpm = _line_rpm(unit.rated_speed_rpm, frequency_hz, shaft_power, settings)
     if line_rpm is not None:
         return Speed(Reading(line_rpm, doubtful), SpeedSource.LINE)
     return Speed(Reading(unit.rated_speed_rpm, doubtful), SpeedSource.RATED)
+
+
+def _pulsed(
+    key_phase: KeyPhase | None, slow_rpm: Reading | None, settings: AnalysisSettings
+) -> Reading | None:
+    """Speed by the key-phase, doubted where a speed channel says otherwise."""
+    if key_phase is None:
+        return None
+    other_rpm = slow_rpm.value if slow_rpm is not None else None
+    if other_rpm is None or abs(other_rpm - key_phase.speed_rpm) <= (
+        settings.sensors.speed_tolerance * key_phase.speed_rpm
+    ):
+        return Reading(key_phase.speed_rpm)
+    return Reading(key_phase.speed_rpm, uncertain(Reason.SPEED_IMPLAUSIBLE))
 
 
 def _line_rpm(

@@ -10,7 +10,7 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
     """Displacement phasor in µm per phasor of the channel's own engineering unit.
 
     Velocity is integrated once, acceleration twice, by division by iω and (iω)²; what the
-    transducer's own response did to the signal is undone.
+    transducer's own response did to the signal is undone. A key-phase shows no displacement: zero.
 
     Parameters
     ----------
@@ -36,6 +36,8 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
             factor = 1e3 / i_omega
         case Measurand.ACCELERATION_M_S2:
             factor = 1e6 / i_omega**2
+        case Measurand.KEY_PHASE_V:
+            return np.zeros_like(i_omega)
     if channel.response is not None:
         factor = factor / channel.response.at(frequency_hz)
     return channel.direction * factor

@@ -121,7 +121,7 @@ def test_corners_and_damping_that_cannot_be_are_refused(value: float) -> None:
         HighPass(1.0, 3)
 
 
-@pytest.mark.parametrize("measurand", Measurand)
+@pytest.mark.parametrize("measurand", [m for m in Measurand if m != Measurand.KEY_PHASE_V])
 @pytest.mark.parametrize("name", RESPONSES)
 def test_the_analysis_takes_out_what_the_transducer_put_in(name: str, measurand: Measurand) -> None:
     plain = Channel("vx", measurand, -1)

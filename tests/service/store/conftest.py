@@ -41,6 +41,7 @@ def build_assessment(
         estimators={"xx": None, "yy": None},
         spectrum=nothing,
         orbit=None,
+        runout={},
     )
 
 

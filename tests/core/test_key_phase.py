@@ -1,0 +1,146 @@
+"""A key-phase gives the shaft's angle and speed when every pulse is where it belongs, or neither."""
+
+import math
+
+import numpy as np
+import pytest
+
+from core.arrays import FloatArray
+from core.key_phase import KeyPhase, KeyPhaseFault, read_key_phase, rising_edges
+
+RATE_HZ = 600.0
+N_SAMPLES = 8192
+WIDTH_TURNS = 6.0 / 360.0
+
+
+def turned(speed_rpm: float, angle_rad: float) -> FloatArray:
+    return angle_rad / (2 * math.pi) + speed_rpm / 60 / RATE_HZ * np.arange(N_SAMPLES)
+
+
+def steps(speed_rpm: float, angle_rad: float) -> FloatArray:
+    """Pulses of 5 V with edges that a sample tells no more of than on which side it is."""
+    return np.where(turned(speed_rpm, angle_rad) % 1.0 < WIDTH_TURNS, 5.0, 0.2)
+
+
+def pulses(speed_rpm: float, angle_rad: float) -> FloatArray:
+    """The same, averaged over each sampling interval as a converter does."""
+    step = speed_rpm / 60 / RATE_HZ
+    edges = turned(speed_rpm, angle_rad)[:, np.newaxis] + step * np.array([-0.5, 0.5])
+    so_far = np.floor(edges) * WIDTH_TURNS + np.minimum(edges % 1.0, WIDTH_TURNS)
+    return 0.2 + 4.8 * np.diff(so_far, axis=1)[:, 0] / step
+
+
+def angle_error_deg(found: KeyPhase, angle_rad: float) -> float:
+    return math.degrees(
+        (found.shaft_angle_rad - angle_rad + math.pi) % (2 * math.pi) - math.pi,
+    )
+
+
+def edges_of(signal: FloatArray) -> list[int]:
+    return [math.ceil(edge) for edge in rising_edges(signal)]
+
+
+@pytest.mark.parametrize("speed_rpm", [60.0, 76.6, 92.3, 90.909, 120.0, 143.7, 150.0])
+@pytest.mark.parametrize("angle_rad", [0.0, 0.9, 3.3, 6.2])
+def test_clean_pulses_give_angle_and_speed(speed_rpm: float, angle_rad: float) -> None:
+    found = read_key_phase(pulses(speed_rpm, angle_rad), RATE_HZ)
+
+    assert isinstance(found, KeyPhase)
+    assert abs(angle_error_deg(found, angle_rad)) < 0.2
+    assert found.speed_rpm == pytest.approx(speed_rpm, rel=5e-5)
+    assert 0.0 <= found.shaft_angle_rad < 2 * math.pi
+
+
+@pytest.mark.parametrize("speed_rpm", np.linspace(60.0, 150.0, 91).tolist())
+def test_edges_without_slope_still_give_angle_and_speed(speed_rpm: float) -> None:
+    found = read_key_phase(steps(speed_rpm, 0.9), RATE_HZ)
+
+    assert isinstance(found, KeyPhase)
+    # where a turn is a whole number of samples, all edges are late alike, by half a sample at most
+    assert abs(angle_error_deg(found, 0.9)) < 1.0
+    assert found.speed_rpm == pytest.approx(speed_rpm, rel=1.5e-4)
+
+
+def test_edges_lie_between_the_samples() -> None:
+    ramp = np.array([0.0, 0.0, 0.1, 0.7, 1.0, 1.0, 0.0, 0.0, 0.3, 0.9, 1.0, 0.0])
+    assert rising_edges(ramp) == pytest.approx([2 + 2 / 3, 8 + 1 / 3])
+
+
+def test_edges_that_slope_are_exact() -> None:
+    """Behind an anti-alias filter an edge takes a few samples."""
+    turns = turned(92.3, 0.6 * math.pi)
+    sloped = np.interp(turns % 1.0, [0.0, 0.01, 0.03, 0.04, 0.99, 1.0], [2.5, 5, 5, 0, 0, 2.5])
+    found = read_key_phase(sloped, RATE_HZ)
+    assert isinstance(found, KeyPhase)
+    assert abs(angle_error_deg(found, 0.6 * math.pi)) < 0.001
+    assert found.speed_rpm == pytest.approx(92.3, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_makes_no_pulses_and_hardly_moves_the_angle(seed: int) -> None:
+    noise = 0.1 * np.random.default_rng(seed).normal(size=N_SAMPLES)
+    found = read_key_phase(pulses(92.3, 1.0) + noise, RATE_HZ)
+    assert isinstance(found, KeyPhase)
+    assert abs(angle_error_deg(found, 1.0)) < 1.0
+    assert found.speed_rpm == pytest.approx(92.3, rel=1e-4)
+
+
+@pytest.mark.parametrize("lost", [0, 1, 9, 19, 20])
+def test_a_missing_pulse_is_no_phase_reference(lost: int) -> None:
+    signal = pulses(92.3, 0.9)
+    begin = edges_of(signal)[lost]
+    signal[begin - 1 : begin + 12] = 0.2
+    found = read_key_phase(signal, RATE_HZ)
+    assert found is KeyPhaseFault.MISSING_PULSE
+
+
+@pytest.mark.parametrize("side", ["first half", "second half"])
+def test_a_pick_up_that_fails_within_the_segment_is_no_phase_reference(side: str) -> None:
+    signal = pulses(92.3, 0.9)
+    dead = slice(0, N_SAMPLES // 2) if side == "first half" else slice(N_SAMPLES // 2, None)
+    signal[dead] = 0.2
+    assert read_key_phase(signal, RATE_HZ) is KeyPhaseFault.MISSING_PULSE
+
+
+@pytest.mark.parametrize("after_samples", [20, 80, 200, 350])
+def test_a_double_pulse_is_no_phase_reference(after_samples: int) -> None:
+    signal = pulses(92.3, 0.9)
+    begin = edges_of(signal)[7] + after_samples
+    signal[begin : begin + 6] = 5.0
+    assert read_key_phase(signal, RATE_HZ) is KeyPhaseFault.EXTRA_PULSE
+
+
+def test_a_pulse_that_is_always_doubled_is_no_phase_reference() -> None:
+    turns = 92.3 / 60 / RATE_HZ * np.arange(N_SAMPLES)
+    twice = (turns % 1.0 < WIDTH_TURNS) | ((turns - 0.3) % 1.0 < WIDTH_TURNS)
+    fault = read_key_phase(np.where(twice, 5.0, 0.0), RATE_HZ)
+    assert isinstance(fault, KeyPhaseFault)
+
+
+def test_a_pulse_out_of_its_place_is_no_phase_reference() -> None:
+    signal = pulses(92.3, 0.9)
+    begin = edges_of(signal)[7]
+    signal[begin - 20 : begin] = 5.0
+    assert read_key_phase(signal, RATE_HZ) is KeyPhaseFault.IRREGULAR
+
+
+def test_a_speed_that_changes_too_fast_for_one_phase_is_none() -> None:
+    time_s = np.arange(N_SAMPLES) / RATE_HZ
+    running_up = 60 / 60 * time_s + 0.01 * time_s**2
+    found = read_key_phase(np.where(running_up % 1.0 < WIDTH_TURNS, 5.0, 0.0), RATE_HZ)
+    assert found is KeyPhaseFault.IRREGULAR
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_without_pulses_noise_is_never_read_as_any(seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(size=N_SAMPLES)
+    assert isinstance(read_key_phase(noise, RATE_HZ), KeyPhaseFault)
+
+
+@pytest.mark.parametrize("level_v", [0.0, 0.2, 5.0])
+def test_a_standing_shaft_has_no_pulses(level_v: float) -> None:
+    assert read_key_phase(np.full(N_SAMPLES, level_v), RATE_HZ) is KeyPhaseFault.TOO_FEW_PULSES
+
+
+def test_slow_roll_has_too_few_turns_in_a_segment() -> None:
+    assert read_key_phase(pulses(8.0, 0.9), RATE_HZ) is KeyPhaseFault.TOO_FEW_PULSES
