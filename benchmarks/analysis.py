@@ -39,7 +39,7 @@ from core.settings import AnalysisSettings
 from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
 from core.transfer import line_transfer
 from core.uncertainty import BearingAccuracy
-from core.whirl import vortex_frequency_hz, whirl
+from core.whirl import whirl
 
 REQUIRED_RATIO = 300.0
 WINDOW_S = 300
@@ -81,8 +81,6 @@ class Analysis:
             )
         )
         spectra = [self._bearing(4 * bearing) for bearing in range(len(self._unit.bearings))]
-        turn_hz = SPEED_RPM / 60.0
-        vortex_frequency_hz([bins for bins, _ in spectra], (0.2 * turn_hz, 0.4 * turn_hz))
         return sum(self._estimate(bins, orders) for bins, orders in spectra)
 
     def _bearing(self, row: int) -> tuple[CrossSpectrum, CrossSpectrum]:
