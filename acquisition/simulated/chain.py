@@ -5,6 +5,7 @@ import numpy as np
 from acquisition.errors import ConfigError
 from acquisition.simulated.accelerometer_noise import AccelerometerNoise
 from acquisition.simulated.conditions import Conditions
+from acquisition.simulated.key_phase import KeyPhasePulses
 from acquisition.simulated.probes import ShaftRunout, reference_gap_um, standing_gap_um
 from acquisition.simulated.response_filter import ResponseFilter
 from acquisition.simulated.scenario import ChannelScenario, Scenario, TransducerNoise
@@ -13,7 +14,7 @@ from core.machine import Measurand, Unit
 
 
 class TransducerChain:
-    """Gap, runout, response, gain and noise of every channel of one unit.
+    """Gap, runout, key-phase, response, gain and noise of every channel of one unit.
 
     Parameters
     ----------
@@ -37,6 +38,7 @@ class TransducerChain:
         channels = _channels(machine, scenario)
         self._machine = machine
         self._runout = ShaftRunout(machine, scenario)
+        self._key_phase = KeyPhasePulses(machine, scenario.key_phase)
         self._filters = {
             row: ResponseFilter(channel.response, machine.rate_hz)
             for row, channel in enumerate(channels)
@@ -65,6 +67,7 @@ class TransducerChain:
         motion += gap_um[:, np.newaxis]
         motion += np.outer(next_gap_um - gap_um, np.arange(turns.size) / turns.size)
         self._runout.add_to(motion, turns)
+        self._key_phase.add_to(motion, turns)
         if self._own is not None:
             motion[self._noisy] += self._own.advance(turns.size)
         for row, response in self._filters.items():
@@ -86,6 +89,7 @@ def noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
         Measurand.DISPLACEMENT_UM: noise.displacement_um_rms,
         Measurand.VELOCITY_MM_S: noise.velocity_mm_s_rms,
         Measurand.ACCELERATION_M_S2: noise.acceleration_m_s2_rms,
+        Measurand.KEY_PHASE_V: noise.key_phase_v_rms,
     }
     return np.array([by_measurand[channel.measurand] for channel in machine.channels])
 

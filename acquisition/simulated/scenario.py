@@ -77,12 +77,30 @@ class VortexRope:
 
 
 @dataclass(frozen=True)
+class KeyPhasePulse:
+    """What a key-phase pick-up gives once a turn.
+
+    Parameters
+    ----------
+    mark_turns
+        Angle from where it passes the pick-up to the zero that unbalance and runout count from.
+    height_v
+        Above `rest_v`, or below it on a channel whose direction is -1.
+    """
+
+    width_turns: float = 6.0 / 360.0
+    mark_turns: float = 0.0
+    rest_v: float = 0.5
+    height_v: float = 5.0
+
+
+@dataclass(frozen=True)
 class TransducerNoise:
     """Noise of each kind of transducer.
 
     Parameters
     ----------
-    gap_um_rms, displacement_um_rms, velocity_mm_s_rms, acceleration_m_s2_rms
+    gap_um_rms, displacement_um_rms, velocity_mm_s_rms, acceleration_m_s2_rms, key_phase_v_rms
         White over the whole band, behind the transducer: its response does not touch it.
     accelerometer_g_per_sqrt_hz
         One-sided density of the accelerometers' own noise, before their response; a velocity
@@ -97,6 +115,7 @@ class TransducerNoise:
     acceleration_m_s2_rms: float = 0.0
     accelerometer_g_per_sqrt_hz: float = 0.0
     accelerometer_corner_hz: float = 2.0
+    key_phase_v_rms: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -151,6 +170,7 @@ class Scenario:
     speed_wander: float = 0.0
     channels: Mapping[str, ChannelScenario] = field(default_factory=dict)
     exchanged: tuple[tuple[str, str], ...] = ()
+    key_phase: KeyPhasePulse = field(default_factory=KeyPhasePulse)
 
     @property
     def true_rotor(self) -> RotorParameters:

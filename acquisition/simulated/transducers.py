@@ -30,6 +30,9 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
     maps, places = _motion_maps(parameters, matrices), _places(machine, parameters)
     rows = []
     for channel in machine.channels:
+        if channel.measurand is Measurand.KEY_PHASE_V:
+            rows.append(np.zeros(maps[SHAFT, Measurand.GAP_UM].shape[1]))  # sees the angle alone
+            continue
         if channel.id not in places:
             raise ConfigError(f"channel {channel.id!r} belongs to no bearing of {machine.id!r}")
         part, row = places[channel.id]

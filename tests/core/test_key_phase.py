@@ -1,4 +1,4 @@
-"""A key-phase gives the shaft's angle and speed when every pulse is where it belongs, or neither."""
+"""A key-phase gives angle and speed when every pulse is where it belongs, or neither."""
 
 import math
 
@@ -14,7 +14,8 @@ WIDTH_TURNS = 6.0 / 360.0
 
 
 def turned(speed_rpm: float, angle_rad: float) -> FloatArray:
-    return angle_rad / (2 * math.pi) + speed_rpm / 60 / RATE_HZ * np.arange(N_SAMPLES)
+    turns: FloatArray = speed_rpm / 60 / RATE_HZ * np.arange(N_SAMPLES, dtype=np.float64)
+    return turns + angle_rad / (2 * math.pi)
 
 
 def steps(speed_rpm: float, angle_rad: float) -> FloatArray:
@@ -126,7 +127,7 @@ def test_a_pulse_out_of_its_place_is_no_phase_reference() -> None:
 
 def test_a_speed_that_changes_too_fast_for_one_phase_is_none() -> None:
     time_s = np.arange(N_SAMPLES) / RATE_HZ
-    running_up = 60 / 60 * time_s + 0.01 * time_s**2
+    running_up = 0.5 + 92.3 / 60 * time_s + 0.004 * time_s**2
     found = read_key_phase(np.where(running_up % 1.0 < WIDTH_TURNS, 5.0, 0.0), RATE_HZ)
     assert found is KeyPhaseFault.IRREGULAR
 
