@@ -158,6 +158,20 @@ async def test_an_estimator_without_excitation_says_so_in_its_row(running_plant,
         await expect(page.locator(f"{place} .spread:visible")).to_have_count(0)
 
 
+async def test_eccentricity_has_a_budget_too_and_only_one_budget_is_open(
+    running_plant, page
+) -> None:
+    await open_bearing(page, running_plant.url)
+    await page.locator(SPREAD).click()
+    other = page.locator(".tiles [data-reading=eccentricity_ratio] button.spread")
+    await other.click()
+    shown = page.locator(".tiles .budget")
+    await expect(shown).to_have_attribute("data-quantity", "eccentricity_ratio")
+    await expect(shown.locator("tbody")).to_contain_text("clearance")
+    await expect(page.locator(SPREAD)).to_have_attribute("aria-expanded", "false")
+    await expect(other).to_have_attribute("aria-expanded", "true")
+
+
 async def test_the_stiffness_trend_draws_random_uncertainty_apart_and_says_so(
     running_plant, page
 ) -> None:

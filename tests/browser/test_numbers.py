@@ -38,6 +38,7 @@ DECIMALS = {
     "_lack_of_fit_x": (1, 2),
     "_lack_of_fit_y": (1, 2),
     "_n_lines": (1, 0),
+    "_roundness": (1, 2),
 }
 
 

@@ -12,6 +12,7 @@ const KINDS = [
   { name: /_hz$/, scale: 1, decimals: 4, unit: "Hz" },
   { name: /_ratio$|_coherence_/, scale: 1, decimals: 3, unit: "" },
   { name: /_lack_of_fit_/, scale: 1, decimals: 2, unit: "" },
+  { name: /_roundness$/, scale: 1, decimals: 2, unit: "" },
   { name: /_n_lines$/, scale: 1, decimals: 0, unit: "" },
 ];
 

@@ -1,6 +1,6 @@
 /** Plane charts with equal axes: the orbit, and the shaft centre in its clearance circle. */
 
-import { formatFixed } from "../format.js";
+import { formatFixed, formatTime } from "../format.js";
 import { FAINT, INK, X_BAND, X_COLOUR, axis, baseLayout } from "./style.js";
 
 const MARGIN = 1.12;
@@ -67,9 +67,16 @@ export function centreLayout(clearanceUm, trail, current) {
   return planeLayout(reach * MARGIN, "centre", [circle]);
 }
 
-export function centreCaption(clearanceUm, current) {
-  const radius = `Circle: clearance, radius ${formatFixed(clearanceUm, 0)} µm.`;
-  return current ? `${radius} Cross: now. Line: means over the chosen span.` : `${radius} No current point. Line: means over the chosen span.`;
+export function centreCaption(facts, current) {
+  const radius = `Circle: clearance, radius ${formatFixed(facts.clearance_um, 0)} µm.`;
+  const now = current ? "Cross: now." : "No current point.";
+  return `${radius} ${now} Line: means over the chosen span. ${referenceWords(facts.reference)}`;
+}
+
+function referenceWords({ set, author, note }) {
+  if (set === null) return "Reference: from the plant file.";
+  const by = author ? ` by ${author}` : "";
+  return `Reference set ${formatTime(Date.parse(set))}${by}${note ? `: ${note}` : "."}`;
 }
 
 function point(x, y, name) {

@@ -119,7 +119,7 @@ function centreChart(path, trends) {
       const current = centreNow(latest);
       const asked = trends.newest();
       const trail = centreTrail(asked);
-      const inputs = JSON.stringify([current, trail, facts.clearance_um]);
+      const inputs = JSON.stringify([current, trail, facts]);
       if (inputs === drawn) return;
       drawn = inputs;
       if (!current && trail.length === 0) {
@@ -128,7 +128,7 @@ function centreChart(path, trends) {
         return;
       }
       const layout = centreLayout(facts.clearance_um, trail, current);
-      const caption = centreCaption(facts.clearance_um, current);
+      const caption = centreCaption(facts, current);
       box.show(centreTraces(trail, current), layout, caption).catch((failure) => {
         drawn = null;
         box.trouble(failure.message);

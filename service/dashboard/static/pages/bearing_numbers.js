@@ -2,7 +2,8 @@
 
 import { element, setText } from "../dom.js";
 import { budgetPanel } from "../parts/budget.js";
-import { pairView, readingView } from "../parts/reading.js";
+import { pairView, readingOf, readingView } from "../parts/reading.js";
+import { budgetSpread } from "../parts/spread.js";
 import { qualityOf, speedOrigin } from "../words.js";
 import { preferredStiffness } from "./preferred_stiffness.js";
 
@@ -18,18 +19,19 @@ const TILES = [
   ["Bearing motion, vortex", BRACKET("vortex")],
   ["Eccentricity and attitude", [["eccentricity_ratio", "attitude_angle_deg"], ["ratio", "angle"]]],
   ["Line frequencies", [["order1_frequency_hz", "vortex_frequency_hz"], ["1×", "vortex"]]],
-  ["Probe gaps", [["gap_x_um", "gap_y_um"], ["x", "y"]]],
-  ["Oil temperature", [["oil_temperature_c"], [""]]],
-  ["Power", [["power_mw"], [""]]],
+  ["Orbit roundness, + forward", [["order1_roundness", "vortex_roundness"], ["1×", "vortex"]]],
+  ["Oil and power", [["oil_temperature_c", "power_mw"], ["oil", "power"]]],
 ];
+const OPPOSITE = ["opposite_gap_x_um", "opposite_gap_y_um"];
+const GROWTH = "gap_growth_um";
 
 /** Returns `{ node, draw(latest), close() }`. */
 export function bearingNumbers(path) {
   const budget = budgetPanel(path);
   budget.node.classList.add("panel");
-  const tiles = [preferredStiffness(budget), ...TILES.map(tile), speedTile()];
-  const nodes = tiles.map((one) => one.node);
-  nodes.splice(1, 0, budget.node); // next in the tab order; shown below all tiles
+  const small = TILES.map((one) => tile(one, budget));
+  const tiles = [preferredStiffness(budget), ...small, gapsTile(budget), speedTile()];
+  const nodes = [...tiles.map((one) => one.node), budget.node];
   return {
     node: element("section", { class: "tiles", "aria-label": "Numbers" }, ...nodes),
     draw(latest) {
@@ -40,11 +42,28 @@ export function bearingNumbers(path) {
   };
 }
 
-function tile([title, [names, labels]]) {
-  const numbers = names.length === 1 ? readingView(names[0], "") : pairView(names, labels);
+function tile([title, [names, labels]], budget) {
+  const pair = pairView(names, labels, undefined, (name) => budgetSpread(name, budget));
   return {
-    node: element("div", { class: "tile" }, element("h2", {}, title), numbers.node),
-    draw: numbers.draw,
+    node: element("div", { class: "tile" }, element("h2", {}, title), pair.node),
+    draw: pair.draw,
+  };
+}
+
+/** Two probes for all bearings; their opposites and what only these can tell where they exist. */
+function gapsTile(budget) {
+  const gaps = pairView(["gap_x_um", "gap_y_um"], ["x", "y"]);
+  const opposite = pairView(OPPOSITE, ["−x", "−y"]);
+  const growth = readingView(GROWTH, "growth", undefined, budgetSpread(GROWTH, budget));
+  const parts = [gaps, opposite, growth];
+  const exists = (latest, name) => readingOf(latest, name).reason !== "not_measured";
+  return {
+    node: element("div", { class: "tile gaps" }, element("h2", {}, "Probe gaps"), ...parts.map((part) => part.node)),
+    draw(latest, saidReason) {
+      for (const part of parts) part.draw(latest, saidReason);
+      opposite.node.hidden = !OPPOSITE.some((name) => exists(latest, name));
+      growth.node.hidden = opposite.node.hidden || !exists(latest, GROWTH);
+    },
   };
 }
 

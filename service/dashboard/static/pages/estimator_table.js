@@ -5,7 +5,7 @@ import { budgetPanel } from "../parts/budget.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { readingOf, readingView } from "../parts/reading.js";
 import { budgetSpread } from "../parts/spread.js";
-import { estimatorWords } from "../words.js";
+import { estimatorWords, qualityOf } from "../words.js";
 
 const LINE_COHERENCE = (line) => [`${line}_coherence_xx`, `${line}_coherence_yy`];
 const TRANSFER = (line) => ({ k: `${line}_transfer_k`, c: `${line}_transfer_c`, coherence: LINE_COHERENCE(line) });
@@ -69,7 +69,7 @@ function estimatorRow(estimator, { k, c, coherence }, budget) {
     draw(latest) {
       const whole = worstOf(names.map((name) => readingOf(latest, name)));
       for (const view of views) view.draw(latest, whole.reason);
-      drawQuality(quality, whole);
+      drawQuality(quality, whole, qualityOf(latest).reason);
       setText(preferred, preferredWords(latest.estimators ?? {}, estimator));
     },
   };

@@ -5,6 +5,7 @@ import { budgetPanel } from "../parts/budget.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { budgetSpread } from "../parts/spread.js";
+import { qualityOf } from "../words.js";
 
 const AXES = ["xx", "xy", "yx", "yy"];
 const HELP =
@@ -27,7 +28,7 @@ export function filmMatrices(path) {
     node: element("section", { class: "panel film" }, head, body, element("p", { class: "help" }, HELP), budget.node),
     draw(latest) {
       const whole = readingOf(latest, "dynamic_k_xx_n_per_m");
-      drawQuality(quality, whole);
+      drawQuality(quality, whole, qualityOf(latest).reason);
       for (const part of parts) part.draw(latest, whole.reason);
     },
     close: budget.close,

@@ -10,7 +10,7 @@ const MORE_DECIMALS = 2;
 const HEADS = ["Contribution", "Kind", "Distribution", "Width", "Standard uncertainty"];
 const READING_HELP =
   "Random parts differ from one result to the next; systematic ones stay. Width: standard uncertainty if normal, " +
-  "half-width if uniform, of what contributes: relative for gains, stiffness and noise, µm for runout.";
+  "half-width if uniform, of what contributes: a share of it, or in µm.";
 
 let nPanels = 0;
 
@@ -88,7 +88,8 @@ function budgetRow(quantity, line) {
   );
 }
 
-const withUnit = (quantity, value) => `${formatQuantity(quantity, value, MORE_DECIMALS)} ${kindOf(quantity).unit}`;
+const united = (quantity, digits) => `${digits} ${kindOf(quantity).unit}`.trimEnd();
+const withUnit = (quantity, value) => united(quantity, formatQuantity(quantity, value, MORE_DECIMALS));
 
 /** Spectral statistics are stated in the unit of the result itself: nothing lies between. */
 function widthWords(quantity, { kind, width }) {
@@ -98,9 +99,9 @@ function widthWords(quantity, { kind, width }) {
 const contributionWords = (quantity, { contribution }) => withUnit(quantity, contribution);
 
 function budgetSentence({ quantity, value, uncertainty, time }) {
-  const { unit } = kindOf(quantity);
+  const interval = united(quantity, formatInterval(quantity, uncertainty));
   return (
-    `${formatQuantity(quantity, value)} ${unit}, 95 %: ${formatInterval(quantity, uncertainty)} ${unit}. ` +
+    `${united(quantity, formatQuantity(quantity, value))}, 95 %: ${interval}. ` +
     `Standard uncertainty: random ${withUnit(quantity, uncertainty.random)}, ` +
     `systematic ${withUnit(quantity, uncertainty.systematic)}. Samples up to ${formatTime(Date.parse(time))}.`
   );

@@ -43,8 +43,12 @@ export function mark() {
   };
 }
 
-/** Draw a quality of the API on a mark: its level in a word, and the reason unless all is well. */
-export function drawQuality(one, { level, reason }) {
-  const look = lookOf(level, reason);
+/**
+ * Draw a quality of the API on a mark: its level in a word, and the reason unless all is well.
+ *
+ * Where a number is missing for the reason that the page's head shouts already, its mark stays quiet.
+ */
+export function drawQuality(one, { level, reason }, saidReason = null) {
+  const look = level === "bad" && reason === saidReason ? "absent" : lookOf(level, reason);
   one.draw(look, look === "good" ? WORDS.good : `${WORDS[look]}: ${reasonWords(reason)}`);
 }
