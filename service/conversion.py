@@ -29,14 +29,13 @@ def machine_of(settings: UnitSettings) -> Unit:
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
         rate_hz=settings.rate_hz,
-        channels=tuple(
-            Channel(c.id, c.measurand, c.sign, response_of(c.response)) for c in settings.channel
-        ),
+        channels=tuple(_channel(channel) for channel in settings.channel),
         bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
         speed_channel=settings.speed_channel,
         power_channel=settings.power_channel,
         rotation_sense=1 if settings.rotation == "x_to_y" else -1,
         has_vortex=settings.turbine == "francis",
+        key_phase=settings.key_phase,
     )
 
 
@@ -47,6 +46,8 @@ def _channel(settings: ChannelSettings) -> Channel:
         direction=settings.sign,
         response=response_of(settings.response),
         unit_per_count=_calibration(settings).unit_per_count,
+        probe=settings.probe or "",
+        slow_roll=settings.slow_roll.vector(settings.id) if settings.slow_roll else None,
     )
 
 

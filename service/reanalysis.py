@@ -1,15 +1,22 @@
 """A recording through the same analysis as live samples, and its results in the API's words."""
 
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
-from typing import Literal
 
 from acquisition.calibration import UnitCalibration
 from acquisition.source import SampleSource
 from core.assessment import Assessment
 from core.monitor import UnitMonitor
-from service.api.models import ApiModel, QualityModel, ReadingModel, Time, WindowModel
+from service.api.models import (
+    ApiModel,
+    QualityModel,
+    ReadingModel,
+    RunoutName,
+    SpeedSourceName,
+    Time,
+    WindowModel,
+)
 from service.api.times import rfc3339
-from service.api.views import quality_model, reading_model, window_model
+from service.api.views import quality_model, reading_model, runout_names, window_model
 
 
 class AssessmentModel(ApiModel):
@@ -27,8 +34,11 @@ class AssessmentModel(ApiModel):
     quality: QualityModel
     """The worst of the 1× results."""
 
-    speed_source: Literal["slow_channel", "line", "rated"]
+    speed_source: SpeedSourceName
     """Where the running speed came from."""
+
+    runout: dict[str, RunoutName | None]
+    """Whether runout was taken off 1× of the newest segment, and if not, why."""
 
     window: WindowModel
     """The samples."""
@@ -45,6 +55,7 @@ def assessment_model(assessment: Assessment) -> AssessmentModel:
         time=rfc3339(assessment.time_ns),
         quality=quality_model(assessment.quality),
         speed_source=assessment.speed_source.value,
+        runout=runout_names(assessment),
         window=window_model(assessment.window),
         readings={name: reading_model(name, r) for name, r in assessment.readings.items()},
     )

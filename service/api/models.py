@@ -17,6 +17,10 @@ EstimatorName = Literal[
     "dynamic", "transfer_order1", "transfer_vortex", "ratio_order1", "ratio_vortex"
 ]
 
+SpeedSourceName = Literal["key_phase", "slow_channel", "line", "rated"]
+
+RunoutName = Literal["applied", "no_vector", "other_probe", "not_slow_roll", "no_phase_reference"]
+
 Time = Annotated[str, Field(examples=["2026-11-21T09:03:12.400Z"])]
 
 
@@ -114,8 +118,18 @@ class LatestModel(ApiModel):
     quality: QualityModel
     """The worst of the 1× results."""
 
-    speed_source: Literal["slow_channel", "line", "rated"] | None
+    speed_source: SpeedSourceName | None
     """Where the running speed came from."""
+
+    runout: Annotated[
+        dict[str, RunoutName | None],
+        Field(examples=[{"shaft_x": "applied", "shaft_y": "no_vector"}]),
+    ]
+    """Whether runout is taken off 1× of the newest segment, by "shaft_x" and "shaft_y": "applied",
+    or why not: "no_vector" (none in the plant file), "other_probe" (it is of another probe than is
+    there now), "not_slow_roll" (read above a quarter of the rated speed), "no_phase_reference" (no
+    key-phase, or its pulses are missing, doubled, irregular or contradicted). Null if nothing is
+    current."""
 
     window: WindowModel | None
     """The newest result's samples."""

@@ -17,6 +17,7 @@ from service.api.models import (
     OrbitModel,
     QualityModel,
     ReadingModel,
+    RunoutName,
     SourceModel,
     SpectrumChannelModel,
     SpectrumModel,
@@ -112,6 +113,7 @@ def latest_model(live: LiveView, unit: str, bearing: str) -> LatestModel:
         speed_source=newest.speed_source.value if newest else None,
         window=window_model(newest.window) if newest else None,
         estimators=_estimators(current),
+        runout=_runout(current),
         readings={name: reading_model(name, r) for name, r in current.readings.items()},
     )
 
@@ -121,6 +123,17 @@ def _estimators(current: CurrentBearing) -> dict[str, EstimatorName | None]:
         return {"xx": None, "yy": None}
     chosen = current.assessment.estimators
     return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
+
+
+def _runout(current: CurrentBearing) -> dict[str, RunoutName | None]:
+    if current.assessment is None or not current.is_current:
+        return {"shaft_x": None, "shaft_y": None}
+    return runout_names(current.assessment)
+
+
+def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
+    """What was done about runout, by shaft channel."""
+    return {place: verdict.value for place, verdict in assessment.runout.items()}
 
 
 def window_model(window: AveragingWindow) -> WindowModel:

@@ -9,6 +9,7 @@ from core.machine import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, Settings
 from service.settings.response import ResponseSettings
+from service.settings.slow_roll import ProbeName, SlowRollSettings
 
 
 class Transducer(StrEnum):
@@ -18,6 +19,7 @@ class Transducer(StrEnum):
     DISPLACEMENT = "displacement"
     VELOCITY = "velocity"
     ACCELEROMETER = "accelerometer"
+    KEY_PHASE = "key_phase"
 
 
 class SensitivityUnit(StrEnum):
@@ -35,6 +37,7 @@ MEASURANDS = {
     Transducer.DISPLACEMENT: Measurand.DISPLACEMENT_UM,
     Transducer.VELOCITY: Measurand.VELOCITY_MM_S,
     Transducer.ACCELEROMETER: Measurand.ACCELERATION_M_S2,
+    Transducer.KEY_PHASE: Measurand.KEY_PHASE_V,
 }
 
 LENGTH_UNITS = (SensitivityUnit.V_PER_MM, SensitivityUnit.MV_PER_UM)
@@ -62,6 +65,12 @@ PLAUSIBLE_V_PER_UNIT = {
 }
 """Sensitivities outside these are mistakes of unit: no such transducer is sold."""
 
+SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
+"""What a shaft may be looked at with, and so what may see its runout."""
+
+NOT_OF_A_KEY_PHASE = ("sensitivity", "sensitivity_unit", "response", "probe", "slow_roll")
+"""Keys that say nothing of pulses: their angle counts, not their height."""
+
 
 class ChannelSettings(Settings):
     """A waveform channel; the order of the channels is their order on the wire."""
@@ -70,13 +79,14 @@ class ChannelSettings(Settings):
     """Unique within the unit; example: "ujb_shaft_x"."""
 
     transducer: Transducer
-    """"proximity_probe" (DC-coupled gap), "displacement", "velocity" or "accelerometer"."""
+    """"proximity_probe" (DC-coupled gap), "displacement", "velocity", "accelerometer" or
+    "key_phase" (one pulse a turn)."""
 
-    sensitivity: float
-    """In ``sensitivity_unit``; negative if the voltage falls as the measured quantity grows;
-    example: 4.0."""
+    sensitivity: float | None = None
+    """In ``sensitivity_unit``; negative if the voltage falls as the measured quantity grows; a
+    key_phase has none, all others need it; example: 4.0."""
 
-    sensitivity_unit: SensitivityUnit
+    sensitivity_unit: SensitivityUnit | None = None
     """"V/mm" or "mV/um" for probes and displacement, "mV/(mm/s)" for velocity, "mV/g" or
     "mV/(m/s2)" for accelerometers."""
 
@@ -99,25 +109,55 @@ class ChannelSettings(Settings):
 
     direction: Literal[1, -1] | None = None
     """+1 if a growing reading is motion along the positive bearing axis, -1 if against it. Default:
-    -1 for a proximity probe, which sits on the positive axis and sees its gap shrink; else +1."""
+    -1 for a proximity probe, which sits on the positive axis and sees its gap shrink; else +1. Of a
+    key_phase, -1 if its pulses fall."""
+
+    probe: ProbeName | None = None
+    """Serial number or mark of the shaft probe that is there, which its slow_roll must be of;
+    example: "SN123"."""
+
+    slow_roll: SlowRollSettings | None = None
+    """Runout of the shaft under this probe, taken off 1× as long as a key-phase gives the shaft's
+    angle. Example: { um_pk = 8.0, phase_deg = 30.0, speed_rpm = 8.0, taken = 2026-03-01T10:00:00Z,
+    probe = "SN123" }."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if not self.ok_min_v < self.ok_max_v:
+            raise MisfitError(f"must be below ok_max_v {self.ok_max_v:g}", "ok_min_v")
+        if self.transducer is Transducer.KEY_PHASE:
+            self._check_key_phase()
+        else:
+            self._check_sensitivity()
+            self._check_runout()
+        return self
+
+    def _check_key_phase(self) -> None:
+        for key in NOT_OF_A_KEY_PHASE:
+            if getattr(self, key) not in (None, ()):
+                raise MisfitError("a key_phase has none; leave it out", key)
+
+    def _check_runout(self) -> None:
+        for key in ("probe", "slow_roll"):
+            if getattr(self, key) is not None and self.transducer not in SHAFT_TRANSDUCERS:
+                words = " or ".join(SHAFT_TRANSDUCERS)
+                raise MisfitError(f"is for a {words}; this is a {self.transducer}", key)
+        if self.slow_roll is not None and self.probe is None:
+            raise MisfitError("must be given with slow_roll, which is of one probe alone", "probe")
+
+    def _check_sensitivity(self) -> None:
         allowed = ALLOWED_UNITS[self.transducer]
         if self.sensitivity_unit not in allowed:
             words = " or ".join(f'"{unit}"' for unit in allowed)
             raise MisfitError(f"that of a {self.transducer} is {words}", "sensitivity_unit")
         low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
         scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
-        if not low <= abs(self.sensitivity) * scale <= high:
+        if self.sensitivity is None or not low <= abs(self.sensitivity) * scale <= high:
             raise MisfitError(
                 f"a {self.transducer} has {low / scale:g} to {high / scale:g}"
                 f" {self.sensitivity_unit}, or as much below zero",
                 "sensitivity",
             )
-        if not self.ok_min_v < self.ok_max_v:
-            raise MisfitError(f"must be below ok_max_v {self.ok_max_v:g}", "ok_min_v")
-        return self
 
     @property
     def measurand(self) -> Measurand:
@@ -126,7 +166,9 @@ class ChannelSettings(Settings):
 
     @property
     def unit_per_v(self) -> float:
-        """Engineering units per volt."""
+        """Engineering units per volt; pulses stay volts."""
+        if self.sensitivity is None or self.sensitivity_unit is None:
+            return 1.0
         return 1.0 / (self.sensitivity * V_PER_ENGINEERING_UNIT[self.sensitivity_unit])
 
     @property

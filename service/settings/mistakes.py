@@ -1,6 +1,7 @@
 """What is wrong with a plant file, in one line each: key, value, what is allowed."""
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 from pydantic_core import ErrorDetails
@@ -50,6 +51,7 @@ def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -
 
 def _shown(value: Any) -> str:
     text = str(value).lower() if isinstance(value, bool) else repr(value)
+    text = value.isoformat() if isinstance(value, datetime) else text
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
 

@@ -12,7 +12,7 @@ from service.settings.bearings import (
     OPTIONAL_CHANNEL_KEYS,
     BearingSettings,
 )
-from service.settings.channels import ChannelSettings, SlowChannelSettings
+from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer
 from service.settings.simulation import SimulationSettings
 
 
@@ -83,7 +83,12 @@ class UnitSettings(Settings):
     turns the other way is a sign of exchanged transducers."""
 
     speed_channel: Identifier | None = None
-    """Slow channel (r/min) of the running speed; without it the 1× line is used."""
+    """Slow channel (r/min) of the running speed; without it and a key-phase, the 1× line
+    is used."""
+
+    key_phase: Identifier | None = None
+    """Waveform channel with one pulse a turn (transducer "key_phase"): it gives the running speed,
+    and the shaft's angle that slow_roll needs; example: "kp"."""
 
     power_channel: Identifier | None = None
     """Slow channel (MW) of the active power."""
@@ -117,6 +122,7 @@ class UnitSettings(Settings):
             self._check_slow(bearing.oil_temperature, "degC", "bearing", n, "oil_temperature")
             for key in GAP_KEYS:
                 self._check_slow(getattr(bearing, key), "mm", "bearing", n, key)
+        self._check_key_phase()
         self._check_slow(self.speed_channel, "r/min", "speed_channel")
         self._check_slow(self.power_channel, "MW", "power_channel")
         self._check_simulation()
@@ -129,7 +135,19 @@ class UnitSettings(Settings):
         for key, id_ in used:
             if id_ not in known:
                 raise MisfitError(_not_among(known), "bearing", number, key)
+            if id_ in self._key_phases():
+                raise MisfitError("is a key_phase channel, no vibration", "bearing", number, key)
         refuse_twice(("bearing", number, key, id_) for key, id_ in used)
+
+    def _key_phases(self) -> list[str]:
+        return [c.id for c in self.channel if c.transducer is Transducer.KEY_PHASE]
+
+    def _check_key_phase(self) -> None:
+        if self.key_phase is not None and self.key_phase not in self._key_phases():
+            words = ", ".join(self._key_phases()) or "none"
+            raise MisfitError(
+                f'needs a channel with transducer "key_phase"; there is {words}', "key_phase"
+            )
 
     def _check_slow(self, id_: str | None, unit: str, *at: int | str) -> None:
         units = {channel.id: channel.unit for channel in self.slow_channel}

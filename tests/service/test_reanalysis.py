@@ -130,7 +130,8 @@ def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:
         assert found["readings"][name]["value"] == reading.value
         assert found["readings"][name]["reason"] == reading.quality.reason.value
     assert set(found) == {
-        "unit", "bearing", "time", "quality", "speed_source", "window", "readings"
+        "unit", "bearing", "time", "quality", "speed_source", "runout", "window",
+        "readings",
     }  # fmt: skip
 
 
