@@ -72,6 +72,9 @@ class UnitMonitor:
         for name, value in here.items():
             if there[name] != value:
                 raise ValueError(f"{name} is {there[name]!r}, is {value!r} here")
+        for before, after in zip(self.unit.bearings, unit.bearings, strict=True):
+            if _references(before) != _references(after):
+                self._growth.pop(before.id, None)  # it counts from a reference
         self.unit = unit
 
     def drain_gaps(self) -> list[Gap]:
@@ -195,6 +198,10 @@ def _fixed_parts(unit: Unit) -> dict[str, object]:
     """What stays as long as a monitor lives, by name."""
     fixed: dict[str, object] = {field.name: getattr(unit, field.name) for field in fields(unit)}
     return fixed | {"bearings": tuple((b.id, b.channels) for b in unit.bearings)}
+
+
+def _references(bearing: Bearing) -> tuple[object, ...]:
+    return (bearing.gap_reference_um, bearing.opposite_reference_um)
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:

@@ -22,10 +22,7 @@ Key = tuple[str, str]
 
 def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
     """Whether the gap is also measured across the shaft, in x and in y."""
-    return (
-        (bearing.opposite_x or bearing.opposite_gap_x) is not None,
-        (bearing.opposite_y or bearing.opposite_gap_y) is not None,
-    )
+    return bearing.opposite_x is not None, bearing.opposite_y is not None
 
 
 def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:

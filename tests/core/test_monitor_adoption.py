@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from core.arrays import FloatArray
-from core.machine import Bearing, Unit
+from core.machine import Bearing, Channel, Measurand, Unit
 from core.monitor import UnitMonitor
+from core.quality import GOOD, Reason, bad
 from core.settings import AnalysisSettings
 
 SEGMENT, HOP = 8192, 7168
@@ -59,6 +60,40 @@ def test_nothing_but_the_position_depends_on_the_reference(unit: Unit, blocks) -
     differing = {name for name in results[0] if results[0][name] != results[1][name]}
 
     assert differing == {"shaft_centre_x_um", "eccentricity_ratio", "attitude_angle_deg"}
+
+
+def test_growth_since_an_older_reference_is_forgotten(unit: Unit, blocks) -> None:
+    """All gaps have grown by 35 µm since the reference; then the opposite probe in x is lost."""
+    (bearing,) = unit.bearings
+    three = replace(bearing, opposite_x="fx", opposite_reference_um=(2000.0, 2000.0))
+    unit = replace(
+        unit,
+        channels=(*unit.channels, Channel("fx", Measurand.GAP_UM, 1)),
+        bearings=(three,),
+    )
+    signals = shaft_at(30.0, 40.0, n_segments=6)
+    signals[:2] += 35.0
+    opposite = 4000.0 + 2 * 35.0 - signals[0]
+    stream = [
+        replace(
+            block,
+            samples=np.vstack([block.samples, far[np.newaxis]]).astype(np.float32),
+            channel_quality=(*block.channel_quality, GOOD if n < 4 else bad(Reason.SENSOR_FAILURE)),
+        )
+        for n, block in enumerate(blocks(signals, n_each=HOP))
+        for far in [opposite[n * HOP : n * HOP + block.n_samples]]
+    ]
+    centres = []
+    for reference in ((2000.0, 2000.0), (2035.0, 2035.0)):
+        monitor = UnitMonitor(unit, AnalysisSettings())
+        found = [a for block in stream[:4] for a in monitor.ingest(block)]
+        assert found[-1].readings["gap_growth_um"].value == pytest.approx(35.0, abs=1.0)
+        anew = replace(three, gap_reference_um=reference)
+        monitor.adopt(replace(unit, bearings=(anew,)))
+        found = [a for block in stream[4:] for a in monitor.ingest(block)]
+        centres.append(found[-1].readings["shaft_centre_y_um"].value)
+
+    assert centres == pytest.approx([40.0, 40.0], abs=1.0)
 
 
 @pytest.mark.parametrize(
