@@ -80,5 +80,9 @@ def average(
     n_segments = weight.T @ weight
     divisor = np.maximum(n_segments, 1.0)
     matrix = by_line @ by_line.conj().transpose(0, 2, 1) / divisor
-    power = (np.abs(by_line) ** 2) @ weight / divisor
+    own = by_line.real**2 + by_line.imag**2
+    if usable.all():
+        power = np.repeat(own.mean(axis=2)[:, :, np.newaxis], usable.shape[1], axis=2)
+    else:
+        power = own @ weight / divisor
     return CrossSpectrum(frequency_hz, matrix, power, n_segments.astype(np.int64))

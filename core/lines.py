@@ -10,6 +10,9 @@ from scipy import fft
 
 from core.arrays import ComplexArray, FloatArray, SampleArray
 
+FINE_STEPS = 64
+"""Samples of one run in a Fourier sum at any frequency."""
+
 
 @lru_cache(maxsize=8)
 def hann(n_samples: int) -> FloatArray:
@@ -70,9 +73,16 @@ def exact_phasors(
     """
     if np.any(frequency_hz <= 0.0) or np.any(frequency_hz >= rate_hz / 2.0):
         raise ValueError(f"frequencies {frequency_hz} must lie between 0 and {rate_hz / 2.0} Hz")
-    time_s = np.arange(tapered_samples.shape[1]) / rate_hz
-    basis = np.exp(-2j * np.pi * np.outer(time_s, frequency_hz))
-    phasors: ComplexArray = tapered_samples @ basis
+    n_channels, n_samples = tapered_samples.shape
+    n_coarse = -(-n_samples // FINE_STEPS)
+    padded = np.zeros((n_channels, n_coarse * FINE_STEPS))
+    padded[:, :n_samples] = tapered_samples
+    # the exponential of a sum of steps: a fine table within each run and a coarse one over runs
+    turn_rad = -2j * np.pi * frequency_hz / rate_hz
+    fine = np.exp(np.outer(np.arange(FINE_STEPS), turn_rad))
+    coarse = np.exp(np.outer(FINE_STEPS * np.arange(n_coarse), turn_rad))
+    runs = padded.reshape(n_channels, n_coarse, FINE_STEPS) @ fine
+    phasors: ComplexArray = (runs * coarse).sum(axis=1)
     return phasors
 
 
