@@ -94,7 +94,18 @@ def migrate(connection: sqlite3.Connection, name: str) -> None:
             " run the padwatch that wrote it, or restore a backup"
         )
     for number in range(version, len(MIGRATIONS)):
+        _step(connection, number)
+
+
+def _step(connection: sqlite3.Connection, number: int) -> None:
+    """Lead from one schema to the next, unless another process has done so meanwhile."""
+    try:
         connection.executescript(
             f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION_ID};"
             f"{MIGRATIONS[number]} PRAGMA user_version = {number + 1}; COMMIT;"
         )
+    except sqlite3.Error:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        if int(connection.execute("PRAGMA user_version").fetchone()[0]) <= number:
+            raise
