@@ -39,6 +39,7 @@ async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
     assert body["quality"] == {"level": "good", "reason": "ok"}
     assert body["time"] == rfc3339(newest.time_ns)
     assert body["speed_source"] == "slow_channel"
+    assert body["runout"] == {"shaft_x": "no_vector", "shaft_y": "no_vector"}
     assert body["window"] == {
         "epoch": newest.window.epoch,
         "first_index": newest.window.first_index,
@@ -88,6 +89,7 @@ async def test_before_the_first_segment_a_bearing_waits_for_data(service: Any) -
     assert {r["value"] for r in body["readings"].values()} == {None}
     assert body["age_s"] is None
     assert body["speed_source"] is None
+    assert body["runout"] == {"shaft_x": None, "shaft_y": None}
 
 
 async def test_a_bearing_is_described_as_configured(running: Any) -> None:
