@@ -83,9 +83,11 @@ def migrate(connection: sqlite3.Connection, name: str) -> None:
     StoreError
         If the file belongs to another program or to a newer padwatch.
     """
+    connection.execute("BEGIN")  # one look at all three: another process may be upgrading
+    n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
     version = int(connection.execute("PRAGMA user_version").fetchone()[0])
     application = int(connection.execute("PRAGMA application_id").fetchone()[0])
-    n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+    connection.execute("COMMIT")
     if application not in (0, APPLICATION_ID) or (application == 0 and n_tables > 0):
         raise StoreError(f"{name} is not a padwatch database; choose another data folder")
     if version > len(MIGRATIONS):
