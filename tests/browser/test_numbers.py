@@ -46,7 +46,9 @@ def shown(name: str, value: float | None) -> str:
     if value is None:
         return "—"
     scale, decimals = next(form for ending, form in DECIMALS.items() if name.endswith(ending))
-    return f"{value / scale:.{decimals}f}".replace("-", "−")
+    text = f"{value / scale:.{decimals}f}"
+    # what is zero in all digits shown has no sign
+    return text.replace("-", "" if float(text) == 0.0 else "−")
 
 
 async def freeze(page: Page, url: str) -> dict:
