@@ -12,7 +12,7 @@ import httpx2
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 60.0
+PATIENCE_S = 40.0
 """Until a test gives up; no test waits that long when all is well."""
 
 
@@ -59,19 +59,26 @@ class Program:
             raise AssertionError(f"{path} never came to be so; last: {answer}") from None
         return answer
 
-    async def end(self, number: int = signal.SIGTERM) -> int:
-        """Send a signal and wait for the end."""
+    async def end(self, number: int = signal.SIGTERM, within_s: float = PATIENCE_S) -> int:
+        """Send a signal and wait for the end; what outlasts that is killed and fails the test."""
         if self.process.returncode is None:
             self.process.send_signal(number)
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(within_s):
                 return await self.process.wait()
         except TimeoutError:
-            self.process.kill()
             raise AssertionError(f"did not end on signal {number}: {self.errors}") from None
         finally:
+            self.kill()
             await self.process.wait()
-            await self._reading
+            # a child that should not have survived would hold its end of the pipe open
+            await asyncio.wait([self._reading], timeout=5)
+            self._reading.cancel()
+
+    def kill(self) -> None:
+        """End it at once, if it has not ended."""
+        if self.process.returncode is None:
+            self.process.kill()
 
     async def _read_errors(self) -> None:
         assert self.process.stderr is not None
@@ -130,8 +137,12 @@ def gone() -> Callable[[int], Awaitable[None]]:
         return stat.rpartition(")")[2].split()[0] not in "ZX"
 
     async def wait(pid: int) -> None:
-        async with asyncio.timeout(PATIENCE_S):
-            while is_running(pid):
-                await asyncio.sleep(0.05)
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                while is_running(pid):
+                    await asyncio.sleep(0.05)
+        except TimeoutError:
+            os.kill(pid, signal.SIGKILL)
+            raise AssertionError(f"process {pid} is still running") from None
 
     return wait

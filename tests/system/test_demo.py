@@ -1,6 +1,5 @@
 """`padwatch demo`: a plant to look at with one command, and nothing left of it afterwards."""
 
-import asyncio
 import os
 import signal
 from collections.abc import Awaitable, Callable
@@ -88,8 +87,7 @@ async def test_the_demo_ends_in_order_and_takes_its_daq_along(
     await demo.wait_for_url()
     [daq] = children(demo.pid)
 
-    async with asyncio.timeout(5.0):
-        assert await demo.end(number) == 0
+    assert await demo.end(number, within_s=5.0) == 0
     await gone(daq)
 
     assert "Traceback" not in demo.errors
@@ -103,7 +101,7 @@ async def test_a_service_that_is_killed_leaves_no_daq_behind(
     await demo.wait_for_url()
     [daq] = children(demo.pid)
 
-    await demo.end(signal.SIGKILL)
+    demo.kill()
 
     await gone(daq)
 
