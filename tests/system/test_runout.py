@@ -116,9 +116,10 @@ def blocks(settings: UnitSettings) -> list[SampleBlock]:
     return record(settings, {})
 
 
-def upper(unit: Unit, blocks: list[SampleBlock]) -> Assessment:
+def upper(unit: Unit, blocks: list[SampleBlock], min_coherence: float = 0.9) -> Assessment:
     """The newest assessment of the upper bearing; its lines are small, and read all the same."""
-    monitor = UnitMonitor(unit, AnalysisSettings(min_bearing_um_pk=0.1))
+    settings = AnalysisSettings(min_bearing_um_pk=0.1, min_coherence=min_coherence)
+    monitor = UnitMonitor(unit, settings)
     found = [a for block in blocks for a in monitor.ingest(block) if a.bearing == "UJB"]
     return found[-1]
 
@@ -195,7 +196,7 @@ def test_a_pick_up_that_fails_leaves_the_speed_channel_and_no_phase_reference(
     settings: UnitSettings, unit: Unit, kind: FaultKind
 ) -> None:
     broken = record(settings, {"kp": ChannelScenario(faults=(Fault(kind, 30_000),))}, 90)
-    found = upper(with_runout_limit(unit, 10.0), broken)
+    found = upper(with_runout_limit(unit, 10.0), broken, min_coherence=0.0)
     assert found.speed_source is SpeedSource.SLOW_CHANNEL
     assert set(found.runout.values()) == {RunoutVerdict.NO_PHASE_REFERENCE}
     # some of the averaged segments still hold the runout, and so the line says nothing
