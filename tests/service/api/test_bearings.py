@@ -5,12 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.account import Gap, SampleAccount
 from core.assessment import Assessment
 from core.quantities import CATALOGUE
 from service.api.times import rfc3339
 from service.live import LinkState
-from service.store.port import UnitGap
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 K = "order1_k_eff_xx_n_per_m"
@@ -239,70 +237,3 @@ async def test_without_a_result_there_is_no_spectrum_and_no_orbit(service: Any, 
     problem = await service.problem(f"{UJB}/{what}", 409)
 
     assert "no result yet" in problem["detail"]
-
-
-async def test_gaps_are_listed_with_their_exact_length(running: Any) -> None:
-    stop_ns = 1_767_225_700_500_000_000
-    running.store.append([], [UnitGap("U1", Gap(1, 60_000, 450, stop_ns))])
-    running.store.append([], [UnitGap("U2", Gap(1, 0, 1, stop_ns))])
-    whole = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
-
-    assert await running.json("/api/v1/units/U1/gaps", **whole) == [
-        {
-            "epoch": 1,
-            "first_index": 60_000,
-            "n_samples": 450,
-            "end": "2026-01-01T00:01:40.500Z",
-        }
-    ]
-    later = {"start": "2026-01-01T00:01:41Z", "end": "2026-01-02T00:00:00Z"}
-    assert await running.json("/api/v1/units/U1/gaps", **later) == []
-
-
-async def test_units_say_how_their_samples_arrive(running: Any) -> None:
-    account = SampleAccount(8000, 100, 50, 7, 1, {"torn": 25})
-    running.live.set_received("U1", 1_767_225_613_000_000_000, account)
-    running.clock.s += 4.0
-
-    one = await running.json("/api/v1/units/U1")
-    both = await running.json("/api/v1/units")
-
-    assert one["source"] == {
-        "state": "connected",
-        "reason": None,
-        "since": "2026-01-01T00:00:00.000Z",
-        "data_age_s": 4.0,
-        "last_sample_time": "2026-01-01T00:00:13.000Z",
-        "n_offered": 8175,
-        "n_stored": 8000,
-        "n_flagged": 100,
-        "n_gap": 50,
-        "n_repeated": 7,
-        "n_restarts": 1,
-        "rejected": {"torn": 25},
-    }
-    assert both[0] == one
-    assert one["bearing_ids"] == ["UJB", "LJB", "TJB"]
-    assert both[1]["source"]["state"] == "not_connected"
-    assert both[1]["source"]["reason"] == "127.0.0.1:502: Connection refused"
-    assert both[1]["source"]["data_age_s"] is None
-
-
-async def test_the_overview_shows_what_each_bearing_shows(running: Any) -> None:
-    overview = await running.json("/api/v1/overview")
-
-    assert overview["plant"] == {"name": "Demo plant"}
-    assert overview["time"] == "2026-01-01T00:00:00.000Z"
-    assert overview["refresh_s"] == 11.95
-    assert overview["store"] == {"error": None, "n_unstored": 0}
-    for unit in overview["units"]:
-        assert unit["source"] == (await running.json(f"/api/v1/units/{unit['id']}"))["source"]
-        for bearing in unit["bearings"]:
-            path = f"/api/v1/units/{unit['id']}/bearings/{bearing['bearing']}/latest"
-            assert await running.json(path) == bearing
-
-
-async def test_the_catalogue_names_every_quantity(running: Any) -> None:
-    assert await running.json("/api/v1/quantities") == [
-        {"name": q.name, "unit": q.unit, "label": q.label} for q in CATALOGUE
-    ]
