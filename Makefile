@@ -30,6 +30,8 @@ check: install
 
 bench: install
 	$(BIN)/python benchmarks/ingest.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/analysis.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py
 
 format: install
 	$(BIN)/ruff format .

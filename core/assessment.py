@@ -67,7 +67,7 @@ class Assessment:
     readings
         One for each quantity of :data:`core.quantities.CATALOGUE`.
     quality
-        Of the bearing's 1× results as a whole: the worst of its measured inputs.
+        Of the bearing as a whole: the worst of its 1× amplitudes and its preferred stiffness.
     budgets
         Where the uncertainty of a reading comes from, by quantity, where it is known.
     estimators

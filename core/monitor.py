@@ -25,8 +25,8 @@ JUDGED = (
     "order1_shaft_y_um_pk",
     "order1_bearing_x_um_pk",
     "order1_bearing_y_um_pk",
-    "order1_k_eff_xx_n_per_m",
-    "order1_k_eff_yy_n_per_m",
+    "stiffness_xx_n_per_m",
+    "stiffness_yy_n_per_m",
 )
 """The readings whose worst quality is the quality of the assessment."""
 

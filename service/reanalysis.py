@@ -32,7 +32,7 @@ class AssessmentModel(ApiModel):
     """End of the samples."""
 
     quality: QualityModel
-    """The worst of the 1× results."""
+    """The worst of the 1× amplitudes and the preferred stiffness."""
 
     speed_source: SpeedSourceName
     """Where the running speed came from."""

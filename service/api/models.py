@@ -116,7 +116,7 @@ class LatestModel(ApiModel):
     """Seconds since that result was made."""
 
     quality: QualityModel
-    """The worst of the 1× results."""
+    """The worst of the 1× amplitudes and the preferred stiffness."""
 
     speed_source: SpeedSourceName | None
     """Where the running speed came from."""

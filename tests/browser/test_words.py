@@ -7,6 +7,8 @@ import pytest
 
 from core.estimators import Estimator
 from core.quality import Reason
+from core.runout import RunoutVerdict
+from core.speed import SpeedSource
 
 SOURCE = Path(__file__).parents[2] / "service" / "dashboard" / "static" / "words.js"
 ONLY_THE_PAGE_KNOWS = {"service_not_reachable"}
@@ -32,3 +34,8 @@ def test_no_words_are_kept_for_reasons_that_nobody_gives() -> None:
 
 def test_every_estimator_has_words() -> None:
     assert entries("ESTIMATORS").keys() == {estimator.value for estimator in Estimator}
+
+
+def test_every_verdict_on_runout_and_every_speed_source_has_words() -> None:
+    assert entries("RUNOUT").keys() == {verdict.value for verdict in RunoutVerdict}
+    assert entries("SPEED_SOURCES").keys() == {source.value for source in SpeedSource}

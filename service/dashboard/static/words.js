@@ -77,6 +77,21 @@ export function estimatorWords(name) {
   return name === null ? "" : (ESTIMATORS[name] ?? name.replaceAll("_", " "));
 }
 
+const RUNOUT = {
+  applied: "taken off",
+  no_vector: "not taken off: no slow-roll vector",
+  other_probe: "not taken off: the slow-roll vector is of another probe",
+  not_slow_roll: "not taken off: the vector was not measured at slow roll",
+  no_phase_reference: "not taken off: no key-phase",
+};
+
+/** Whether the shaft's runout is taken off at 1×, in words, once if it is the same in x and y. */
+export function runoutWords(runout) {
+  if (!runout) return "";
+  const [x, y] = ["shaft_x", "shaft_y"].map((shaft) => RUNOUT[runout[shaft]] ?? String(runout[shaft]));
+  return x === y ? x : `x ${x}, y ${y}`;
+}
+
 /** Which estimator the preferred stiffness comes from, in one go if it is the same in both axes. */
 export function preferredOrigin({ estimators }) {
   const chosen = Object.entries(estimators ?? {}).filter(([, name]) => name !== null);
@@ -85,6 +100,7 @@ export function preferredOrigin({ estimators }) {
 }
 
 const SPEED_SOURCES = {
+  key_phase: "measured by key-phase",
   slow_channel: "measured",
   line: "from the 1× line",
   rated: "rated value, not measured",

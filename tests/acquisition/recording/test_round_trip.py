@@ -66,7 +66,7 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
     blocks, epoch, index = [], draw(st.integers(0, 2**32)), draw(st.integers(0, 2**50))
     for _ in range(draw(st.integers(1, 6))):
         if draw(st.booleans()):
-            epoch, index = draw(st.integers(0, 2**32)), 0
+            epoch, index = epoch + draw(st.integers(1, 2**32)), 0
         rejected = draw(st.lists(REJECTIONS, max_size=3))
         index += sum(r.n_samples for r in rejected) + draw(st.sampled_from([0, 0, 1, 10**6]))
         n_samples = draw(st.integers(1, 9))

@@ -2,6 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { formatAge, formatCount, formatFixed } from "../format.js";
+import { runoutWords } from "../words.js";
 
 const FACTS = [
   ["Segments averaged", (w) => `${w.n_segments} of ${w.n_segments_wanted} wanted`],
@@ -13,17 +14,22 @@ const FACTS = [
   ["Epoch of the device", (w) => String(w.epoch)],
 ];
 
+const RUNOUT = "Runout at 1×";
+
 /** Returns `{ node, draw(latest) }`. */
 export function windowFacts() {
   const sentence = element("p", { class: "sentence" });
   const values = FACTS.map(() => element("dd"));
   const rows = FACTS.map(([name], index) => element("div", {}, element("dt", {}, name), values[index]));
+  const runout = element("dd");
+  rows.push(element("div", {}, element("dt", {}, RUNOUT), runout));
   const list = element("dl", { class: "facts" }, ...rows);
   return {
     node: element("section", { class: "panel window" }, element("h2", {}, "Averaged window"), sentence, list),
     draw(latest) {
       list.hidden = latest.window === null;
       setText(sentence, windowSentence(latest));
+      setText(runout, runoutWords(latest.runout));
       if (latest.window) FACTS.forEach(([, words], index) => setText(values[index], words(latest.window)));
     },
   };
