@@ -20,6 +20,7 @@ import scipy.signal
 
 from benchmarks.accuracy_plant import RATE_HZ, machine
 from core.arrays import FloatArray
+from core.blocks import SampleBlock
 from core.bracket import BracketDynamics
 from core.cross_spectrum import (
     BEARING_X,
@@ -33,7 +34,6 @@ from core.dynamic import DynamicStiffness, dynamic_stiffness
 from core.dynamic_settings import DynamicSettings
 from core.machine import Measurand, Unit
 from core.quality import GOOD, Reading
-from core.ring import Window
 from core.segments import ORDER1, VORTEX, SegmentTransform
 from core.settings import AnalysisSettings
 from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
@@ -70,7 +70,8 @@ class Analysis:
     def add(self, samples: FloatArray, index: int) -> int:
         """Take in the newest segment and evaluate all bearings; count the results of `dynamic`."""
         self._transform.add(
-            Window(
+            SampleBlock(
+                unit=self._unit.id,
                 epoch=1,
                 first_index=index,
                 start_ns=0,

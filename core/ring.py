@@ -7,48 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.account import Gap, SampleAccount
-from core.arrays import SampleArray
 from core.blocks import SampleBlock
 from core.quality import Level, Quality, Reading, mean_reading, worst
 from core.units import ns_from_s
-
-
-@dataclass(frozen=True)
-class Window:
-    """A stretch of consecutive samples with all that belongs to its time.
-
-    Parameters
-    ----------
-    samples
-        (n_channels, n_samples), a copy.
-    channel_quality
-        The worst within the window, for each channel.
-    slow
-        The mean within the window, for each slow channel.
-    """
-
-    epoch: int
-    first_index: int
-    start_ns: int
-    rate_hz: float
-    samples: SampleArray
-    channel_quality: tuple[Quality, ...]
-    slow: Mapping[str, Reading]
-
-    @property
-    def n_samples(self) -> int:
-        """Samples per channel."""
-        return int(self.samples.shape[1])
-
-    @property
-    def stop_index(self) -> int:
-        """Index of the first sample after the window."""
-        return self.first_index + self.n_samples
-
-    @property
-    def stop_ns(self) -> int:
-        """Time of the first sample after the window."""
-        return self.start_ns + ns_from_s(self.n_samples / self.rate_hz)
 
 
 @dataclass(frozen=True)
@@ -83,6 +44,7 @@ class Ring:
         self._capacity = capacity
         self._stretches: deque[_Stretch] = deque()
         self.contiguous_from = 0
+        self._unit = ""
         self.epoch: int | None = None
         self.stop_index = 0
         self.account = SampleAccount()
@@ -102,6 +64,7 @@ class Ring:
             raise ValueError(
                 f"{block.samples.shape[0]} channels offered to a ring of {self._samples.shape[0]}"
             )
+        self._unit = block.unit
         if self.epoch is None:  # what came before padwatch looked was not offered to it
             block = replace(block, rejected=())
             self.epoch, self.stop_index = block.epoch, block.first_index
@@ -120,8 +83,10 @@ class Ring:
         oldest = max(self.contiguous_from, self.stop_index - self._capacity)
         return oldest <= first_index <= stop_index <= self.stop_index
 
-    def read(self, first_index: int, stop_index: int) -> Window:
+    def read(self, first_index: int, stop_index: int) -> SampleBlock:
         """Copy a stretch of consecutive samples.
+
+        Each channel has its worst quality within the stretch, each slow channel its mean.
 
         Raises
         ------
@@ -135,7 +100,8 @@ class Ring:
         n_samples = [s.n_within(first_index, stop_index) for s in stretches]
         reference = stretches[0]
         offset_s = (first_index - reference.first_index) / reference.rate_hz
-        return Window(
+        return SampleBlock(
+            unit=self._unit,
             epoch=self.epoch or 0,
             first_index=first_index,
             start_ns=reference.start_ns + ns_from_s(offset_s),

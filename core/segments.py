@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
+from core.blocks import SampleBlock
 from core.cross_spectrum import average
 from core.key_phase import KeyPhase, read_key_phase
 from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.quality import Level, Quality, Reading, Reason, bad, worst
-from core.ring import Window
 from core.runout import RunoutVerdict
 from core.segment_runout import without_runout
 from core.sensor_checks import quietest_rms, signal_quality
@@ -94,7 +94,7 @@ class SegmentTransform:
         """Forget all segments: the device counts anew."""
         self.segments.clear()
 
-    def add(self, window: Window) -> Segment:
+    def add(self, window: SampleBlock) -> Segment:
         """Transform a window, keep it, and drop what has left the averaging time."""
         finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
         quality = tuple(
@@ -159,7 +159,7 @@ class SegmentTransform:
 
     def _speed(
         self,
-        window: Window,
+        window: SampleBlock,
         bins: ComplexArray,
         usable: npt.NDArray[np.bool_],
         key_phase: KeyPhase | None,

@@ -5,11 +5,11 @@ import pytest
 from scipy import signal
 
 from core.arrays import FloatArray
+from core.blocks import SampleBlock
 from core.cross_spectrum import CrossSpectrum, average
 from core.lines import bin_phasors, tapered
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.quality import GOOD, Reading
-from core.ring import Window
 from core.segments import SegmentTransform
 from core.settings import AnalysisSettings
 
@@ -72,7 +72,7 @@ def test_samples_in_single_precision_cost_no_more_than_their_own_rounding(
     for start in range(0, N_SAMPLES - 8191, SETTINGS.hop_samples):
         piece = travelling[:, start : start + 8192]
         slow = {"speed": Reading(92.3)}
-        transform.add(Window(1, start, 0, RATE_HZ, piece, (GOOD,) * 4, slow))
+        transform.add(SampleBlock("U1", 1, start, 0, RATE_HZ, piece, (GOOD,) * 4, slow))
 
     segments = list(transform.segments)
     ours = average(

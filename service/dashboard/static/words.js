@@ -88,7 +88,7 @@ const RUNOUT = {
 /** Whether the shaft's runout is taken off at 1×, in words, once if it is the same in x and y. */
 export function runoutWords(runout) {
   if (!runout) return "";
-  const [x, y] = ["shaft_x", "shaft_y"].map((shaft) => RUNOUT[runout[shaft]] ?? String(runout[shaft]));
+  const [x, y] = ["shaft_x", "shaft_y"].map((shaft) => RUNOUT[runout[shaft]] ?? "");
   return x === y ? x : `x ${x}, y ${y}`;
 }
 
