@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install run test check bench format lock clean
+.PHONY: install run test check bench accuracy format lock clean
 
 $(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
@@ -31,7 +31,9 @@ check: install
 bench: install
 	$(BIN)/python benchmarks/ingest.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/analysis.py
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py
+
+accuracy: install
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2
 
 format: install
 	$(BIN)/ruff format .

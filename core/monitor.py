@@ -34,8 +34,9 @@ JUDGED = (
 class UnitMonitor:
     """Watches one unit. All state of its analysis is here and nowhere else.
 
-    The results depend on the samples and their indices alone, not on how they were cut into blocks
-    or when they arrived.
+    What comes from the samples depends on them and their indices alone, not on how they were cut
+    into blocks or when they arrived. Slow readings count for the samples of the block they came
+    with.
     """
 
     def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
