@@ -149,7 +149,7 @@ def bearing_router(context: Context) -> APIRouter:
             raise ProblemError(404, "No such budget", detail)
         found = _budget(context.live.current(unit, bearing), quantity)
         if found is None:
-            detail = f"{quantity} has no number just now, and so no budget"
+            detail = f"{quantity} has no budget just now: no number, or too few segments yet"
             raise ProblemError(409, "No result", detail)
         return found
 
