@@ -12,16 +12,11 @@ from core.quantities import BY_NAME
 from core.units import ns_from_s
 from service.api.bearing_models import BearingModel
 from service.api.bearing_views import bearing_model
+from service.api.budget_models import BudgetModel
 from service.api.context import BearingId, Context, QuantityName, UnitId
-from service.api.models import (
-    BudgetModel,
-    GapModel,
-    LatestModel,
-    OrbitModel,
-    SpectrumModel,
-    TrendModel,
-)
+from service.api.models import LatestModel
 from service.api.problems import ProblemError, problem_responses
+from service.api.series_models import GapModel, OrbitModel, SpectrumModel, TrendModel
 from service.api.times import ns_from_datetime, rfc3339, written_as_date
 from service.api.views import (
     budget_model,

@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Response
 
 from service.api.context import Context
-from service.api.models import HealthModel
+from service.api.plant_models import HealthModel
 
 
 def health_router(context: Context) -> APIRouter:

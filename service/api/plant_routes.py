@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from core.quantities import CATALOGUE
 from service.api.context import Context, UnitId
-from service.api.models import (
+from service.api.plant_models import (
     OverviewModel,
     PlantModel,
     QuantityModel,

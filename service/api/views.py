@@ -8,23 +8,24 @@ from core.quality import Level, Quality, Reading
 from core.quantities import BY_NAME
 from core.uncertainty import Budget
 from core.units import NS_PER_S
+from service.api.budget_models import BudgetLineModel, BudgetModel
 from service.api.models import (
-    BudgetLineModel,
-    BudgetModel,
     EstimatorName,
     LatestModel,
     LevelName,
-    OrbitModel,
     QualityModel,
     ReadingModel,
     RunoutName,
-    SourceModel,
+    UncertaintyModel,
+    WindowModel,
+)
+from service.api.plant_models import SourceModel
+from service.api.series_models import (
+    OrbitModel,
     SpectrumChannelModel,
     SpectrumModel,
     TrendModel,
     TrendSeriesModel,
-    UncertaintyModel,
-    WindowModel,
 )
 from service.api.times import rfc3339
 from service.live import CurrentBearing, LiveView

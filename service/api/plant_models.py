@@ -1,0 +1,142 @@
+"""What the API answers about the plant, its units and the service itself."""
+
+from typing import Literal
+
+from service.api.models import ApiModel, LatestModel, Time
+
+
+class SourceModel(ApiModel):
+    """How the samples of a unit arrive, and where every one of them went."""
+
+    state: Literal["connecting", "connected", "not_connected"]
+    """Whether samples arrive."""
+
+    reason: str | None
+    """Why not."""
+
+    since: Time | None
+    """Since when it has been so."""
+
+    data_age_s: float | None
+    """Seconds since the newest sample arrived."""
+
+    last_sample_time: Time | None
+    """Time of that sample by the device's clock."""
+
+    n_offered: int
+    """Samples per channel the device counted: stored + flagged + gap + rejected."""
+
+    n_stored: int
+    """Taken, all channels good."""
+
+    n_flagged: int
+    """Taken, some channel not good."""
+
+    n_gap: int
+    """Never arrived."""
+
+    n_repeated: int
+    """Arrived again and were dropped."""
+
+    n_restarts: int
+    """How often the device began to count anew."""
+
+    rejected: dict[str, int]
+    """Arrived and were refused, by reason."""
+
+
+class UnitModel(ApiModel):
+    """A unit and how its samples arrive."""
+
+    id: str
+    """Stable identifier."""
+
+    name: str
+    """As people call it."""
+
+    rated_speed_rpm: float
+    """Rated running speed."""
+
+    bearing_ids: list[str]
+    """Its guide bearings."""
+
+    source: SourceModel
+    """How its samples arrive."""
+
+
+class UnitOverviewModel(ApiModel):
+    """A unit with all its bearings."""
+
+    id: str
+    """Stable identifier."""
+
+    name: str
+    """As people call it."""
+
+    rated_speed_rpm: float
+    """Rated running speed."""
+
+    source: SourceModel
+    """How its samples arrive."""
+
+    bearings: list[LatestModel]
+    """Its guide bearings now."""
+
+
+class PlantModel(ApiModel):
+    """The plant."""
+
+    name: str
+    """As people call it."""
+
+
+class StoreModel(ApiModel):
+    """Whether results reach the disk."""
+
+    error: str | None
+    """Why they do not."""
+
+    n_unstored: int
+    """Results given up because the store did not answer for too long."""
+
+
+class OverviewModel(ApiModel):
+    """Everything that a control room wants to see at a glance."""
+
+    plant: PlantModel
+    """The plant."""
+
+    time: Time
+    """Now."""
+
+    refresh_s: float
+    """Seconds from one result to the next."""
+
+    store: StoreModel
+    """Whether results reach the disk."""
+
+    units: list[UnitOverviewModel]
+    """All units."""
+
+
+class QuantityModel(ApiModel):
+    """A quantity that trends can be asked for."""
+
+    name: str
+    """As in readings and trends."""
+
+    unit: str
+    """Unit and detector."""
+
+    label: str
+    """What it is, in words."""
+
+
+class HealthModel(ApiModel):
+    """Whether the service can do its work."""
+
+    status: Literal["ok", "not ready"]
+    """In a word."""
+
+    checks: dict[str, str]
+    """Each check in a sentence."""

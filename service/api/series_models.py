@@ -1,0 +1,119 @@
+"""What the API answers about time and frequency: trends, gaps, spectra and orbits, by column."""
+
+from typing import Literal
+
+from service.api.models import ApiModel, LevelName, Time
+
+
+class TrendSeriesModel(ApiModel):
+    """One quantity; a value for each time."""
+
+    unit: str
+    """Unit and detector."""
+
+    min: list[float | None]
+    """Lowest usable reading; null if there is none."""
+
+    max: list[float | None]
+    """Highest usable reading."""
+
+    mean: list[float | None]
+    """Mean of the usable readings."""
+
+    count: list[int]
+    """Number of usable readings."""
+
+    worst_level: list[LevelName | None]
+    """Worst quality in the bucket; null where there was no reading at all."""
+
+    u_random: list[float | None] | None
+    """Mean random standard uncertainty; null for quantities without."""
+
+    u_systematic: list[float | None] | None
+    """Mean systematic standard uncertainty; null for quantities without."""
+
+
+class TrendModel(ApiModel):
+    """Trends of one bearing, by column."""
+
+    unit: str
+    """Unit."""
+
+    bearing: str
+    """Bearing."""
+
+    start: Time
+    """First time asked for."""
+
+    end: Time
+    """Time up to which was asked."""
+
+    bucket_s: float | None
+    """Width of the buckets; null if each reading stands alone."""
+
+    time: list[float]
+    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
+
+    series: dict[str, TrendSeriesModel]
+    """The quantities asked for."""
+
+
+class GapModel(ApiModel):
+    """Samples that the device counted but nobody delivered."""
+
+    epoch: int
+    """Of the device's count."""
+
+    first_index: int
+    """Index of the first missing sample."""
+
+    n_samples: int
+    """How many are missing, per channel."""
+
+    end: Time
+    """Time of the first sample after the gap."""
+
+
+class SpectrumChannelModel(ApiModel):
+    """Amplitude spectrum of one channel."""
+
+    unit: Literal["um_pk"]
+    """Displacement, zero to peak."""
+
+    amplitude: list[float] | None
+    """A value for each frequency; null if the channel is not usable."""
+
+
+class SpectrumModel(ApiModel):
+    """Averaged amplitude spectra of a bearing, as displacement."""
+
+    time: Time
+    """End of the samples."""
+
+    frequency_hz: list[float]
+    """Frequencies of the lines."""
+
+    channels: dict[str, SpectrumChannelModel]
+    """shaft_x, shaft_y, bearing_x and bearing_y."""
+
+    lines: dict[str, float | None]
+    """Where order1 (1×) and the vortex were read."""
+
+
+class OrbitModel(ApiModel):
+    """The newest turns of the shaft relative to its bearing, means removed."""
+
+    time: Time
+    """Time of the first sample."""
+
+    rate_hz: float
+    """Samples per second."""
+
+    duration_s: float
+    """Length."""
+
+    shaft_x_um: list[float]
+    """Displacement in x."""
+
+    shaft_y_um: list[float]
+    """Displacement in y."""
