@@ -6,11 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.raw import RawBlock
+from core.arrays import SampleArray
 from core.blocks import SampleBlock
 from core.quality import GOOD, Quality, Reading, Reason, bad, missing
 
 COUNTS_FULL_SCALE = 32768
 """Counts of a 16-bit converter that stand for its full-scale voltage."""
+
+BLOCK_SAMPLES = 50
+"""A twelfth of a second at 600 Hz: how long a probe can be lost before anybody is told."""
 
 
 @dataclass(frozen=True)
@@ -49,33 +53,50 @@ class SlowCalibration:
 
 @dataclass(frozen=True)
 class UnitCalibration:
-    """Everything needed to read one unit's device, in wire order."""
+    """Everything needed to read one unit's device, in wire order.
+
+    Parameters
+    ----------
+    block_samples
+        Samples of each channel in a block: they share one verdict on each channel and one set of
+        slow values. Blocks begin at multiples of it, so that the same samples are judged the same
+        way whatever the wire cuts them into.
+    """
 
     unit: str
     rate_hz: float
     channels: tuple[ChannelCalibration, ...]
     slow: tuple[SlowCalibration, ...]
+    block_samples: int = BLOCK_SAMPLES
 
 
 def calibrate(raw: RawBlock, calibration: UnitCalibration) -> SampleBlock:
-    """Turn counts into engineering units and device flags into qualities.
+    """Turn what a device delivered into engineering units, its flags into qualities.
 
-    The result is bit-identical for identical counts, whichever adapter carried them.
+    The result is bit-identical for identical raw blocks, whichever adapter carried them.
     """
-    gain = np.array([c.unit_per_count for c in calibration.channels], dtype=np.float32)
-    samples = raw.counts.astype(np.float32)
-    samples *= gain[:, np.newaxis]
     return SampleBlock(
         unit=calibration.unit,
         epoch=raw.epoch,
         first_index=raw.first_index,
         start_ns=raw.start_ns,
         rate_hz=raw.rate_hz,
-        samples=samples,
+        samples=_engineering_units(raw, calibration),
         channel_quality=_channel_qualities(raw, calibration.channels),
         slow={c.id: _slow_reading(v, c) for c, v in zip(calibration.slow, raw.slow, strict=True)},
         rejected=raw.rejected,
     )
+
+
+def _engineering_units(raw: RawBlock, calibration: UnitCalibration) -> SampleArray:
+    if raw.counts.dtype == np.float32:
+        # one NaN would blind a whole spectrum; the channel is bad for this block, and says so
+        finite = np.isfinite(raw.counts).all(axis=1, keepdims=True)
+        return np.where(finite, raw.counts, np.float32(0.0))
+    gain = np.array([c.unit_per_count for c in calibration.channels], dtype=np.float32)
+    samples = raw.counts.astype(np.float32)
+    samples *= gain[:, np.newaxis]
+    return samples
 
 
 def _channel_qualities(
@@ -83,15 +104,16 @@ def _channel_qualities(
 ) -> tuple[Quality, ...]:
     lowest = raw.counts.min(axis=1)
     highest = raw.counts.max(axis=1)
-    mean = raw.counts.mean(axis=1)
+    mean = raw.counts.mean(axis=1, dtype=np.float64)
+    judge = _quality_of_units if raw.counts.dtype == np.float32 else _quality_of_counts
     return tuple(
-        _channel_quality(c, ok, int(lo), int(hi), float(m))
+        judge(c, ok, float(lo), float(hi), float(m))
         for c, ok, lo, hi, m in zip(channels, raw.ok, lowest, highest, mean, strict=True)
     )
 
 
-def _channel_quality(
-    channel: ChannelCalibration, ok: bool, lowest: int, highest: int, mean: float
+def _quality_of_counts(
+    channel: ChannelCalibration, ok: bool, lowest: float, highest: float, mean: float
 ) -> Quality:
     mean_v = mean * channel.full_scale_v / COUNTS_FULL_SCALE
     if not ok or not channel.ok_min_v <= mean_v <= channel.ok_max_v:
@@ -99,6 +121,17 @@ def _channel_quality(
     if lowest == -COUNTS_FULL_SCALE or highest == COUNTS_FULL_SCALE - 1:
         return bad(Reason.CLIPPED)
     return GOOD
+
+
+def _quality_of_units(
+    channel: ChannelCalibration, ok: bool, lowest: float, highest: float, mean: float
+) -> Quality:
+    if not np.isfinite(lowest) or not np.isfinite(highest):
+        return bad(Reason.NOT_FINITE)
+    if not ok or not channel.ok_min_v <= mean / channel.unit_per_v <= channel.ok_max_v:
+        return bad(Reason.SENSOR_FAILURE)
+    full_scale = abs(channel.full_scale_v * channel.unit_per_v)
+    return GOOD if max(-lowest, highest) < full_scale else bad(Reason.CLIPPED)
 
 
 def _slow_reading(value: float, channel: SlowCalibration) -> Reading:

@@ -11,6 +11,9 @@ CountArray: TypeAlias = npt.NDArray[np.int16]
 SampleArray: TypeAlias = npt.NDArray[np.float32]
 """Samples in engineering units as they travel through the house."""
 
+RawArray: TypeAlias = CountArray | SampleArray
+"""What a device delivers: counts of its converter, or engineering units it has made itself."""
+
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 """Real numbers that are calculated with."""
 

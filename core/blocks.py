@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from core.arrays import SampleArray
+from core.device_clock import DeviceClock, StampFault
 from core.quality import Quality, Reading
 from core.units import ns_from_s
 
@@ -49,6 +50,10 @@ class SampleBlock:
     rejected
         What was refused between the previous block and this one; the rest of a jump in
         ``first_index`` is a gap.
+    clock
+        How the device's clock stands against the host's; None if there is no such clock.
+    stamp_fault
+        Why the device's own time stamp was not used: ``start_ns`` then follows from the index.
     """
 
     unit: str
@@ -60,6 +65,8 @@ class SampleBlock:
     channel_quality: tuple[Quality, ...]
     slow: Mapping[str, Reading] = field(default_factory=dict)
     rejected: tuple[Rejection, ...] = ()
+    clock: DeviceClock | None = None
+    stamp_fault: StampFault | None = None
 
     def __post_init__(self) -> None:
         if self.samples.ndim != 2 or len(self.channel_quality) != self.samples.shape[0]:

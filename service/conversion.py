@@ -97,6 +97,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
         rate_hz=settings.rate_hz,
         channels=tuple(_calibration(c) for c in settings.channel),
         slow=tuple(SlowCalibration(c.id, c.minimum, c.maximum) for c in settings.slow_channel),
+        block_samples=settings.block_samples,
     )
 
 

@@ -55,7 +55,7 @@ def source_of(unit: settings.UnitSettings, clock: Clock) -> SampleSource:
             return ModbusRingSource(ring, calibration_of(unit), clock)
         case settings.SimulatedSettings():
             feed = simulated_feed(unit, clock)
-            return SimulatedSource(feed, calibration_of(unit), clock, source.samples_per_block)
+            return SimulatedSource(feed, calibration_of(unit), clock)
 
 
 def simulated_feed(unit: settings.UnitSettings, clock: Clock) -> RawFeed:

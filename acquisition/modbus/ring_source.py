@@ -4,8 +4,9 @@ from collections.abc import AsyncGenerator, AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 
-from acquisition.calibration import UnitCalibration, calibrate
+from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
+from acquisition.delivery import Delivery
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import LinkSettings, RegisterLink
 from acquisition.modbus.follower import RingFollower
@@ -57,7 +58,7 @@ class ModbusRingSource:
         self, settings: ModbusRingSettings, calibration: UnitCalibration, clock: Clock
     ) -> None:
         self._settings = settings
-        self._calibration = calibration
+        self._delivery = Delivery(calibration)
         self._clock = clock
         self._follower = RingFollower(
             len(calibration.channels), calibration.rate_hz, len(calibration.slow)
@@ -106,8 +107,10 @@ class ModbusRingSource:
         while True:
             with _nonsense_drops_the_link():
                 raw_blocks = await self._follower.advance(reader)
+            arrived_ns = self._clock.now_ns()
             for raw in raw_blocks:
-                yield calibrate(raw, self._calibration)
+                for block in self._delivery.take(raw, arrived_ns):
+                    yield block
             if raw_blocks:
                 self._fresh_at_s = self._clock.monotonic_s()
             else:

@@ -3,8 +3,8 @@
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager, closing
 
-from acquisition.calibration import calibrate
 from acquisition.clock import Clock
+from acquisition.delivery import Delivery
 from acquisition.recording.progress import Progress
 from acquisition.recording.reader import Recording
 from acquisition.recording.selection import Selection, all_of
@@ -44,6 +44,7 @@ class RecordingSource:
         self._recording = recording
         self._clock = clock
         self._selection = selection or all_of(recording.manifest)
+        self._delivery = Delivery(self._selection.calibration)
         self._speed = speed
         self._start_s: float | None = None
         self._next_block = 0
@@ -74,7 +75,10 @@ class RecordingSource:
                 await self._clock.sleep(0.0 if missed else max(0.0, due_s - self._elapsed_s()))
                 self._progress, self._next_block = after, self._next_block + 1
                 if not missed:
-                    yield calibrate(self._selection.of(raw), self._selection.calibration)
+                    for block in self._delivery.take(self._selection.of(raw)):
+                        yield block
+            for block in self._delivery.flush():
+                yield block
 
     def _elapsed_s(self) -> float:
         return self._clock.monotonic_s() - (self._start_s or 0.0)

@@ -3,8 +3,9 @@
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
 
-from acquisition.calibration import UnitCalibration, calibrate
+from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
+from acquisition.delivery import Delivery
 from acquisition.raw import RawFeed
 from core.blocks import SampleBlock
 
@@ -18,16 +19,6 @@ class SimulatedSource:
     In real time the feed runs from the first connection on, connected or not: what passed while
     nobody was connected is missing, and the sample index jumps. Unpaced, a new connection goes on
     where the last one stopped.
-
-    Parameters
-    ----------
-    block_samples
-        Samples of each channel in a block.
-
-    Raises
-    ------
-    ValueError
-        If `block_samples` is less than 1.
     """
 
     def __init__(
@@ -35,15 +26,13 @@ class SimulatedSource:
         feed: RawFeed,
         calibration: UnitCalibration,
         clock: Clock,
-        block_samples: int = 512,
         paced: bool = True,
     ) -> None:
-        if block_samples < 1:
-            raise ValueError(f"a block needs at least 1 sample, got {block_samples}")
         self._feed = feed
-        self._calibration = calibration
+        self._rate_hz = calibration.rate_hz
+        self._block_samples = calibration.block_samples
+        self._delivery = Delivery(calibration)
         self._clock = clock
-        self._block_samples = block_samples
         self._paced = paced
         self._start_s: float | None = None
         self._n_taken = 0
@@ -54,7 +43,7 @@ class SimulatedSource:
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()
         if self._paced:
-            await self._skip_to(int(self._elapsed_s() * self._calibration.rate_hz))
+            await self._skip_to(int(self._elapsed_s() * self._rate_hz))
         async with aclosing(self._blocks()) as blocks:
             yield blocks
 
@@ -62,9 +51,10 @@ class SimulatedSource:
         while True:
             raw = self._feed.advance(self._block_samples)
             self._n_taken += self._block_samples
-            due_s = self._n_taken / self._calibration.rate_hz if self._paced else 0.0
+            due_s = self._n_taken / self._rate_hz if self._paced else 0.0
             await self._clock.sleep(max(0.0, due_s - self._elapsed_s()))
-            yield calibrate(raw, self._calibration)
+            for block in self._delivery.take(raw):
+                yield block
 
     async def _skip_to(self, index: int) -> None:
         while self._n_taken < index:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
+from acquisition.calibration import BLOCK_SAMPLES
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.bearings import (
     CHANNEL_KEYS,
@@ -53,9 +54,6 @@ class SimulatedSettings(Settings):
     kind: Literal["simulated"]
     """This source's kind."""
 
-    samples_per_block: Annotated[int, Field(ge=1, le=100_000)] = 60
-    """Samples per channel in one block."""
-
 
 SourceSettings = Annotated[ModbusRingSettings | SimulatedSettings, Field(discriminator="kind")]
 
@@ -74,6 +72,10 @@ class UnitSettings(Settings):
 
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
     """Samples per second and channel; example: 600.0."""
+
+    block_samples: Annotated[int, Field(ge=1, le=10_000)] = BLOCK_SAMPLES
+    """Samples of each channel that share one verdict on the channel and one set of slow values; a
+    DAQ's slots should be as long. Example: 50, a twelfth of a second at 600 Hz."""
 
     turbine: Literal["francis", "kaplan"] = "francis"
     """"francis" or "kaplan". A Kaplan turbine has no part-load vortex: that order is off."""

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -33,7 +34,8 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
     build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
     feed = build_unit(full_load)
-    source = SimulatedSource(feed, calibration, clock, block_samples=500, paced=False)
+    in_500s = replace(calibration, block_samples=500)
+    source = SimulatedSource(feed, in_500s, clock, paced=False)
 
     blocks = await take(source, 3)
     clock.elapsed_s += 3600.0
@@ -48,7 +50,8 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
 async def test_a_paced_source_delivers_samples_when_they_have_happened(
     build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    source = SimulatedSource(build_unit(full_load), calibration, clock, block_samples=300)
+    in_halves = replace(calibration, block_samples=300)
+    source = SimulatedSource(build_unit(full_load), in_halves, clock)
 
     await take(source, 4)
 
@@ -58,7 +61,8 @@ async def test_a_paced_source_delivers_samples_when_they_have_happened(
 async def test_what_passed_while_nobody_was_connected_shows_as_a_jump_of_the_index(
     build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    source = SimulatedSource(build_unit(full_load), calibration, clock, block_samples=300)
+    in_halves = replace(calibration, block_samples=300)
+    source = SimulatedSource(build_unit(full_load), in_halves, clock)
     before = await take(source, 2)
     clock.elapsed_s += 300.0
 
@@ -73,7 +77,8 @@ async def test_what_passed_while_nobody_was_connected_shows_as_a_jump_of_the_ind
 async def test_a_slow_reader_of_a_paced_source_loses_nothing(
     build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
-    source = SimulatedSource(build_unit(full_load), calibration, clock, block_samples=300)
+    in_halves = replace(calibration, block_samples=300)
+    source = SimulatedSource(build_unit(full_load), in_halves, clock)
     indices = []
     async with source.connect() as stream:
         async for block in stream:
@@ -83,10 +88,3 @@ async def test_a_slow_reader_of_a_paced_source_loses_nothing(
                 break
 
     assert indices == [0, 300, 600, 900, 1200]
-
-
-def test_blocks_without_samples_are_refused(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
-) -> None:
-    with pytest.raises(ValueError, match="got 0"):
-        SimulatedSource(build_unit(full_load), calibration, clock, block_samples=0)

@@ -1,0 +1,1 @@
+"""Recordings from the formats that other tools write."""

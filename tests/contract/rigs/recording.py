@@ -1,0 +1,50 @@
+"""A recording of a counting plant."""
+
+import tempfile
+from pathlib import Path
+
+from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recording.reader import open_recording
+from acquisition.recording.source import RecordingSource
+from acquisition.recording.writer import RecordingWriter
+from acquisition.source import SampleSource
+from core.machine import Measurand
+
+
+class RecordingRig:
+    """A recording replayed at its own pace, on a clock that is stepped."""
+
+    def __init__(self, feed, calibration, clock) -> None:
+        self._feed, self._calibration, self._clock = feed, calibration, clock
+        self._parent = tempfile.TemporaryDirectory()
+        self.step_samples = 50
+        self.source: SampleSource
+
+    async def __aenter__(self) -> "RecordingRig":
+        folder = Path(self._parent.name) / "recording"
+        with RecordingWriter(folder, recorded(self._calibration), "contract suite") as writer:
+            for _ in range(400):
+                writer.write(self._feed.advance(self.step_samples))
+        self.source = RecordingSource(open_recording(folder), self._clock, speed=1.0)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._parent.cleanup()
+
+    def run(self, n_samples: int) -> None:
+        self._clock.step(n_samples / self._calibration.rate_hz)
+
+
+def recorded(calibration) -> RecordedUnit:
+    """Names for the channels of a calibration."""
+    return RecordedUnit(
+        unit=calibration.unit,
+        rate_hz=calibration.rate_hz,
+        channels=tuple(
+            RecordedChannel(id=f"channel{n}", measurand=Measurand.GAP_UM, **vars(channel))
+            for n, channel in enumerate(calibration.channels)
+        ),
+        slow_channels=tuple(
+            RecordedSlowChannel(unit="degC", **vars(slow)) for slow in calibration.slow
+        ),
+    )
