@@ -7,6 +7,8 @@ from enum import StrEnum
 from acquisition.clock import Clock
 from core.account import SampleAccount
 from core.assessment import Assessment
+from core.blocks import SampleBlock
+from core.device_clock import DeviceClock, StampFault
 from core.quality import Quality, Reading, Reason, bad, missing
 from core.quantities import CATALOGUE
 
@@ -33,6 +35,10 @@ class UnitStatus:
         Time of the newest sample by the device's clock.
     received_s
         When that arrived, on the steady clock.
+    clock
+        How the device's clock stands against the host's, where it can be told.
+    stamp_fault
+        Why the newest block's own time stamp was not used.
     """
 
     state: LinkState = LinkState.CONNECTING
@@ -41,6 +47,8 @@ class UnitStatus:
     last_sample_ns: int | None = None
     received_s: float | None = None
     account: SampleAccount = field(default_factory=SampleAccount)
+    clock: DeviceClock | None = None
+    stamp_fault: StampFault | None = None
 
 
 @dataclass(frozen=True)
@@ -86,13 +94,15 @@ class LiveView:
         self._status[unit] = replace(before, state=state, reason=reason, since_ns=since_ns)
         return before.state is not state
 
-    def set_received(self, unit: str, last_sample_ns: int, account: SampleAccount) -> None:
+    def set_received(self, block: SampleBlock, account: SampleAccount) -> None:
         """Note the arrival of a block."""
-        self._status[unit] = replace(
-            self._status[unit],
-            last_sample_ns=last_sample_ns,
+        self._status[block.unit] = replace(
+            self._status[block.unit],
+            last_sample_ns=block.stop_ns,
             received_s=self._clock.monotonic_s(),
             account=account,
+            clock=block.clock,
+            stamp_fault=block.stamp_fault,
         )
 
     def set_assessment(self, assessment: Assessment) -> None:

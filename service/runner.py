@@ -13,6 +13,7 @@ from acquisition.source import SampleSource
 from core.blocks import SampleBlock
 from core.monitor import UnitMonitor
 from service.bus import Bus
+from service.connect_gate import ConnectGate
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
 from service.store.port import UnitGap
@@ -21,18 +22,27 @@ log = structlog.get_logger()
 
 BUS_CAPACITY = 512
 
-FIRST_RETRY_S = 0.5
-LAST_RETRY_S = 5.0
+CONNECTS_PER_S = 50.0
+"""Over all units, so that a hundred devices that come back together are not stormed."""
+
 CONFIG_RETRY_S = 15.0
 """A device that cannot fit the settings may be replaced or reconfigured, but not in seconds."""
 
 
 @dataclass(frozen=True)
 class WatchedUnit:
-    """A unit's source and the monitor that its blocks go to."""
+    """A unit's source and the monitor that its blocks go to.
+
+    Parameters
+    ----------
+    retry_s
+        Longest wait before a lost link is tried again: the source's poll period, so that the first
+        sample is here within two of them after the device is back.
+    """
 
     source: SampleSource
     monitor: UnitMonitor
+    retry_s: float = 0.5
 
 
 class Runner:
@@ -47,7 +57,7 @@ class Runner:
     ) -> None:
         self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
         self._bus = Bus(BUS_CAPACITY)
-        self._n_blocks = dict.fromkeys(units, 0)
+        self._gate = ConnectGate(CONNECTS_PER_S, clock)
 
     async def run(self) -> None:
         """Acquire and analyse; ends when every source has come to its end."""
@@ -56,22 +66,20 @@ class Runner:
             analysis = tasks.create_task(self._analyse(), name="analyse")
             async with asyncio.TaskGroup() as sources:
                 for unit, watched in self._units.items():
-                    sources.create_task(self._acquire(unit, watched.source), name=f"acquire {unit}")
+                    sources.create_task(self._acquire(unit, watched), name=f"acquire {unit}")
             await self._bus.drained()
             analysis.cancel()
             recording.cancel()
 
-    async def _acquire(self, unit: str, source: SampleSource) -> None:
-        """Read one unit for ever, and wait ever longer between attempts at a lost link."""
-        n_failures = 0
+    async def _acquire(self, unit: str, watched: WatchedUnit) -> None:
+        """Read one unit for ever; a lost link is tried again and again."""
         while True:
-            before = self._n_blocks[unit]
+            await self._gate.turn()
             try:
-                await self._read(unit, source)
+                await self._read(unit, watched.source)
             except AcquisitionError as error:
-                n_failures = n_failures + 1 if self._n_blocks[unit] == before else 1
                 self._note_failure(unit, error)
-                await self._clock.sleep(_retry_s(error, n_failures))
+                await self._clock.sleep(_retry_s(error, watched.retry_s))
             else:
                 self._live.set_link(unit, LinkState.NOT_CONNECTED, "the source has ended")
                 return
@@ -81,7 +89,6 @@ class Runner:
             async for block in blocks:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
-                self._n_blocks[unit] += 1
                 await self._bus.publish(block)
 
     def _note_failure(self, unit: str, error: AcquisitionError) -> None:
@@ -99,14 +106,13 @@ class Runner:
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
             self._live.set_assessment(assessment)
-        self._live.set_received(block.unit, block.stop_ns, monitor.account)
+        self._live.set_received(block, monitor.account)
         if assessments or gaps:
             self._recorder.put(Findings(assessments, gaps))
 
 
-def _retry_s(error: AcquisitionError, n_failures: int) -> float:
+def _retry_s(error: AcquisitionError, retry_s: float) -> float:
     if isinstance(error, ConfigError):
         return CONFIG_RETRY_S
-    delay_s = min(FIRST_RETRY_S * 2.0 ** (n_failures - 1), LAST_RETRY_S)
     # devices that vanish together must not be called back together
-    return delay_s * random.uniform(0.75, 1.25)  # noqa: S311  not a secret
+    return retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret

@@ -5,6 +5,26 @@ from typing import Literal
 from service.api.models import ApiModel, LatestModel, Time
 
 
+class DeviceClockModel(ApiModel):
+    """How the device's clock stands against the host's."""
+
+    offset_s: float | None
+    """How far the device's time stamps are ahead of the host's clock; null if it does not stamp."""
+
+    drift_ppm: float | None
+    """How much faster than nominal the device samples, by the host's clock, in parts per million;
+    null during the first minute."""
+
+    drift_uncertainty_ppm: float | None
+    """Standard uncertainty of the drift."""
+
+    n_stamp_faults: int
+    """Blocks whose own time stamp did not fit the sample index and was not used."""
+
+    stamp_fault: Literal["stamp_regressed", "stamp_repeated", "stamp_jumped"] | None
+    """What was wrong with the newest stamp."""
+
+
 class SourceModel(ApiModel):
     """How the samples of a unit arrive, and where every one of them went."""
 
@@ -43,6 +63,9 @@ class SourceModel(ApiModel):
 
     rejected: dict[str, int]
     """Arrived and were refused, by reason."""
+
+    clock: DeviceClockModel | None
+    """The device's clock, where it can be compared with the host's."""
 
 
 class UnitModel(ApiModel):

@@ -19,7 +19,7 @@ from service.api.models import (
     UncertaintyModel,
     WindowModel,
 )
-from service.api.plant_models import SourceModel
+from service.api.plant_models import DeviceClockModel, SourceModel
 from service.api.series_models import (
     OrbitModel,
     SpectrumChannelModel,
@@ -28,7 +28,7 @@ from service.api.series_models import (
     TrendSeriesModel,
 )
 from service.api.times import rfc3339
-from service.live import CurrentBearing, LiveView
+from service.live import CurrentBearing, LiveView, UnitStatus
 from service.store.codec import U_RANDOM, U_SYSTEMATIC, columns_of
 from service.store.port import Trend, TrendQuery, TrendSeries
 
@@ -169,6 +169,19 @@ def source_model(live: LiveView, unit: str) -> SourceModel:
         n_repeated=account.n_repeated,
         n_restarts=account.n_restarts,
         rejected=dict(account.rejected),
+        clock=_clock_model(status),
+    )
+
+
+def _clock_model(status: UnitStatus) -> DeviceClockModel | None:
+    if status.clock is None:
+        return None
+    return DeviceClockModel(
+        offset_s=status.clock.offset_s,
+        drift_ppm=status.clock.drift_ppm,
+        drift_uncertainty_ppm=status.clock.u_drift_ppm,
+        n_stamp_faults=status.clock.n_faults,
+        stamp_fault=None if status.stamp_fault is None else status.stamp_fault.value,
     )
 
 

@@ -2,7 +2,12 @@
 
 from typing import Any
 
+import numpy as np
+
 from core.account import Gap, SampleAccount
+from core.blocks import SampleBlock
+from core.device_clock import DeviceClock, StampFault
+from core.quality import GOOD
 from core.quantities import CATALOGUE
 from service.store.port import UnitGap
 
@@ -27,7 +32,19 @@ async def test_gaps_are_listed_with_their_exact_length(running: Any) -> None:
 
 async def test_units_say_how_their_samples_arrive(running: Any) -> None:
     account = SampleAccount(8000, 100, 50, 7, 1, {"torn": 25})
-    running.live.set_received("U1", 1_767_225_613_000_000_000, account)
+    clock = DeviceClock(offset_s=-0.25, drift_ppm=12.0, u_drift_ppm=1.5, n_faults=3)
+    block = SampleBlock(
+        unit="U1",
+        epoch=1,
+        first_index=0,
+        start_ns=1_767_225_612_000_000_000,
+        rate_hz=600.0,
+        samples=np.zeros((1, 600), dtype=np.float32),
+        channel_quality=(GOOD,),
+        clock=clock,
+        stamp_fault=StampFault.JUMPED,
+    )
+    running.live.set_received(block, account)
     running.clock.s += 4.0
 
     one = await running.json("/api/v1/units/U1")
@@ -46,6 +63,13 @@ async def test_units_say_how_their_samples_arrive(running: Any) -> None:
         "n_repeated": 7,
         "n_restarts": 1,
         "rejected": {"torn": 25},
+        "clock": {
+            "offset_s": -0.25,
+            "drift_ppm": 12.0,
+            "drift_uncertainty_ppm": 1.5,
+            "n_stamp_faults": 3,
+            "stamp_fault": "stamp_jumped",
+        },
     }
     assert both[0] == one
     assert one["bearing_ids"] == ["UJB", "LJB", "TJB"]

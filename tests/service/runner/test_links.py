@@ -12,8 +12,6 @@ from service.live import LinkState
 
 Make = Callable[..., Any]
 
-LONGEST_S = 5.0 * 1.25
-
 
 async def run_until(plant: Any, exhausted: asyncio.Event, **units: Any) -> None:
     running = asyncio.create_task(plant.runner(**units).run())
@@ -26,7 +24,7 @@ async def run_until(plant: Any, exhausted: asyncio.Event, **units: Any) -> None:
         await running
 
 
-async def test_a_device_that_does_not_answer_is_tried_again_ever_more_seldom(
+async def test_a_device_that_does_not_answer_is_tried_again_in_each_poll_period(
     plant: Any, scripted: Make, block: Make
 ) -> None:
     refusals = [[LinkError("10.0.0.7:502: Connection refused")] for _ in range(12)]
@@ -36,11 +34,8 @@ async def test_a_device_that_does_not_answer_is_tried_again_ever_more_seldom(
 
     waits = plant.clock.slept_s
     assert len(waits) == 12
-    for n, wait_s in enumerate(waits):
-        expected_s = min(0.5 * 2**n, 5.0)
-        assert 0.75 * expected_s <= wait_s <= 1.25 * expected_s
-    assert max(waits) <= LONGEST_S
-    assert len(set(waits)) == 12
+    assert all(0.25 <= wait_s <= 0.5 for wait_s in waits)
+    assert len(set(waits)) == 12  # devices that vanish together do not come back in step
 
 
 async def test_a_unit_without_link_says_why_and_since_when(
@@ -83,7 +78,7 @@ async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(
     assert plant.clock.slept_s == [15.0] * 3
 
 
-async def test_a_link_that_delivers_and_breaks_starts_with_short_waits_again(
+async def test_a_link_that_delivers_and_breaks_loses_no_sample_it_delivered(
     plant: Any, scripted: Make, block: Make
 ) -> None:
     refused = [LinkError("refused")]
@@ -92,10 +87,6 @@ async def test_a_link_that_delivers_and_breaks_starts_with_short_waits_again(
 
     await run_until(plant, source.exhausted, U1=source)
 
-    waits = plant.clock.slept_s
-    assert len(waits) == 9
-    assert waits[2] >= 0.75 * 2.0
-    assert max(waits[3:]) <= 0.5 * 1.25
     assert plant.live.status("U1").account.n_stored == 7 * 128
     assert source.n_open == 0
 
@@ -135,7 +126,7 @@ async def test_a_bug_in_a_source_ends_the_run_and_closes_all_links(
 
     assert ended.group_contains(RuntimeError, match="a bug")
     assert (broken.n_open, healthy.n_open) == (0, 0)
-    assert plant.clock.slept_s == []
+    assert broken.n_connections == 1
 
 
 async def test_a_bug_in_the_analysis_ends_the_run(plant: Any, scripted: Make, block: Make) -> None:

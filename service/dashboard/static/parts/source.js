@@ -10,14 +10,16 @@ export function sourceView() {
   const link = mark();
   const age = element("span", { class: "data-age" });
   const count = element("span", { class: "samples" });
+  const clock = element("span", { class: "clock" });
   return {
-    node: element("div", { class: "source" }, link.node, age, count),
+    node: element("div", { class: "source" }, link.node, age, count, clock),
     draw(source) {
       const { level, words } = sourceState(source.state);
       link.draw(level, sourceSentence(source, words));
       setText(age, ageWords(source.data_age_s));
       age.dataset.current = String(source.state === "connected");
       setText(count, sampleWords(source));
+      setText(clock, clockWords(source.clock));
     },
   };
 }
@@ -48,4 +50,20 @@ function sampleWords(source) {
 function rejectedWords(rejected) {
   const parts = Object.entries(rejected).map(([reason, count]) => `${reason.replaceAll("_", " ")} ${formatCount(count)}`);
   return parts.length ? ` (${parts.join(", ")})` : "";
+}
+
+/** `Device clock +0.120 s, drift −3.1 ± 0.4 ppm`; nothing where there is no such clock. */
+function clockWords(clock) {
+  if (!clock) return "";
+  const parts = [];
+  if (clock.offset_s !== null) parts.push(`${signed(clock.offset_s, 3)} s`);
+  if (clock.drift_ppm !== null) {
+    parts.push(`drift ${signed(clock.drift_ppm, 1)} ± ${(1.96 * clock.drift_uncertainty_ppm).toFixed(1)} ppm`);
+  }
+  if (clock.n_stamp_faults) parts.push(`${formatCount(clock.n_stamp_faults)} wrong time stamps`);
+  return parts.length ? `Device clock ${parts.join(", ")}` : "";
+}
+
+function signed(value, digits) {
+  return `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)}`;
 }
