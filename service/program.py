@@ -18,7 +18,8 @@ from service.references import ReferencesInForce
 from service.runner import Runner
 from service.settings.plant import PlantFile
 from service.store.port import Store
-from service.wiring import open_store, watched_units
+from service.wiring.sources import watched_units
+from service.wiring.stores import open_store
 
 STALE_HOPS = 2.5
 """A result older than this many refreshes is no longer current."""

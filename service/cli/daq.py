@@ -14,7 +14,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.plant import PlantFile
-from service.wiring import simulated_daq
+from service.wiring.daqs import simulated_daq
 
 
 def daq(

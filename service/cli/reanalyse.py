@@ -25,7 +25,7 @@ from service.reanalysis import (
     calibration_differences,
     is_full,
 )
-from service.wiring import recording_of, recording_source, selection_of
+from service.wiring.recordings import recording_of, recording_source, selection_of
 
 
 class WindowChoice(StrEnum):

@@ -20,7 +20,8 @@ from acquisition.recording.writer import RecordingWriter
 from acquisition.source import SampleSource
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
-from service.wiring import recording_of, recording_writer, source_of
+from service.wiring.recordings import recording_of, recording_writer
+from service.wiring.sources import source_of
 
 MAX_SECONDS = 7 * 86_400.0
 

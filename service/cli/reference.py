@@ -23,7 +23,7 @@ from service.reference_setting import (
 from service.settings.plant import PlantFile
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import Store, StoreError
-from service.wiring import database_path, open_store
+from service.wiring.stores import database_path, open_store
 
 app = typer.Typer(
     no_args_is_help=True, help="Set or list references: the probe gaps with the shaft centred."

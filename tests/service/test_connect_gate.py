@@ -2,7 +2,8 @@
 
 import asyncio
 import heapq
-import random
+
+import numpy as np
 
 from service.connect_gate import ConnectGate
 
@@ -42,7 +43,7 @@ class VirtualClock:
 
 
 async def test_a_hundred_absent_devices_are_tried_evenly_and_all_back_soon() -> None:
-    clock, jitter = VirtualClock(), random.Random(1)
+    clock, jitter = VirtualClock(), np.random.default_rng(1)
     gate = ConnectGate(PER_S, clock)
     attempts: list[float] = []
     back: list[float] = []

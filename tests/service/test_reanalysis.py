@@ -25,13 +25,8 @@ from service.reanalysis import (
 )
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
-from service.wiring import (
-    recording_of,
-    recording_source,
-    recording_writer,
-    selection_of,
-    simulated_feed,
-)
+from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of
+from service.wiring.simulations import simulated_feed
 
 ANALYSIS = AnalysisSettings(segment_samples=1024, n_segments=4)
 

@@ -16,7 +16,7 @@ from core.units import NS_PER_S
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
-from service.wiring import simulated_feed
+from service.wiring.simulations import simulated_feed
 
 Start = Callable[..., Awaitable[Any]]
 Children = Callable[[int], list[int]]

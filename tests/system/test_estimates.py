@@ -16,7 +16,7 @@ from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.wiring import scenario_of
+from service.wiring.simulations import scenario_of
 
 DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
 MINUTES = 6

@@ -19,7 +19,7 @@ from service.references import ReferencesInForce
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
-from service.wiring import simulated_feed
+from service.wiring.simulations import simulated_feed
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 

@@ -22,8 +22,8 @@ from service.reanalysis import assessment_model, assessments
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.wiring import recording_of, recording_source, recording_writer, selection_of
-from service.wiring import simulated_feed as feed_of
+from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of
+from service.wiring.simulations import simulated_feed as feed_of
 
 COMMAND = [sys.executable, "-m", "service.cli.main"]
 ENVIRONMENT = {"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}

@@ -17,7 +17,7 @@ from core.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file
 from service.settings.plant import PlantFile
-from service.wiring import simulated_feed
+from service.wiring.simulations import simulated_feed
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 

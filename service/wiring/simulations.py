@@ -1,0 +1,73 @@
+"""The simulated machines behind simulated sources and DAQs."""
+
+from acquisition.clock import Clock
+from acquisition.raw import RawFeed
+from acquisition.simulated.scenario import (
+    BearingScenario,
+    HydraulicNoise,
+    Scenario,
+    TransducerNoise,
+    VortexRope,
+)
+from acquisition.simulated.unit import SimulatedUnit
+from core.film import Film
+from service.conversion import calibration_of, machine_of
+from service.settings.simulation import SimulatedBearingSettings, SimulationSettings
+from service.settings.units import UnitSettings
+
+
+def simulated_feed(unit: UnitSettings, clock: Clock) -> RawFeed:
+    """The simulated machine of a unit, its first sample now.
+
+    Raises
+    ------
+    LookupError
+        If the unit has none.
+    """
+    simulation = simulation_of(unit)
+    scenario = scenario_of(simulation)
+    machine, calibration = machine_of(unit), calibration_of(unit)
+    return SimulatedUnit(machine, calibration, scenario, simulation.seed, clock.now_ns())
+
+
+def scenario_of(simulation: SimulationSettings) -> Scenario:
+    """What a simulated unit goes through."""
+    return Scenario(
+        bearings={bearing.bearing: _bearing_scenario(bearing) for bearing in simulation.bearing},
+        speed_rpm=simulation.speed_rpm,
+        active_power_mw=simulation.power_mw,
+        active_power_wander_mw_rms=simulation.power_wander_mw_rms,
+        unbalance_grade_mm_s=simulation.unbalance_grade_mm_s,
+        hydraulic=HydraulicNoise(simulation.hydraulic_force_n_rms, simulation.hydraulic_cutoff_hz),
+        rope=VortexRope(simulation.rope_force_n, simulation.rope_order),
+        noise=TransducerNoise(
+            gap_um_rms=simulation.gap_noise_um_rms,
+            displacement_um_rms=simulation.gap_noise_um_rms,
+            velocity_mm_s_rms=simulation.velocity_noise_mm_s_rms,
+            acceleration_m_s2_rms=simulation.acceleration_noise_m_s2_rms,
+        ),
+    )
+
+
+def simulation_of(unit: UnitSettings) -> SimulationSettings:
+    """The settings of a unit's simulated machine.
+
+    Raises
+    ------
+    LookupError
+        If there are none.
+    """
+    if unit.simulation is None:
+        raise LookupError(f"unit {unit.id} has no [unit.simulation] table")
+    return unit.simulation
+
+
+def _bearing_scenario(bearing: SimulatedBearingSettings) -> BearingScenario:
+    return BearingScenario(
+        film=Film.proportional(bearing.k_xx_n_per_m, bearing.k_yy_n_per_m, bearing.k_cross_n_per_m),
+        centre_x_um=bearing.centre_x_um,
+        centre_y_um=bearing.centre_y_um,
+        centre_wander_um_rms=bearing.centre_wander_um_rms,
+        oil_temperature_c=bearing.oil_temperature_c,
+        oil_temperature_wander_c_rms=bearing.oil_temperature_wander_c_rms,
+    )
