@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from acquisition.calibration import calibrate
+from acquisition.delivery import Delivery
 from acquisition.raw import RawBlock
 from core.assessment import Assessment
 from core.blocks import Rejection
@@ -73,8 +74,9 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
     machine, calibration = machine_of(unit), calibration_of(unit)
     live_monitor, live = UnitMonitor(machine, ANALYSIS), []
     with recording_writer(unit, tmp_path / "run", "a test") as writer:
-        for raw in rough_ride(unit, stepped_clock):
-            block = calibrate(raw, calibration)
+        delivery = Delivery(calibration)
+        blocks = [b for raw in rough_ride(unit, stepped_clock) for b in delivery.take(raw)]
+        for block in blocks + delivery.flush():
             live += live_monitor.ingest(block)
             writer.write_calibrated(block)
 

@@ -70,7 +70,7 @@ def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> N
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout == f"{out}: 0.5 s of unit U2, 12 channels, 0.0 MB\n"
     manifest = recording_of(out).manifest
-    assert (manifest.unit, manifest.n_samples, manifest.n_blocks) == ("U2", 300, 5)
+    assert (manifest.unit, manifest.n_samples, manifest.n_blocks) == ("U2", 300, 6)
     assert manifest.made_by.startswith("padwatch 0")
 
     again = padwatch("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
