@@ -13,6 +13,7 @@ from acquisition.recording.writer import RecordingWriter
 from core.machine import Measurand
 
 MADE_BY = "padwatch in a test"
+START_NS = 1_767_225_600_000_000_000
 
 
 def recorded_unit(n_channels: int = 2, n_slow: int = 2, rate_hz: float = 600.0) -> RecordedUnit:
@@ -43,7 +44,7 @@ def numbered_block(first_index: int, n_samples: int, epoch: int = 1, **changes: 
     values: dict[str, object] = {
         "epoch": epoch,
         "first_index": first_index,
-        "start_ns": 1_767_225_600_000_000_000 + round(first_index * 1e9 / 600.0),
+        "start_ns": START_NS + first_index * 10**7 // 6 // 1000 * 1000,
         "rate_hz": 600.0,
         "counts": (np.array([index, index + 1]) % 2**14).astype(np.int16),
         "ok": (True, True),

@@ -134,7 +134,8 @@ def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
 def test_the_manifest_says_when_it_began_and_who_made_it(
     record: Callable[..., Path], numbered: Numbered
 ) -> None:
-    manifest = open_recording(record([numbered(5, 10), numbered(15, 10)])).manifest
+    first = numbered(5, 10, start_ns=1_767_225_600_008_333_333)
+    manifest = open_recording(record([first, numbered(15, 10)])).manifest
     assert manifest.start == "2026-01-01T00:00:00.008333333Z"
     assert manifest.made_by == "padwatch in a test"
 

@@ -28,7 +28,7 @@ def machine(*channels: str, measurand: Measurand = Measurand.GAP_UM, **changes: 
 async def test_blocks_are_those_that_were_calibrated_live_and_then_it_ends(
     record: Record, numbered: Numbered, unit: RecordedUnit, stepped_clock
 ) -> None:
-    raws = [numbered(60 * n, 60) for n in range(5)]
+    raws = [numbered(50 * n, 50) for n in range(5)]
     source = RecordingSource(open_recording(record(raws)), stepped_clock)
     async with source.connect() as blocks:
         found = [block async for block in blocks]
@@ -44,31 +44,31 @@ async def test_blocks_are_those_that_were_calibrated_live_and_then_it_ends(
 async def test_an_unpaced_recording_left_and_taken_up_again_loses_nothing(
     record: Record, numbered: Numbered, stepped_clock
 ) -> None:
-    recording = open_recording(record(numbered(60 * n, 60) for n in range(5)))
+    recording = open_recording(record(numbered(50 * n, 50) for n in range(5)))
     source = RecordingSource(recording, stepped_clock)
     async with source.connect() as blocks:
         first = [await anext(blocks), await anext(blocks)]
     stepped_clock.step(1e6)
     async with source.connect() as blocks:
         rest = [block async for block in blocks]
-    assert [block.first_index for block in first + rest] == [0, 60, 120, 180, 240]
+    assert [block.first_index for block in first + rest] == [0, 50, 100, 150, 200]
 
 
 @pytest.mark.parametrize("speed", [1.0, 50.0])
 async def test_it_takes_the_time_it_took_gaps_included_and_restarts_not(
     record: Record, numbered: Numbered, stepped_clock, speed: float
 ) -> None:
-    raws = [numbered(0, 60), numbered(6060, 60), numbered(120, 60, epoch=2)]
+    raws = [numbered(0, 50), numbered(6050, 50), numbered(100, 50, epoch=2)]
     source = RecordingSource(open_recording(record(raws)), stepped_clock, speed=speed)
     async with source.connect() as blocks:
         arrived_s = [stepped_clock.monotonic_s() async for _ in blocks]
-    assert np.multiply(arrived_s, speed) == pytest.approx([0.1, 10.2, 10.3])
+    assert np.multiply(arrived_s, speed) == pytest.approx([50 / 600, 6100 / 600, 6150 / 600])
 
 
 def test_time_cannot_stand_still_or_run_back(
     record: Record, numbered: Numbered, stepped_clock
 ) -> None:
-    recording = open_recording(record([numbered(0, 60)]))
+    recording = open_recording(record([numbered(0, 50)]))
     for speed in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="positive speed"):
             RecordingSource(recording, stepped_clock, speed=speed)
@@ -77,7 +77,7 @@ def test_time_cannot_stand_still_or_run_back(
 async def test_a_unit_finds_its_channels_by_name_wherever_they_are(
     record: Record, numbered: Numbered, stepped_clock
 ) -> None:
-    raw = numbered(0, 60, ok=(True, False), slow=(40.0, 50.0))
+    raw = numbered(0, 50, ok=(True, False), slow=(40.0, 50.0))
     recording = open_recording(record([raw]))
     wanted = machine("c1", "c0", id="U7")
     selection = select(recording.manifest, wanted, {"slow1": "degC"})
@@ -123,7 +123,7 @@ def test_a_recording_of_something_else_is_refused_naming_both(
 async def test_a_recording_that_vanishes_is_an_error_of_its_own(
     record: Record, numbered: Numbered, stepped_clock
 ) -> None:
-    recording = open_recording(record([numbered(0, 60)]))
+    recording = open_recording(record([numbered(0, 50)]))
     (recording.folder / "samples.parquet").unlink()
     async with RecordingSource(recording, stepped_clock).connect() as blocks:
         with pytest.raises(ConfigError, match=r"samples\.parquet: No such file"):
