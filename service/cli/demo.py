@@ -15,7 +15,7 @@ from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import run_plant
 from service.cli.terminal import terminal_to_itself
 from service.settings.plant import PlantFile
-from service.settings.units import ModbusRingSettings
+from service.settings.sources import ModbusRingSettings
 
 STOP_S = 3.0
 

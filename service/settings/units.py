@@ -15,47 +15,7 @@ from service.settings.bearings import (
 )
 from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer
 from service.settings.simulation import SimulationSettings
-
-
-class ModbusRingSettings(Settings):
-    """A streaming DAQ over Modbus TCP, block-ring profile v1."""
-
-    kind: Literal["modbus_ring"]
-    """This source's kind."""
-
-    host: Annotated[str, StringConstraints(min_length=1, max_length=253)]
-    """Address or name of the DAQ; example: "192.0.2.17"."""
-
-    port: Annotated[int, Field(ge=0, le=65535)] = 502
-    """TCP port; example: 502. 0 only for a simulated DAQ, which then takes a free one."""
-
-    device_id: Annotated[int, Field(ge=1, le=255)] = 1
-    """Modbus unit identifier, 1 to 255."""
-
-    base_address: Annotated[int, Field(ge=0, le=65520)] = 0
-    """Address of the profile's header, counted from 0."""
-
-    function: Literal[3, 4] = 3
-    """Function code that reads the registers: 3 (holding) or 4 (input)."""
-
-    timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 1.0
-    """Longest wait for one reply in seconds, 0.05 to 60."""
-
-    poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.25
-    """Time between looks at the ring in seconds; the ring must hold several of them."""
-
-    stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
-    """A DAQ whose newest slot stands still for this long counts as not connected."""
-
-
-class SimulatedSettings(Settings):
-    """The unit's simulation read in this process, without any wire."""
-
-    kind: Literal["simulated"]
-    """This source's kind."""
-
-
-SourceSettings = Annotated[ModbusRingSettings | SimulatedSettings, Field(discriminator="kind")]
+from service.settings.sources import SimulatedSettings, SourceSettings
 
 
 class UnitSettings(Settings):

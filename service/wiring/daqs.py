@@ -3,11 +3,12 @@
 from acquisition.clock import Clock
 from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
-from service.settings import units as settings
+from service.settings import sources
+from service.settings.units import UnitSettings
 from service.wiring.simulations import simulated_feed, simulation_of
 
 
-def simulated_daq(unit: settings.UnitSettings, clock: Clock) -> ModbusRingServer:
+def simulated_daq(unit: UnitSettings, clock: Clock) -> ModbusRingServer:
     """A Modbus TCP DAQ with the simulated machine of a unit behind it, where its source looks.
 
     Raises
@@ -16,7 +17,7 @@ def simulated_daq(unit: settings.UnitSettings, clock: Clock) -> ModbusRingServer
         If the unit has no simulation, or its source is no Modbus ring.
     """
     source = unit.source
-    if not isinstance(source, settings.ModbusRingSettings):
+    if not isinstance(source, sources.ModbusRingSettings):
         raise LookupError(f'the source of unit {unit.id} is not of kind "modbus_ring"')
     simulation = simulation_of(unit)
     shape = RingDeviceSettings(

@@ -9,8 +9,9 @@ from acquisition.source import SampleSource
 from core.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.runner import WatchedUnit
-from service.settings import units as settings
+from service.settings import sources
 from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
 from service.wiring.simulations import simulated_feed
 
 
@@ -23,13 +24,13 @@ def watched_units(plant: PlantFile, clock: Clock) -> Mapping[str, WatchedUnit]:
     }
 
 
-def source_of(unit: settings.UnitSettings, clock: Clock) -> SampleSource:
+def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
     """Where the samples of a unit come from."""
     source = unit.source
     match source:
-        case settings.ModbusRingSettings():
+        case sources.ModbusRingSettings():
             ring = ModbusRingSettings(**source.model_dump(exclude={"kind"}))
             return ModbusRingSource(ring, calibration_of(unit), clock)
-        case settings.SimulatedSettings():
+        case sources.SimulatedSettings():
             feed = simulated_feed(unit, clock)
             return SimulatedSource(feed, calibration_of(unit), clock)

@@ -1,0 +1,48 @@
+"""How a Modbus device is reached: what all Modbus sources have in common."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from service.settings.base import MisfitError, Settings
+
+
+class ModbusLinkSettings(Settings):
+    """A Modbus device on the network (host) or on a serial line (device)."""
+
+    host: Annotated[str, StringConstraints(min_length=1, max_length=253)] | None = None
+    """Address or name of a Modbus TCP device; example: "192.0.2.17"."""
+
+    port: Annotated[int, Field(ge=0, le=65535)] = 502
+    """TCP port; example: 502. 0 only for a simulated DAQ, which then takes a free one."""
+
+    device: Annotated[str, StringConstraints(min_length=1, max_length=255)] | None = None
+    """Serial port of a Modbus RTU line instead of a host; example: "/dev/ttyUSB0". "pty" only for a
+    simulated DAQ, which then makes one."""
+
+    baudrate: Annotated[int, Field(ge=1200, le=4_000_000)] = 115_200
+    """Bits per second of the serial line; 12 channels of 600 Hz need at least 230400."""
+
+    parity: Literal["none", "even", "odd"] = "even"
+    """Parity of the serial line."""
+
+    stop_bits: Literal[1, 2] = 1
+    """Stop bits of the serial line: 1, or 2 where parity is "none"."""
+
+    device_id: Annotated[int, Field(ge=1, le=255)] = 1
+    """Modbus unit identifier, 1 to 255; on a serial line at most 247."""
+
+    timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
+    """Longest wait for one reply in seconds, 0.05 to 60; a link that is silent for longer is
+    lost. Two poll periods or less notice that within three."""
+
+    @model_validator(mode="after")
+    def _check_link(self) -> Self:
+        if (self.host is None) == (self.device is None):
+            found = "neither" if self.host is None else "both"
+            raise MisfitError(
+                f"host (Modbus TCP) or device (serial line) must be given, found {found}", "host"
+            )
+        if self.device is not None and self.device_id > 247:
+            raise MisfitError("on a serial line must be 1 to 247", "device_id")
+        return self
