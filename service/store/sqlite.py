@@ -12,6 +12,7 @@ from core.account import Gap
 from core.assessment import Assessment
 from core.quality import Level
 from core.quantities import CATALOGUE
+from service.origin import Origin
 from service.store.buckets import Readings, bucket_width_ns, bucketed, single_points
 from service.store.codec import Layout, columns_of
 from service.store.gap_reference import GapReference
@@ -61,6 +62,8 @@ class SqliteStore:
     ----------
     path
         Created, with its folder, if it does not exist.
+    origin
+        What it is to hold; a file that holds the other is refused.
 
     Raises
     ------
@@ -68,8 +71,8 @@ class SqliteStore:
         If the file cannot be opened, is not padwatch's, is damaged, or is newer than this program.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, origin: Origin = Origin.LIVE) -> None:
+        self._path, self._origin = path, origin
         self._lock = Lock()
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
@@ -175,7 +178,9 @@ class SqliteStore:
 
     def _prepare(self) -> int:
         """Bring the file up to date; return the number of the layout that is written."""
-        migrate(self._writer, str(self._path))  # first: a file that is not ours stays as it is
+        migrate(
+            self._writer, str(self._path), self._origin
+        )  # first: a file that is not ours stays as it is
         for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
             self._writer.execute(f"PRAGMA {setting}")
         return self._remember_layout()

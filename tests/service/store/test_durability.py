@@ -1,5 +1,6 @@
 """The database file: what is foreign, newer or damaged is refused, what was appended is there."""
 
+import itertools
 import os
 import signal
 import sqlite3
@@ -12,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from core.assessment import Assessment
+from service.origin import Origin
 from service.store import schema
 from service.store.port import StoreError, TrendQuery, UnitGap
-from service.store.schema import APPLICATION_ID, MIGRATIONS
+from service.store.schema import APPLICATION_IDS, MIGRATIONS
 from service.store.sqlite import SqliteStore
 
 Build = Callable[..., Assessment]
@@ -42,7 +44,9 @@ def test_every_append_is_written_through_to_the_disk(store: SqliteStore, path: P
 
     assert store._writer.execute("PRAGMA journal_mode").fetchone() == ("wal",)
     assert store._writer.execute("PRAGMA synchronous").fetchone() == (synchronous_full,)
-    assert sqlite3.connect(path).execute("PRAGMA application_id").fetchone() == (APPLICATION_ID,)
+    assert sqlite3.connect(path).execute("PRAGMA application_id").fetchone() == (
+        APPLICATION_IDS[Origin.LIVE],
+    )
 
 
 def test_what_was_appended_survives_kill_9(path: Path, query: Ask) -> None:
@@ -281,3 +285,14 @@ def test_a_migration_keeps_the_data_and_is_done_once(
         assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
         store.close()
     assert n_rows(path, "more") == 0
+
+
+@pytest.mark.parametrize(("first", "then"), list(itertools.permutations(Origin)))
+def test_live_and_replayed_results_never_share_a_database(
+    tmp_path: Path, first: Origin, then: Origin
+) -> None:
+    path = tmp_path / "padwatch.sqlite3"
+    SqliteStore(path, first).close()
+    SqliteStore(path, first).close()
+    with pytest.raises(StoreError, match=f"holds {first} results and is not opened for {then}"):
+        SqliteStore(path, then)
