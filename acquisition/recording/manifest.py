@@ -8,9 +8,15 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 from pydantic import model_validator as validated
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from acquisition.calibration import (
+    BLOCK_SAMPLES,
+    ChannelCalibration,
+    SlowCalibration,
+    UnitCalibration,
+)
 from acquisition.errors import ConfigError
 from acquisition.recording.limits import (
+    MAX_BLOCK_SAMPLES,
     MAX_CHANNELS,
     MAX_MANIFEST_BYTES,
     MAX_SAMPLES,
@@ -20,7 +26,9 @@ from core.machine import Measurand
 from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"
-VERSION = 1
+VERSION = 2
+READABLE = (1, 2)
+"""Version 1 had no float32, and did not say on which grid its blocks were."""
 
 MANIFEST = "manifest.json"
 SAMPLES = "samples.parquet"
@@ -28,6 +36,7 @@ BLOCKS = "blocks.parquet"
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
 FileName = Literal["samples.parquet", "blocks.parquet"]
+SampleType = Literal["int16", "float32"]
 
 
 class ManifestPart(BaseModel):
@@ -59,6 +68,14 @@ class RecordedSlowChannel(ManifestPart):
 class RecordedUnit(ManifestPart):
     """The unit whose samples are recorded; channels in the order of the columns.
 
+    Parameters
+    ----------
+    sample_type
+        "int16": counts of the converter. "float32": engineering units from a device that has no
+        counts, not a number where it has no sample.
+    block_samples
+        Grid of the blocks; see :class:`acquisition.calibration.UnitCalibration`.
+
     Raises
     ------
     ValueError
@@ -69,6 +86,8 @@ class RecordedUnit(ManifestPart):
     rate_hz: Annotated[float, Field(gt=0.0, le=1e6)]
     channels: Annotated[tuple[RecordedChannel, ...], Field(min_length=1, max_length=MAX_CHANNELS)]
     slow_channels: Annotated[tuple[RecordedSlowChannel, ...], Field(max_length=MAX_SLOW_CHANNELS)]
+    sample_type: SampleType = "int16"
+    block_samples: Annotated[int, Field(ge=1, le=MAX_BLOCK_SAMPLES)] = BLOCK_SAMPLES
 
     @validated(mode="after")
     def _check(self) -> Self:
@@ -80,7 +99,7 @@ class RecordedUnit(ManifestPart):
 
     @property
     def calibration(self) -> UnitCalibration:
-        """How the counts were read when they were recorded."""
+        """How the samples were read when they were recorded."""
         return UnitCalibration(
             unit=self.unit,
             rate_hz=self.rate_hz,
@@ -89,6 +108,7 @@ class RecordedUnit(ManifestPart):
                 for c in self.channels
             ),
             slow=tuple(SlowCalibration(c.id, c.minimum, c.maximum) for c in self.slow_channels),
+            block_samples=self.block_samples,
         )
 
 
@@ -113,13 +133,18 @@ class Manifest(RecordedUnit):
     """
 
     format: Literal["padwatch-recording"]
-    version: Literal[1]
-    sample_type: Literal["int16"]
+    version: Literal[1, 2]
     made_by: Annotated[str, StringConstraints(max_length=200)]
     start: Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{9}Z$")]
     n_blocks: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     n_samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     files: Annotated[dict[FileName, RecordedFile], Field(min_length=2)]
+
+    @validated(mode="after")
+    def _check_version(self) -> Self:
+        if self.version == 1 and self.sample_type != "int16":
+            raise ValueError(f"version 1 has no sample_type {self.sample_type!r}")
+        return self
 
 
 class _Head(BaseModel):
@@ -141,10 +166,10 @@ def read_manifest(folder: Path) -> Manifest:
     text = _read(path)
     try:
         head = _Head.model_validate_json(text, strict=True)
-        if (head.format, head.version) != (FORMAT, VERSION):
+        if head.format != FORMAT or head.version not in READABLE:
             raise ConfigError(
                 f"{path}: {head.format[:40]!r} version {head.version},"
-                f" this padwatch reads {FORMAT!r} version {VERSION}"
+                f" this padwatch reads {FORMAT!r} version {' and '.join(map(str, READABLE))}"
             )
         return Manifest.model_validate_json(text, strict=True)
     except ValidationError as error:

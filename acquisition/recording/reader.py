@@ -30,7 +30,7 @@ from acquisition.recording.tables import (
     read_rows,
     samples_schema,
 )
-from core.arrays import CountArray
+from core.arrays import RawArray
 from core.blocks import Rejection
 
 
@@ -50,7 +50,7 @@ class Recording:
             If a file cannot be read any more.
         """
         with self._samples() as samples, self._blocks() as blocks:
-            counts = _Counts(samples, len(self.manifest.channels))
+            counts = _Counts(samples, self.manifest)
             first_row = 0
             for number, row in enumerate(self._rows(blocks)):
                 n_samples = row["n_samples"]
@@ -89,7 +89,7 @@ class Recording:
         for group in range(blocks.num_row_groups):
             yield from read_rows(blocks, group)
 
-    def _raw(self, row: dict[str, Any], counts: CountArray) -> RawBlock:
+    def _raw(self, row: dict[str, Any], counts: RawArray) -> RawBlock:
         return RawBlock(
             epoch=row["epoch"],
             first_index=row["first_index"],
@@ -115,13 +115,13 @@ class Recording:
 class _Counts:
     """Counts by row, with one row group in memory."""
 
-    def __init__(self, file: Any, n_channels: int) -> None:
+    def __init__(self, file: Any, manifest: Manifest) -> None:
         self._file = file
         self._group: int | None = None
-        self._held: CountArray = np.empty((n_channels, 0), dtype=np.int16)
+        self._held: RawArray = np.empty((len(manifest.channels), 0), dtype=manifest.sample_type)
 
-    def read(self, first_row: int, n_rows: int) -> CountArray:
-        parts = []
+    def read(self, first_row: int, n_rows: int) -> RawArray:
+        parts: list[Any] = []
         while n_rows:
             group, offset = divmod(first_row, ROWS_PER_GROUP)
             if group != self._group:
@@ -130,7 +130,7 @@ class _Counts:
             parts.append(part)
             first_row += part.shape[1]
             n_rows -= part.shape[1]
-        return np.concatenate(parts, axis=1)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
 def open_recording(folder: Path) -> Recording:

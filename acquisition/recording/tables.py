@@ -13,10 +13,14 @@ from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.recording.limits import FOOTER_BYTES_PER_COLUMN
 from acquisition.recording.manifest import RecordedUnit
-from core.arrays import CountArray
+from core.arrays import RawArray
 
 ZSTD_LEVEL = 1
 """Higher levels gain less than one per cent on differences that are already packed to bits."""
+
+_SAMPLE_TYPES = {"int16": pa.int16(), "float32": pa.float32()}
+_ENCODINGS = {"int16": "DELTA_BINARY_PACKED", "float32": "BYTE_STREAM_SPLIT"}
+"""Differences of counts need few bits; floats that follow each other share their high bytes."""
 
 _MAGIC = b"PAR1"
 _TAIL_BYTES = 8  # length of the footer, then the magic
@@ -30,8 +34,9 @@ _REJECTED = pa.list_(pa.field("element", _REJECTION, nullable=False))
 
 
 def samples_schema(unit: RecordedUnit) -> Any:
-    """Counts, a column for each waveform channel."""
-    return pa.schema([pa.field(c.id, pa.int16(), nullable=False) for c in unit.channels])
+    """Counts or engineering units, a column for each waveform channel."""
+    type_ = _SAMPLE_TYPES[unit.sample_type]
+    return pa.schema([pa.field(c.id, type_, nullable=False) for c in unit.channels])
 
 
 def blocks_schema(unit: RecordedUnit) -> Any:
@@ -48,8 +53,8 @@ def blocks_schema(unit: RecordedUnit) -> Any:
     return pa.schema([pa.field(name, type_, nullable=False) for name, type_ in columns])
 
 
-def samples_table(counts: CountArray, unit: RecordedUnit) -> Any:
-    """(n_channels, n_samples) counts as a table."""
+def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
+    """(n_channels, n_samples) counts or engineering units as a table."""
     return pa.table(list(counts), schema=samples_schema(unit))
 
 
@@ -72,7 +77,7 @@ def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Differences packed to bits, then zstd: 6 bits a sample where int16 itself takes 11."""
+    """Packed, then zstd: 6 bits a count where int16 itself takes 11."""
     schema = samples_schema(unit)
     return pq.ParquetWriter(
         path,
@@ -82,7 +87,7 @@ def samples_writer(path: Path, unit: RecordedUnit) -> Any:
         use_dictionary=False,
         write_statistics=False,
         store_schema=False,
-        column_encoding=dict.fromkeys(schema.names, "DELTA_BINARY_PACKED"),
+        column_encoding=dict.fromkeys(schema.names, _ENCODINGS[unit.sample_type]),
     )
 
 
@@ -125,7 +130,7 @@ def foreign_errors_of(path: Path) -> Iterator[None]:
         raise ConfigError(f"{path}: {words.splitlines()[0]}") from error
 
 
-def read_counts(file: Any, group: int) -> CountArray:
+def read_counts(file: Any, group: int) -> RawArray:
     """(n_channels, n_rows) of one row group."""
     columns = file.read_row_group(group, use_threads=False).columns
     return np.stack([column.to_numpy() for column in columns])

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
@@ -38,7 +39,7 @@ from acquisition.recording.tables import (
     samples_table,
     samples_writer,
 )
-from core.arrays import CountArray
+from core.arrays import RawArray
 from core.blocks import SampleBlock
 
 INCOMPLETE = ".incomplete"
@@ -73,7 +74,8 @@ class RecordingWriter:
         self._calibration = unit.calibration
         self._progress = Progress()
         self._start_ns = 0
-        self._counts: list[CountArray] = []
+        self._dtype = np.dtype(unit.sample_type)
+        self._counts: list[RawArray] = []
         self._n_waiting = 0
         self._blocks: list[RawBlock] = []
         if os.path.lexists(folder):
@@ -111,7 +113,7 @@ class RecordingWriter:
             If it is not of this unit's shape and rate or beyond the format's limits, or if the
             disk refuses it.
         """
-        _require_fit(raw, self.unit)
+        _require_fit(raw, self.unit, self._dtype)
         n_samples = raw.counts.shape[1]
         progress = self._progress.after(raw.epoch, raw.first_index, n_samples, raw.rejected)
         if self.n_samples + n_samples > MAX_SAMPLES:
@@ -136,9 +138,10 @@ class RecordingWriter:
         Raises
         ------
         ConfigError
-            As :meth:`write`, and if the block is not exactly counts with this calibration.
+            As :meth:`write`, and if the block is not exactly samples of the recorded type with this
+            calibration.
         """
-        self.write(raw_of(block, self._calibration))
+        self.write(raw_of(block, self._calibration, self._dtype))
 
     def finish(self) -> Manifest:
         """Bring everything to the disk and give the recording its name.
@@ -182,7 +185,7 @@ class RecordingWriter:
     def _write_counts(self, n_samples: int) -> None:
         if n_samples == 0:
             return
-        counts = np.concatenate(self._counts, axis=1)
+        counts: Any = np.concatenate(self._counts, axis=1)
         self._samples_file.write_table(samples_table(counts[:, :n_samples], self.unit))
         rest = counts[:, n_samples:].copy()
         self._counts, self._n_waiting = [rest], rest.shape[1]
@@ -201,7 +204,6 @@ class RecordingWriter:
             **dict(self.unit),
             format=FORMAT,
             version=VERSION,
-            sample_type="int16",
             made_by=self._made_by,
             start=start_text(self._start_ns),
             n_blocks=self.n_blocks,
@@ -227,12 +229,13 @@ def recorded_file(path: Path) -> RecordedFile:
         )
 
 
-def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
+def _require_fit(raw: RawBlock, unit: RecordedUnit, dtype: npt.DTypeLike) -> None:
     shape = (len(unit.channels), len(unit.channels), len(unit.slow_channels))
-    if (len(raw.counts), len(raw.ok), len(raw.slow)) != shape or raw.counts.dtype != np.int16:
+    if (len(raw.counts), len(raw.ok), len(raw.slow)) != shape or raw.counts.dtype != dtype:
         raise ConfigError(
             f"a block of {len(raw.counts)} channels and {len(raw.slow)} slow values as"
-            f" {raw.counts.dtype}, to be recorded are {shape[0]} and {shape[2]} as int16"
+            f" {raw.counts.dtype}, to be recorded are {shape[0]} and {shape[2]} as"
+            f" {unit.sample_type}"
         )
     if raw.rate_hz != unit.rate_hz:
         raise ConfigError(f"a block at {raw.rate_hz} Hz in a recording at {unit.rate_hz} Hz")

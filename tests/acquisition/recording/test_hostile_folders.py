@@ -66,13 +66,19 @@ def test_the_recording_itself_is_sound(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"version": 2}, "'padwatch-recording' version 2, this padwatch reads"),
-        ({"format": "wav"}, "'wav' version 1, this padwatch reads 'padwatch-recording' version 1"),
+        ({"version": 3}, "'padwatch-recording' version 3, this padwatch reads"),
+        (
+            {"format": "wav"},
+            "'wav' version 2, this padwatch reads 'padwatch-recording' version 1 and 2",
+        ),
         ({"version": "1"}, "version: Input should be a valid integer"),
         ({"unit": "../U1"}, "unit: String should match"),
         ({"rate_hz": 0.0}, "rate_hz: Input should be greater than 0"),
         ({"rate_hz": float("nan")}, "rate_hz: Input should be a finite number"),
-        ({"sample_type": "float32"}, "sample_type: Input should be 'int16'"),
+        ({"sample_type": "int8"}, "sample_type: Input should be 'int16' or 'float32'"),
+        ({"sample_type": "float32"}, "column 'c0' of type int16 where the manifest says"),
+        ({"version": 1, "sample_type": "float32"}, "version 1 has no sample_type 'float32'"),
+        ({"block_samples": 0}, "block_samples: Input should be greater than or equal to 1"),
         ({"channels": []}, "channels: Tuple should have at least 1 item"),
         ({"n_samples": 2**40}, "n_samples: Input should be less than or equal to 536870912"),
         ({"n_samples": 999}, "samples.parquet: 1000 rows, the manifest says 999"),

@@ -20,7 +20,7 @@ from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.recording.inversion import raw_of
 from acquisition.recording.manifest import RecordedUnit
-from core.arrays import CountArray
+from core.arrays import CountArray, SampleArray
 from core.quality import Reason
 
 Numbered = Callable[..., RawBlock]
@@ -90,3 +90,30 @@ def test_another_unit_or_calibration_is_refused(unit: RecordedUnit, numbered: Nu
     ):
         with pytest.raises(ConfigError, match="not those"):
             raw_of(block, other)
+
+
+@given(
+    arrays(np.float32, (2, 5), elements=st.floats(width=32)),
+    st.tuples(st.booleans(), st.booleans()),
+)
+def test_engineering_units_are_judged_the_same_again(
+    samples: SampleArray, ok: tuple[bool, bool]
+) -> None:
+    channel = ChannelCalibration(12.0, 250.0, 1.0, 11.0)
+    calibration = UnitCalibration("U1", 600.0, (channel, channel), ())
+    block = calibrate(RawBlock(1, 0, 0, 600.0, samples, ok, ()), calibration)
+    raw = raw_of(block, calibration, np.float32)
+    assert raw.counts.dtype == np.float32
+    again = calibrate(raw, calibration)
+    assert again.channel_quality == block.channel_quality
+    assert again.samples.tobytes() == block.samples.tobytes()
+
+
+def test_a_channel_with_a_sample_that_was_none_has_none_in_the_recording(
+    unit: RecordedUnit, numbered: Numbered
+) -> None:
+    samples = np.array([[100.0, math.nan, 100.0], [200.0, 200.0, 200.0]], np.float32)
+    block = calibrate(numbered(0, 3, counts=samples), unit.calibration)
+    raw = raw_of(block, unit.calibration, np.float32)
+    assert np.isnan(raw.counts[0]).all()
+    np.testing.assert_array_equal(raw.counts[1], samples[1])

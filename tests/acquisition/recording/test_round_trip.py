@@ -1,5 +1,6 @@
 """What was written comes back: every count, every bit of every number, every gap."""
 
+import json
 import math
 import struct
 import tempfile
@@ -35,7 +36,7 @@ def bits(block: RawBlock) -> tuple[object, ...]:
     return (
         tuple(slow),
         counts,
-        replace(block, slow=(), counts=np.zeros((0, 0), np.int16)).__repr__(),
+        repr(replace(block, slow=(), counts=np.zeros((0, 0), np.int16))),
     )
 
 
@@ -44,6 +45,7 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
     """Any unit and any stream of blocks a device may deliver."""
     n_channels, n_slow = draw(st.integers(1, 32)), draw(st.integers(0, 4))
     number = st.floats(-1e6, 1e6).filter(bool)
+    sample_type = draw(st.sampled_from(["int16", "float32"]))
     unit = RecordedUnit(
         unit="U1",
         rate_hz=draw(st.sampled_from([600.0, 1000 / 3])),
@@ -62,6 +64,8 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
             RecordedSlowChannel(id=f"s{n}", unit="degC", minimum=-10.0, maximum=draw(number))
             for n in range(n_slow)
         ),
+        sample_type=sample_type,
+        block_samples=draw(st.integers(1, 1000)),
     )
     blocks, epoch, index = [], draw(st.integers(0, 2**32)), draw(st.integers(0, 2**50))
     for _ in range(draw(st.integers(1, 6))):
@@ -70,7 +74,7 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
         rejected = draw(st.lists(REJECTIONS, max_size=3))
         index += sum(r.n_samples for r in rejected) + draw(st.sampled_from([0, 0, 1, 10**6]))
         n_samples = draw(st.integers(1, 9))
-        counts = draw(arrays(np.int16, (n_channels, n_samples)))
+        counts = draw(arrays(sample_type, (n_channels, n_samples)))
         flags = st.lists(st.booleans(), min_size=n_channels, max_size=n_channels)
         slow = st.lists(st.floats(), min_size=n_slow, max_size=n_slow)
         blocks.append(
@@ -105,6 +109,7 @@ def test_any_stream_of_blocks_comes_back_bit_for_bit(
         manifest = opened.manifest
         assert RecordedUnit(**{name: getattr(manifest, name) for name in dict(unit)}) == unit
         assert manifest.calibration == unit.calibration
+        assert manifest.calibration.block_samples == unit.block_samples
         assert (manifest.n_blocks, manifest.n_samples) == (
             len(blocks),
             sum(block.counts.shape[1] for block in blocks),
@@ -208,3 +213,27 @@ def test_what_the_reader_would_refuse_is_not_written(
         recorder.write(replace(numbered(20, 10), **changes))
     recorder.write(numbered(20, 10, rejected=(Rejection("torn", 10),)))
     assert recorder.finish().n_blocks == 2
+
+
+def test_a_recording_of_version_1_is_still_read(
+    record: Callable[..., Path], numbered: Numbered
+) -> None:
+    blocks = [numbered(50 * n, 50) for n in range(3)]
+    folder = record(blocks)
+    path = folder / "manifest.json"
+    manifest = json.loads(path.read_text()) | {"version": 1}
+    del manifest["block_samples"]
+    path.write_text(json.dumps(manifest))
+    opened = open_recording(folder)
+    assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
+    assert opened.manifest.calibration.block_samples == 50
+
+
+def test_samples_of_the_other_type_are_refused(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    units = unit.model_copy(update={"sample_type": "float32"})
+    recorder = RecordingWriter(tmp_path / "run", units, "x")
+    with pytest.raises(ConfigError, match="as int16, to be recorded are 2 and 2 as float32"):
+        recorder.write(numbered(0, 10))
+    recorder.abandon()
