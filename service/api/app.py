@@ -7,6 +7,7 @@ from fastapi import Depends, FastAPI
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
 from service.api.health_routes import health_router
+from service.api.origin_header import OriginHeader
 from service.api.plant_routes import plant_router
 from service.api.problems import (
     any_other_problem,
@@ -35,6 +36,7 @@ def create_app(context: Context) -> FastAPI:
         redoc_url=None,
         responses=any_other_problem(),
     )
+    app.add_middleware(OriginHeader, origin=context.origin)
     install_problem_handlers(app)
     for router in (
         health_router(context),

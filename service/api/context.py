@@ -9,6 +9,7 @@ from fastapi import Path
 from acquisition.clock import Clock
 from service.api.problems import ProblemError
 from service.live import LiveView
+from service.origin import Origin
 from service.references import ReferencesInForce
 from service.settings.bearings import BearingSettings
 from service.settings.units import UnitSettings
@@ -38,6 +39,7 @@ class Context:
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
+    origin: Origin = Origin.LIVE
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -112,6 +112,10 @@ class PlantModel(ApiModel):
     name: str
     """As people call it."""
 
+    origin: Literal["live", "replay"]
+    """Whether this happens now or is played from a recording; also in the header Padwatch-Origin of
+    every answer."""
+
 
 class StoreModel(ApiModel):
     """Whether results reach the disk."""

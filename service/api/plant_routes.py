@@ -25,7 +25,7 @@ def plant_router(context: Context) -> APIRouter:
     async def overview() -> OverviewModel:
         """All units with all bearings as they may be shown now."""
         return OverviewModel(
-            plant=PlantModel(name=context.plant_name),
+            plant=PlantModel(name=context.plant_name, origin=context.origin.value),
             time=rfc3339(context.clock.now_ns()),
             refresh_s=context.refresh_s,
             store=StoreModel(error=context.live.store_error, n_unstored=context.live.n_unstored),

@@ -37,6 +37,7 @@ function drawBar(view) {
   setText(document.getElementById("plant"), view.plant ?? "");
   setText(document.getElementById("clock"), `${formatTime(Date.now())} ${formatZone(Date.now())}`);
   setText(document.getElementById("service"), serviceSentence(view));
+  document.getElementById("replay").hidden = view.origin !== "replay";
   banner.hidden = view.failure === null;
   setText(document.getElementById("failure"), view.failure ?? "");
   setText(document.getElementById("failure-age"), view.failure === null ? "" : failureAge(view));

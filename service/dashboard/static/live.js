@@ -41,6 +41,7 @@ export function viewAt(live, now) {
     failure: live.failure,
     failedS: live.failedSince ? secondsBetween(live.failedSince, now) : null,
     plant: live.overview?.plant.name ?? null,
+    origin: live.overview?.plant.origin ?? null,
     storeError: live.overview?.store.error ?? null,
     refreshS: live.overview?.refresh_s ?? null,
     serviceTimeMs: live.overview ? Date.parse(live.overview.time) + silenceS * 1000 : null,

@@ -81,7 +81,7 @@ async def test_units_say_how_their_samples_arrive(running: Any) -> None:
 async def test_the_overview_shows_what_each_bearing_shows(running: Any) -> None:
     overview = await running.json("/api/v1/overview")
 
-    assert overview["plant"] == {"name": "Demo plant"}
+    assert overview["plant"] == {"name": "Demo plant", "origin": "live"}
     assert overview["time"] == "2026-01-01T00:00:00.000Z"
     assert overview["refresh_s"] == 11.95
     assert overview["store"] == {"error": None, "n_unstored": 0}

@@ -10,7 +10,7 @@ export function sourceView() {
   const link = mark();
   const age = element("span", { class: "data-age" });
   const count = element("span", { class: "samples" });
-  const clock = element("span", { class: "clock" });
+  const clock = element("span", { class: "device-clock" });
   return {
     node: element("div", { class: "source" }, link.node, age, count, clock),
     draw(source) {
