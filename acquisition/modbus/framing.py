@@ -1,61 +1,85 @@
-"""Modbus TCP framing that lets only reads out and only the one right reply in.
+"""Framing, TCP and RTU, that lets only reads out and only the one right reply in.
 
 pymodbus 3.16.1 takes a transaction id of 0 for any, and checks neither function, byte count nor
-register count of a reply, nor what follows it. This framer knows the outstanding request, so it
-knows the first nine bytes of its answer in advance; whatever differs is a fault. It also hands the
-registers over as bytes, which spares a Python integer for each of them.
+register count of a reply, nor what follows it. These framers know the outstanding request, so they
+know its answer in advance but for the values; whatever differs is a fault. They also hand registers
+over as bytes, which spares a Python integer for each of them.
 """
 
 import struct
 from dataclasses import dataclass
+from typing import ClassVar
 
-from pymodbus.framer import FramerSocket
+from pymodbus.framer import FramerRTU, FramerSocket
+from pymodbus.framer.base import FramerBase
 from pymodbus.pdu import DecodePDU, ModbusPDU
 
-from acquisition.errors import ConfigError
+from acquisition.errors import FrameError
+from acquisition.modbus.replies import (
+    EXCEPTION_BIT,
+    MAX_PDU_BYTES,
+    ReplyShape,
+    least_bytes,
+    reply_to,
+)
 
-READ_HOLDING_REGISTERS = 3
-READ_INPUT_REGISTERS = 4
-READ_FUNCTIONS = (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS)
-"""The only function codes that can leave this process."""
-
-_HEAD = struct.Struct(">HHHBBB")
-_EXCEPTION_BIT = 0x80
-_EXCEPTION_BYTES = 9
+_MBAP = struct.Struct(">HHHB")
+_SHOWN_BYTES = 16
 
 
-class RegisterReply(ModbusPDU):
-    """What came back: registers as bytes, the exception code, or what was wrong."""
+class Reply(ModbusPDU):
+    """What came back: the whole reply from its function code on, or what was wrong."""
 
-    def __init__(self, payload: bytes = b"", refusal: int | None = None, fault: str = "") -> None:
+    def __init__(self, pdu: bytes = b"", fault: str = "") -> None:
         super().__init__()
-        self.payload = payload
-        self.refusal = refusal
+        self.pdu = pdu
         self.fault = fault
+
+    @property
+    def refusal(self) -> int | None:
+        """The exception code, if the device refuses."""
+        return self.pdu[1] if self.pdu and self.pdu[0] & EXCEPTION_BIT else None
 
 
 @dataclass(frozen=True)
-class _Expected:
-    """The reply that the outstanding request allows."""
+class _Asked:
+    """The outstanding request and the reply it allows."""
 
     request: ModbusPDU
-    head: bytes
-    exception_head: bytes
-    n_bytes: int
+    shape: ReplyShape
+
+    def least_bytes(self, pdu: bytes) -> int:
+        return least_bytes(self.request.function_code, self.shape, pdu)
 
 
-class ReadOnlyFramer(FramerSocket):
-    """One outstanding read, one acceptable reply."""
+class ReadOnlyFramer(FramerBase):
+    """One outstanding read, one acceptable reply.
+
+    Attributes
+    ----------
+    unasked
+        What came while nothing was outstanding, as words; empty if nothing did.
+    n_received
+        Bytes that have come since the last request, or unasked.
+    """
+
+    head_bytes: ClassVar[int]
+    tail_bytes: ClassVar[int]
 
     def __init__(self) -> None:
         super().__init__(DecodePDU(False))
+        self.forget()
+
+    def forget(self) -> None:
+        """Start anew, as with a new connection."""
         self.unasked = ""
-        self._expected: _Expected | None = None
+        self.n_received = 0
+        self._asked: _Asked | None = None
 
     @property
     def awaiting(self) -> bool:
         """Whether a request is outstanding."""
-        return self._expected is not None
+        return self._asked is not None
 
     def buildFrame(self, message: ModbusPDU) -> bytes:  # noqa: N802 - pymodbus calls it so
         """Frame a request and remember which reply it allows.
@@ -63,18 +87,10 @@ class ReadOnlyFramer(FramerSocket):
         Raises
         ------
         ConfigError
-            If the request is anything but a read of registers.
+            If the request is anything but a read.
         """
-        function = message.function_code
-        if function not in READ_FUNCTIONS:
-            raise ConfigError(f"function code {function} is never sent, only {READ_FUNCTIONS}")
-        tid, unit, n_bytes = message.transaction_id, message.dev_id, 2 * message.count
-        self._expected = _Expected(
-            message,
-            _HEAD.pack(tid, 0, 3 + n_bytes, unit, function, n_bytes),
-            _HEAD.pack(tid, 0, 3, unit, function | _EXCEPTION_BIT, 0)[:-1],
-            _HEAD.size + n_bytes,
-        )
+        self._asked = _Asked(message, reply_to(message.function_code, message.encode()))
+        self.n_received = 0
         return super().buildFrame(message)
 
     def handleFrame(  # noqa: N802 - pymodbus calls it so
@@ -90,38 +106,83 @@ class ReadOnlyFramer(FramerSocket):
         tuple
             Bytes used up, and the reply if it is complete or wrong.
         """
-        if self._expected is None:
-            self.unasked = f"{len(data)} bytes came unasked: {data[:16].hex()}"
+        if self._asked is None:
+            self.n_received += len(data)
+            self.unasked = f"{len(data)} bytes came unasked: {data[:_SHOWN_BYTES].hex()}"
             return len(data), None
-        reply = _judge(data, self._expected)
+        self.n_received = len(data)
+        try:
+            reply = self._judge(data, self._asked)
+        except FrameError as fault:
+            reply = Reply(fault=f"{fault}: {data[:_SHOWN_BYTES].hex()}")
         if reply is None:
             return 0, None
-        reply.dev_id = self._expected.request.dev_id
-        reply.transaction_id = self._expected.request.transaction_id
-        self._expected = None
+        reply.dev_id = self._asked.request.dev_id
+        reply.transaction_id = self._asked.request.transaction_id
+        self._asked = None
         return len(data), reply
 
+    def _judge(self, data: bytes, asked: _Asked) -> Reply | None:
+        """Return the reply, or None while the bytes may still become the right one."""
+        if len(data) <= self.head_bytes:
+            return None
+        n_expected = self.head_bytes + self._pdu_bytes(data, asked) + self.tail_bytes
+        if len(data) < n_expected:
+            return None
+        if len(data) > n_expected:
+            raise FrameError(f"{len(data) - n_expected} bytes follow the reply")
+        return Reply(self._checked_pdu(data))
 
-def _judge(data: bytes, expected: _Expected) -> RegisterReply | None:
-    """Return the reply, or None while the bytes may still become the right one."""
-    head = data[: _HEAD.size]
-    if expected.head.startswith(head) and len(data) <= expected.n_bytes:
-        return RegisterReply(data[_HEAD.size :]) if len(data) == expected.n_bytes else None
-    if expected.exception_head.startswith(data[: _HEAD.size - 1]) and len(data) <= _EXCEPTION_BYTES:
-        complete = len(data) == _EXCEPTION_BYTES
-        return RegisterReply(refusal=data[-1]) if complete else None
-    return RegisterReply(fault=_difference(data, expected))
+    def _pdu_bytes(self, data: bytes, asked: _Asked) -> int:
+        """Bytes that the reply has between head and tail, or more than are there."""
+        raise NotImplementedError
+
+    def _checked_pdu(self, data: bytes) -> bytes:
+        """Return what is between head and tail of a complete reply."""
+        raise NotImplementedError
 
 
-def _difference(data: bytes, expected: _Expected) -> str:
-    """Say what is wrong with a reply, field by field."""
-    names = ("transaction id", "protocol id", "length", "unit id", "function code", "byte count")
-    found = data[: _HEAD.size].ljust(_HEAD.size, b"\0")
-    for name, wanted, got in zip(
-        names, _HEAD.unpack(expected.head), _HEAD.unpack(found), strict=True
-    ):
-        if wanted != got:
-            return f"{name} is {got}, expected {wanted}: {data[:16].hex()}"
-    return (
-        f"{len(data) - expected.n_bytes} bytes follow the reply: {data[expected.n_bytes :].hex()}"
-    )
+class TcpFramer(ReadOnlyFramer, FramerSocket):
+    """Modbus TCP: transaction, protocol, length and unit before the reply."""
+
+    head_bytes = _MBAP.size
+    tail_bytes = 0
+
+    def _pdu_bytes(self, data: bytes, asked: _Asked) -> int:
+        length: int
+        tid, protocol, length, unit = _MBAP.unpack_from(data)
+        request = asked.request
+        _require_equal("transaction id", tid, request.transaction_id)
+        _require_equal("protocol id", protocol, 0)
+        _require_equal("unit id", unit, request.dev_id)
+        pdu = data[_MBAP.size :]
+        n_least, n_told = asked.least_bytes(pdu), length - 1
+        # a reply whose length is not known from the request has to agree with itself
+        if n_told < n_least or n_told > MAX_PDU_BYTES or (len(pdu) >= n_least < n_told):
+            raise FrameError(f"length is {length}, expected {n_least + 1}")
+        return n_told
+
+    def _checked_pdu(self, data: bytes) -> bytes:
+        return data[_MBAP.size :]
+
+
+class RtuFramer(ReadOnlyFramer, FramerRTU):
+    """Modbus RTU: unit before the reply, CRC-16 behind it."""
+
+    head_bytes = 1
+    tail_bytes = 2
+
+    def _pdu_bytes(self, data: bytes, asked: _Asked) -> int:
+        _require_equal("unit id", data[0], asked.request.dev_id)
+        return asked.least_bytes(data[1:])
+
+    def _checked_pdu(self, data: bytes) -> bytes:
+        found, expected = int.from_bytes(data[-2:], "big"), self.compute_CRC(data[:-2])
+        if found != expected:
+            raise FrameError(f"CRC is {found:#06x}, expected {expected:#06x}")
+        return data[1:-2]
+
+
+def _require_equal(name: str, found: int, expected: int) -> None:
+    if found != expected:
+        raise FrameError(f"{name} is {found}, expected {expected}")

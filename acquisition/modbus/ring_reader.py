@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from acquisition.modbus.client import RegisterLink
+from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.profile import (
     HEADER_REGISTERS,
     PROGRESS_OFFSET,
@@ -20,17 +20,18 @@ from acquisition.modbus.profile import (
 class RingReader:
     """One device's ring, as it is found: nothing is judged here."""
 
-    def __init__(self, link: RegisterLink, base_address: int) -> None:
+    def __init__(self, link: ModbusLink, base_address: int, function: int) -> None:
         self._link = link
         self._base = base_address
+        self._function = function
 
     async def header(self) -> RingHeader:
         """Read and decode the header alone."""
-        return decode_header(await self._link.read(self._base, HEADER_REGISTERS))
+        return decode_header(await self._registers(self._base, HEADER_REGISTERS))
 
     async def header_and_slow(self, n_slow: int) -> tuple[RingHeader, tuple[float, ...]]:
         """Read the header and the slow values behind it."""
-        data = await self._link.read(self._base, HEADER_REGISTERS + 2 * n_slow)
+        data = await self._registers(self._base, HEADER_REGISTERS + 2 * n_slow)
         return decode_header(data[: 2 * HEADER_REGISTERS]), decode_slow(
             data[2 * HEADER_REGISTERS :]
         )
@@ -38,8 +39,11 @@ class RingReader:
     async def progress(self) -> tuple[int, int]:
         """Read epoch and newest sequence, in one request so that they belong together."""
         return decode_progress(
-            await self._link.read(self._base + PROGRESS_OFFSET, PROGRESS_REGISTERS)
+            await self._registers(self._base + PROGRESS_OFFSET, PROGRESS_REGISTERS)
         )
+
+    async def _registers(self, address: int, n_registers: int) -> bytes:
+        return await self._link.read(address, n_registers, self._function)
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
         """Read the places where these sequence numbers belong, whatever lies there.
@@ -52,7 +56,7 @@ class RingReader:
         found: list[Slot] = []
         for address, n_slots in _runs(layout, sequences):
             n_registers = (n_slots - 1) * layout.slot_stride + layout.slot_registers
-            data = memoryview(await self._link.read(address, n_registers))
+            data = memoryview(await self._registers(address, n_registers))
             found += [
                 decode_slot(data[2 * layout.slot_stride * i :], layout) for i in range(n_slots)
             ]

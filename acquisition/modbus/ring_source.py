@@ -8,10 +8,12 @@ from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
 from acquisition.delivery import Delivery
 from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.client import LinkSettings, RegisterLink
 from acquisition.modbus.follower import RingFollower
+from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.profile import ADDRESS_SPACE, HEADER_REGISTERS
+from acquisition.modbus.replies import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
 from acquisition.modbus.ring_reader import RingReader
+from acquisition.modbus.transport import LinkSettings
 from core.blocks import SampleBlock
 
 _MIN_STALE_SLOTS = 3
@@ -20,10 +22,12 @@ _MIN_STALE_SLOTS = 3
 
 @dataclass(frozen=True, kw_only=True)
 class ModbusRingSettings(LinkSettings):
-    """A block ring behind a Modbus TCP device.
+    """A block ring behind a Modbus device.
 
     Parameters
     ----------
+    function
+        3 (holding registers) or 4 (input registers).
     base_address
         Register address of the header, counted from 0.
     poll_period_s
@@ -32,12 +36,15 @@ class ModbusRingSettings(LinkSettings):
         A device without a usable new sample for longer than this is not connected; above 0.
     """
 
+    function: int = READ_HOLDING_REGISTERS
     base_address: int = 0
     poll_period_s: float = 0.5
     stale_after_s: float = 5.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.function not in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
+            raise ConfigError(f"modbus: function is {self.function}, allowed are 3 and 4")
         if not 0 <= self.base_address <= ADDRESS_SPACE - HEADER_REGISTERS:
             raise ConfigError(
                 f"modbus: base_address is {self.base_address},"
@@ -77,11 +84,11 @@ class ModbusRingSource:
         ConfigError
             If it is not a block ring, or not the configured one.
         """
-        link = RegisterLink(self._settings)
+        link = ModbusLink(self._settings)
         try:
             with _nonsense_drops_the_link():
                 await link.open()
-                reader = RingReader(link, self._settings.base_address)
+                reader = RingReader(link, self._settings.base_address, self._settings.function)
                 await self._identify(reader)
             blocks = self._blocks(reader)
             try:
@@ -129,7 +136,7 @@ class ModbusRingSource:
         if standing_s > self._stale_after_s and self._follower.newest is not None:
             epoch, newest = self._follower.newest
             raise LinkError(
-                f"{self._settings.host}:{self._settings.port}: the device answers but its data"
+                f"{self._settings.transport}: the device answers but its data"
                 f" stand still: no usable slot for {standing_s:.1f} s,"
                 f" the newest is {newest} of epoch {epoch}"
             )

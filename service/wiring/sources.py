@@ -12,6 +12,7 @@ from service.runner import WatchedUnit
 from service.settings import sources
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
+from service.wiring.modbus import fields_of, transport_of
 from service.wiring.simulations import simulated_feed
 
 
@@ -29,7 +30,7 @@ def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
     source = unit.source
     match source:
         case sources.ModbusRingSettings():
-            ring = ModbusRingSettings(**source.model_dump(exclude={"kind"}))
+            ring = ModbusRingSettings(transport=transport_of(source), **fields_of(source))
             return ModbusRingSource(ring, calibration_of(unit), clock)
         case sources.SimulatedSettings():
             feed = simulated_feed(unit, clock)

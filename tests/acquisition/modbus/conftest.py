@@ -9,7 +9,9 @@ from acquisition.clock import SystemClock
 from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.transport import LinkSettings, TcpTransport
 
 HONEST_REQUEST_BYTES = 12
 
@@ -86,13 +88,23 @@ async def hostile(device) -> AsyncIterator[HostileServer]:
 
 
 @pytest.fixture
+def link_to() -> Callable[..., ModbusLink]:
+    """Builds links to a port of this machine; other settings as keywords."""
+
+    def build(port: int, host: str = "127.0.0.1", **settings) -> ModbusLink:
+        return ModbusLink(LinkSettings(transport=TcpTransport(host=host, port=port), **settings))
+
+    return build
+
+
+@pytest.fixture
 def source_at(counts_calibration) -> Callable[..., ModbusRingSource]:
     """Builds sources for a port; other settings as keywords."""
 
     def build(port: int, clock=None, calibration=None, **settings) -> ModbusRingSource:
         settings = {"poll_period_s": 0.001, "timeout_s": 5.0} | settings
         return ModbusRingSource(
-            ModbusRingSettings(host="127.0.0.1", port=port, **settings),
+            ModbusRingSettings(transport=TcpTransport(host="127.0.0.1", port=port), **settings),
             calibration or counts_calibration(n_channels=3),
             clock or SystemClock(),
         )

@@ -8,20 +8,20 @@ from hypothesis import strategies as st
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteSingleRegisterRequest
 
 from acquisition.errors import ConfigError
-from acquisition.modbus.framing import ReadOnlyFramer, RegisterReply
+from acquisition.modbus.framing import Reply, TcpFramer
 
 PAYLOAD = bytes(range(10))
 RIGHT = bytes.fromhex("00070000000d01030a") + PAYLOAD
 EXCEPTION = bytes.fromhex("00070000000301") + b"\x83\x02"
 
 
-def asked() -> ReadOnlyFramer:
-    framer = ReadOnlyFramer()
+def asked() -> TcpFramer:
+    framer = TcpFramer()
     framer.buildFrame(ReadHoldingRegistersRequest(dev_id=1, transaction_id=7, address=100, count=5))
     return framer
 
 
-def received(*pieces: bytes) -> RegisterReply | None:
+def received(*pieces: bytes) -> Reply | None:
     """Feed pieces as a transport does: what is not used up comes again."""
     framer, buffer, reply = asked(), b"", None
     for piece in pieces:
@@ -33,14 +33,14 @@ def received(*pieces: bytes) -> RegisterReply | None:
 
 
 def test_a_read_leaves_as_twelve_bytes():
-    framer = ReadOnlyFramer()
+    framer = TcpFramer()
     request = ReadHoldingRegistersRequest(dev_id=1, transaction_id=7, address=100, count=5)
     assert framer.buildFrame(request).hex() == "000700000006010300640005"
 
 
 def test_a_write_never_leaves():
     with pytest.raises(ConfigError, match="function code 6 is never sent"):
-        ReadOnlyFramer().buildFrame(WriteSingleRegisterRequest(address=1, registers=[1]))
+        TcpFramer().buildFrame(WriteSingleRegisterRequest(address=1, registers=[1]))
 
 
 @given(st.lists(st.integers(0, len(RIGHT)), max_size=20))
@@ -49,14 +49,14 @@ def test_a_reply_reads_the_same_however_it_is_sliced(cuts):
     pieces = [RIGHT[a:b] for a, b in itertools.pairwise(edges) if b > a]
     reply = received(*pieces)
     assert reply is not None
-    assert reply.payload == PAYLOAD
+    assert reply.pdu[2:] == PAYLOAD
     assert not reply.fault
 
 
 def test_an_exception_reply_is_told_from_registers():
     reply = received(EXCEPTION)
     assert reply is not None
-    assert (reply.refusal, reply.payload, reply.fault) == (2, b"", "")
+    assert (reply.refusal, reply.fault) == (2, "")
 
 
 @given(position=st.integers(0, 8), flip=st.integers(1, 255))
@@ -66,14 +66,14 @@ def test_no_changed_byte_of_the_head_gets_registers_through(position, flip):
     reply = received(bytes(wrong))
     assert reply is not None
     assert reply.fault
-    assert not reply.payload
+    assert not reply.pdu
 
 
 @given(st.binary(min_size=1, max_size=400))
 def test_no_random_bytes_get_registers_through(data):
     reply = received(data)
     assert reply is None or reply.fault
-    assert reply is None or not reply.payload
+    assert reply is None or not reply.pdu
 
 
 @given(st.binary(min_size=1, max_size=20))
@@ -84,6 +84,6 @@ def test_bytes_behind_the_reply_spoil_it(extra):
 
 
 def test_bytes_that_nobody_asked_for_are_remembered():
-    framer = ReadOnlyFramer()
+    framer = TcpFramer()
     assert framer.handleFrame(RIGHT, 0, 0) == (len(RIGHT), None)
     assert "unasked" in framer.unasked

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.client import LinkSettings, RegisterLink
 
 
 def changed(position: int, delta: int):
@@ -176,8 +175,8 @@ async def test_a_device_that_hangs_up_is_noticed_before_the_time_out(hostile, so
             pass
 
 
-async def test_after_a_missed_reply_the_link_is_closed_so_that_it_meets_nobody(hostile):
-    link = RegisterLink(LinkSettings(host="127.0.0.1", port=hostile.port, timeout_s=0.1))
+async def test_after_a_missed_reply_the_link_is_closed_so_that_it_meets_nobody(hostile, link_to):
+    link = link_to(hostile.port, timeout_s=0.1)
     await link.open()
     hostile.lie = too_late
     with pytest.raises(LinkError):

@@ -6,6 +6,7 @@ import pytest
 from acquisition.daq import faults
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_source import ModbusRingSettings
+from acquisition.modbus.transport import TcpTransport
 
 
 async def test_a_device_that_stands_still_is_not_connected(
@@ -93,6 +94,7 @@ async def test_only_reads_reach_the_device_whatever_it_does(device, server, sour
 @pytest.mark.parametrize(
     ("wrong", "complaint"),
     [
+        ({"function": 6}, "function is 6, allowed are 3 and 4"),
         ({"base_address": 65521}, "base_address is 65521, allowed is 0 to 65520"),
         ({"poll_period_s": 0.0}, "poll_period_s is 0.0, must be above 0"),
         ({"stale_after_s": float("inf")}, "stale_after_s is inf"),
@@ -100,7 +102,7 @@ async def test_only_reads_reach_the_device_whatever_it_does(device, server, sour
 )
 def test_ring_settings_are_refused_with_value_and_limit(wrong, complaint):
     with pytest.raises(ConfigError, match=complaint):
-        ModbusRingSettings(host="127.0.0.1", **wrong)
+        ModbusRingSettings(transport=TcpTransport(host="127.0.0.1"), **wrong)
 
 
 async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(

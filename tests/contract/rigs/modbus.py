@@ -6,6 +6,7 @@ from acquisition.clock import SystemClock
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.transport import TcpTransport
 from acquisition.source import SampleSource
 
 
@@ -23,7 +24,9 @@ class ModbusRig:
     async def __aenter__(self) -> "ModbusRig":
         await self.plug_in()
         settings = ModbusRingSettings(
-            host="127.0.0.1", port=self._server.port, poll_period_s=0.001, timeout_s=5.0
+            transport=TcpTransport(host="127.0.0.1", port=self._server.port),
+            poll_period_s=0.001,
+            timeout_s=5.0,
         )
         self.source = ModbusRingSource(settings, self._calibration, SystemClock())
         return self

@@ -1,0 +1,118 @@
+"""Where a Modbus device is: at a TCP address, or on a serial line."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
+
+from acquisition.errors import ConfigError
+
+Parity: TypeAlias = Literal["none", "even", "odd"]
+
+MAX_REGISTERS_PER_READ = 125
+_MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
+_MAX_SERIAL_DEVICE_ID = 247
+_BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
+_FRAME_GAP_CHARACTERS = 3.5
+_SHORTEST_FRAME_GAP_S = 0.00175
+"""Modbus over Serial Line 1.02, 2.5.1.1: above 19,200 Bd the gap between frames stays this."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TcpTransport:
+    """A Modbus TCP device.
+
+    Parameters
+    ----------
+    host
+        Name or address.
+    port
+        1 to 65535.
+    """
+
+    host: str
+    port: int = 502
+
+    def __post_init__(self) -> None:
+        _require("port", self.port, 1, 65535)
+
+    def __str__(self) -> str:
+        return f"{self.host}:{self.port}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SerialTransport:
+    """A serial line with Modbus RTU on it; always eight data bits.
+
+    Parameters
+    ----------
+    device
+        Path of the port; example: "/dev/ttyUSB0".
+    baudrate
+        300 to 4,000,000 bit/s.
+    parity
+        "none", "even" or "odd".
+    stop_bits
+        1 or 2.
+    """
+
+    device: str
+    baudrate: int = 19_200
+    parity: Parity = "even"
+    stop_bits: Literal[1, 2] = 1
+
+    def __post_init__(self) -> None:
+        _require("baudrate", self.baudrate, _MIN_BAUDRATE, _MAX_BAUDRATE)
+        _require("stop_bits", self.stop_bits, 1, 2)
+        if self.parity not in get_args(Parity):
+            raise ConfigError(
+                f"modbus: parity is {self.parity!r}, allowed are {', '.join(get_args(Parity))}"
+            )
+
+    def __str__(self) -> str:
+        return self.device
+
+    @property
+    def character_s(self) -> float:
+        """Time that one character takes on the line."""
+        n_bits = _BITS_AROUND_A_CHARACTER + (self.parity != "none") + self.stop_bits
+        return n_bits / self.baudrate
+
+    @property
+    def frame_gap_s(self) -> float:
+        """Silence that has to go before every request."""
+        return max(_FRAME_GAP_CHARACTERS * self.character_s, _SHORTEST_FRAME_GAP_S)
+
+
+Transport: TypeAlias = TcpTransport | SerialTransport
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkSettings:
+    """How to reach a Modbus device, and how it wants to be asked.
+
+    Parameters
+    ----------
+    device_id
+        Unit id: 1 to 255 over TCP, 1 to 247 on a serial line.
+    timeout_s
+        For connecting and for each reply, above 0. On a serial line it must be longer than the
+        slowest reply: it is also the silence that is awaited when the line is opened.
+    max_registers
+        Most registers in one read, 1 to 125.
+    """
+
+    transport: Transport
+    device_id: int = 1
+    timeout_s: float = 1.0
+    max_registers: int = MAX_REGISTERS_PER_READ
+
+    def __post_init__(self) -> None:
+        serial = isinstance(self.transport, SerialTransport)
+        _require("device_id", self.device_id, 1, _MAX_SERIAL_DEVICE_ID if serial else 255)
+        _require("max_registers", self.max_registers, 1, MAX_REGISTERS_PER_READ)
+        if not 0 < self.timeout_s < float("inf"):
+            raise ConfigError(f"modbus: timeout_s is {self.timeout_s}, must be above 0")
+
+
+def _require(name: str, value: int, lowest: int, highest: int) -> None:
+    if not lowest <= value <= highest:
+        raise ConfigError(f"modbus: {name} is {value}, allowed is {lowest} to {highest}")
