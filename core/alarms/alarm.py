@@ -1,0 +1,195 @@
+"""`Alarm`: what is known of one alarm, and the words of its life cycle."""
+
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+from core.alarms.delays import RESTED, DelayTimer
+
+
+class AlarmLevel(IntEnum):
+    """How urgent an alarm is: its priority."""
+
+    ALERT = 1
+    DANGER = 2
+
+
+class AlarmState(StrEnum):
+    """Where an alarm stands in its life cycle (ISA-18.2, 5.4: states A to H, latches apart)."""
+
+    NORMAL = "normal"
+    UNACKNOWLEDGED = "unacknowledged"
+    ACKNOWLEDGED = "acknowledged"
+    RETURNED_UNACKNOWLEDGED = "returned_unacknowledged"
+    SHELVED = "shelved"
+    SUPPRESSED = "suppressed"
+    OUT_OF_SERVICE = "out_of_service"
+
+
+class AlarmKind(StrEnum):
+    """What is wrong, in a word that is part of the alarm's identity."""
+
+    CHANNEL_NOT_OK = "channel_not_ok"
+    SHAFT_X = "order1_shaft_x"
+    SHAFT_Y = "order1_shaft_y"
+    OIL_TEMPERATURE = "oil_temperature"
+    CLOCK_OFFSET = "clock_offset"
+    CLOCK_DRIFT = "clock_drift"
+    TIME_STAMPS = "time_stamps"
+    LINK_LOST = "link_lost"
+
+
+@dataclass(frozen=True)
+class AlarmIdentity:
+    """Which alarm: the same for as long as the plant calls its parts by the same names.
+
+    Parameters
+    ----------
+    subject
+        Channel or bearing that it is about; "device" or "link" where it is about the whole unit.
+    """
+
+    unit: str
+    subject: str
+    kind: AlarmKind
+
+    @property
+    def id(self) -> str:
+        """All of it in one word, fit for a URL."""
+        return f"{self.unit}:{self.subject}:{self.kind}"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is found at one moment of what an alarm watches.
+
+    Parameters
+    ----------
+    level
+        Which limit is passed; None if none is. While nothing is known, that which was known last.
+    is_known
+        Whether it could be judged at all; if not, it is neither active nor returned.
+    value, limit
+        What was compared with what, where there are numbers.
+    reason
+        Why it is so, in a word; "ok" if all is well.
+    suppressed_by
+        Why, by design, the alarm counts for nothing now; None if it counts.
+    """
+
+    level: AlarmLevel | None = None
+    is_known: bool = True
+    value: float | None = None
+    limit: float | None = None
+    reason: str = "ok"
+    suppressed_by: str | None = None
+
+
+WITHIN = Condition()
+"""All is well, and there is no number to it."""
+
+NEVER_JUDGED = Condition(is_known=False, reason="waiting_for_data")
+
+
+def unknown(reason: str, suppressed_by: str | None = None) -> Condition:
+    """Build the condition of which nothing is known now."""
+    return Condition(is_known=False, reason=reason, suppressed_by=suppressed_by)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """That somebody has taken an alarm off the list, and why.
+
+    Parameters
+    ----------
+    until_ns
+        When that ends by itself, host time; None if never.
+    """
+
+    actor: str
+    reason: str
+    since_ns: int
+    until_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class AlarmRule:
+    """How long a condition must last, and whether what it raised stays.
+
+    Parameters
+    ----------
+    on_delay_ns, off_delay_ns
+        Known time without interruption before a level counts, or counts no longer.
+    is_latching
+        Whether the alarm stays active after its condition has gone, until it is reset.
+    """
+
+    on_delay_ns: int = 0
+    off_delay_ns: int = 0
+    is_latching: bool = False
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """One alarm at one moment.
+
+    Parameters
+    ----------
+    level
+        Of the alarm itself, after delays and latch; None if it is not active.
+    occurrence
+        How often it was raised or rose in level; the number that is acknowledged.
+    is_acknowledged
+        Whether somebody has seen this occurrence.
+    raised_ns
+        When this occurrence began.
+    n_events
+        How many events it has had; the newest has this number.
+    condition
+        What was found last.
+    suppressed_by
+        Why it counts for nothing by design; None if it counts.
+    shelf, outage
+        Whether somebody has shelved it, or taken it out of service.
+    is_latched
+        Whether only its latch keeps it at its level.
+    timers
+        Of alert and danger.
+    """
+
+    identity: AlarmIdentity
+    level: AlarmLevel | None = None
+    occurrence: int = 0
+    is_acknowledged: bool = True
+    raised_ns: int | None = None
+    n_events: int = 0
+    condition: Condition = NEVER_JUDGED
+    suppressed_by: str | None = None
+    shelf: Hold | None = None
+    outage: Hold | None = None
+    is_latched: bool = False
+    timers: tuple[DelayTimer, DelayTimer] = (RESTED, RESTED)
+
+    @property
+    def state(self) -> AlarmState:
+        """State of the life cycle; what hides an alarm most thoroughly names it."""
+        if self.outage is not None:
+            return AlarmState.OUT_OF_SERVICE
+        if self.shelf is not None:
+            return AlarmState.SHELVED
+        if self.suppressed_by is not None:
+            return AlarmState.SUPPRESSED
+        if self.level is None:
+            returned = AlarmState.RETURNED_UNACKNOWLEDGED
+            return AlarmState.NORMAL if self.is_acknowledged else returned
+        return AlarmState.ACKNOWLEDGED if self.is_acknowledged else AlarmState.UNACKNOWLEDGED
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether it would not be changed by one more condition that is known and within limits."""
+        return (
+            self.level is None
+            and self.condition.is_known
+            and self.condition.level is None
+            and self.suppressed_by is None
+            and self.timers == (RESTED, RESTED)
+        )

@@ -1,0 +1,67 @@
+"""Conditions that are not a value above a limit: a channel, a device's clock, a link."""
+
+from core.alarms.alarm import WITHIN, AlarmLevel, Condition, unknown
+from core.alarms.limits import Limits, judge
+from core.device_clock import DeviceClock, StampFault
+from core.quality import Level, Quality, Reading, Reason
+
+COVERAGE = 1.96
+"""Standard uncertainties on each side of a value that hold the truth with 95 %."""
+
+SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK)
+"""What only a whole segment shows of a channel."""
+
+
+def channel_condition(quality: Quality, segment_fault: Reason | None) -> Condition:
+    """Whether a waveform channel may be believed.
+
+    Parameters
+    ----------
+    quality
+        Of its newest samples.
+    segment_fault
+        What the newest segment has shown, if anything.
+    """
+    if quality.level is Level.BAD:
+        return Condition(AlarmLevel.ALERT, reason=quality.reason)
+    if segment_fault is not None:
+        return Condition(AlarmLevel.ALERT, reason=segment_fault)
+    return WITHIN
+
+
+def slow_channel_condition(reading: Reading) -> Condition:
+    """Whether a slow channel that an alarm depends on delivers a value."""
+    if reading.value is None:
+        return Condition(AlarmLevel.ALERT, reason=reading.quality.reason)
+    return WITHIN
+
+
+def offset_condition(
+    clock: DeviceClock | None, limits: Limits, held: AlarmLevel | None
+) -> Condition:
+    """Whether a device's time stamps agree with the host's clock."""
+    if clock is None or clock.offset_s is None:
+        return unknown(Reason.NOT_MEASURED)
+    return judge(Reading(abs(clock.offset_s)), limits, held)
+
+
+def drift_condition(
+    clock: DeviceClock | None, limits: Limits, held: AlarmLevel | None
+) -> Condition:
+    """Whether a device samples as fast as it says, as far as that can be told yet."""
+    if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
+        return unknown(Reason.WAITING_FOR_DATA)
+    surely_ppm = max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm)
+    return judge(Reading(surely_ppm), limits, held)
+
+
+def stamp_condition(fault: StampFault | None) -> Condition:
+    """Whether a device's own time stamp could be used."""
+    return WITHIN if fault is None else Condition(AlarmLevel.ALERT, reason=fault)
+
+
+def link_condition(is_connected: bool, reason: str | None) -> Condition:
+    """Whether samples of a unit arrive."""
+    if is_connected:
+        return WITHIN
+    return Condition(AlarmLevel.ALERT, reason=reason or "not connected")

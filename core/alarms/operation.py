@@ -1,0 +1,154 @@
+"""What people do to an alarm, and what their shelving does when its time is up."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from core.alarms.alarm import Alarm, Hold
+from core.alarms.event import AlarmChange, AlarmEvent, changed
+from core.alarms.life_cycle import shown_again, standing_level
+
+
+class ActionRefusedError(ValueError):
+    """An action that does not fit the alarm as it is now; the message says why."""
+
+
+@dataclass(frozen=True)
+class Acknowledge:
+    """Somebody has seen an occurrence. One that has come since is not acknowledged by it."""
+
+    actor: str
+    occurrence: int
+    comment: str = ""
+
+
+@dataclass(frozen=True)
+class Shelve:
+    """Somebody takes the alarm off the list for a while."""
+
+    actor: str
+    reason: str
+    until_ns: int
+
+
+@dataclass(frozen=True)
+class Unshelve:
+    """Somebody brings it back before that."""
+
+    actor: str
+
+
+@dataclass(frozen=True)
+class TakeOutOfService:
+    """Somebody takes the alarm off the list until further notice, as for maintenance."""
+
+    actor: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class ReturnToService:
+    """Somebody ends that."""
+
+    actor: str
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Somebody releases the latch of an alarm whose condition has gone."""
+
+    actor: str
+
+
+Action: TypeAlias = Acknowledge | Shelve | Unshelve | TakeOutOfService | ReturnToService | Reset
+
+
+def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
+    """Do what somebody asks for; what is so already is no event.
+
+    Parameters
+    ----------
+    now_ns
+        The host's time.
+
+    Raises
+    ------
+    ActionRefusedError
+        If it does not fit the alarm as it is now.
+    """
+    do = _DOERS[type(action)]
+    result = do(alarm, action, now_ns)
+    if result is None:
+        return alarm, ()
+    after, change, reason = result
+    after, event = changed(alarm, after, change, now_ns, action.actor, reason)
+    return after, (event,)
+
+
+def expire(alarm: Alarm, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
+    """Bring a shelved alarm back when its time is up, by the host's clock."""
+    shelf = alarm.shelf
+    if shelf is None or shelf.until_ns is None or shelf.until_ns > now_ns:
+        return alarm, ()
+    after = shown_again(replace(alarm, shelf=None))
+    after, event = changed(
+        alarm, after, AlarmChange.UNSHELVED, now_ns, reason="the time it was shelved for is up"
+    )
+    return after, (event,)
+
+
+_Result: TypeAlias = tuple[Alarm, AlarmChange, str] | None
+
+
+def _acknowledge(alarm: Alarm, action: Acknowledge, now_ns: int) -> _Result:  # noqa: ARG001
+    if action.occurrence != alarm.occurrence:
+        raise ActionRefusedError(
+            f"occurrence {action.occurrence} was meant, the newest is {alarm.occurrence}:"
+            " look at it before acknowledging it"
+        )
+    if alarm.is_acknowledged:
+        return None
+    return replace(alarm, is_acknowledged=True), AlarmChange.ACKNOWLEDGED, action.comment
+
+
+def _shelve(alarm: Alarm, action: Shelve, now_ns: int) -> _Result:
+    if action.until_ns <= now_ns:
+        raise ActionRefusedError("the time to shelve it for has passed already")
+    hold = Hold(action.actor, action.reason, now_ns, action.until_ns)
+    return replace(alarm, shelf=hold), AlarmChange.SHELVED, action.reason
+
+
+def _unshelve(alarm: Alarm, action: Unshelve, now_ns: int) -> _Result:  # noqa: ARG001
+    if alarm.shelf is None:
+        return None
+    return shown_again(replace(alarm, shelf=None)), AlarmChange.UNSHELVED, ""
+
+
+def _take_out(alarm: Alarm, action: TakeOutOfService, now_ns: int) -> _Result:
+    hold = Hold(action.actor, action.reason, now_ns)
+    return replace(alarm, outage=hold), AlarmChange.TAKEN_OUT_OF_SERVICE, action.reason
+
+
+def _return(alarm: Alarm, action: ReturnToService, now_ns: int) -> _Result:  # noqa: ARG001
+    if alarm.outage is None:
+        return None
+    return shown_again(replace(alarm, outage=None)), AlarmChange.RETURNED_TO_SERVICE, ""
+
+
+def _reset(alarm: Alarm, action: Reset, now_ns: int) -> _Result:  # noqa: ARG001
+    if not alarm.is_latched:
+        raise ActionRefusedError("nothing to reset: it is not its latch that holds it")
+    if not alarm.is_acknowledged:
+        raise ActionRefusedError("it must be acknowledged before it is reset")
+    after = replace(alarm, level=standing_level(alarm.timers), is_latched=False)
+    return after, AlarmChange.RESET, ""
+
+
+_DOERS: dict[type, Callable[..., _Result]] = {
+    Acknowledge: _acknowledge,
+    Shelve: _shelve,
+    Unshelve: _unshelve,
+    TakeOutOfService: _take_out,
+    ReturnToService: _return,
+    Reset: _reset,
+}

@@ -1,0 +1,73 @@
+"""What is watched on a unit, and by which rules."""
+
+from dataclasses import dataclass, field
+
+from core.alarms.alarm import AlarmRule
+from core.alarms.limits import Limits
+from core.units import ns_from_s
+
+
+def rule_of(on_delay_s: float, off_delay_s: float, *, is_latching: bool = False) -> AlarmRule:
+    """A rule with delays in seconds."""
+    return AlarmRule(ns_from_s(on_delay_s), ns_from_s(off_delay_s), is_latching)
+
+
+@dataclass(frozen=True)
+class LimitRule:
+    """A value above a limit."""
+
+    limits: Limits
+    rule: AlarmRule
+
+
+@dataclass(frozen=True)
+class BearingRules:
+    """What is watched on one bearing.
+
+    Parameters
+    ----------
+    shaft_order1
+        Relative shaft vibration at 1× in each direction, µm zero-to-peak; None if it is not.
+    oil_temperature
+        °C; None if it is not.
+    """
+
+    shaft_order1: LimitRule | None = None
+    oil_temperature: LimitRule | None = None
+
+
+@dataclass(frozen=True)
+class ClockRules:
+    """What is watched of a device's clock.
+
+    Parameters
+    ----------
+    offset
+        Of its stamps against the host, s.
+    drift
+        Of its sampling against the host, parts per million.
+    stamps
+        That its stamps fit the sample index.
+    """
+
+    offset: LimitRule = field(default_factory=lambda: LimitRule(Limits(2.0), rule_of(30.0, 30.0)))
+    drift: LimitRule = field(default_factory=lambda: LimitRule(Limits(200.0), rule_of(60.0, 60.0)))
+    stamps: AlarmRule = field(default_factory=lambda: rule_of(0.0, 600.0))
+
+
+@dataclass(frozen=True)
+class UnitRules:
+    """What is watched on a unit.
+
+    Parameters
+    ----------
+    bearings
+        By bearing; one that is not there has no limits.
+    clock, link
+        None if the device's clock or its link is not judged, as in a replay.
+    """
+
+    channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
+    bearings: dict[str, BearingRules] = field(default_factory=dict)
+    clock: ClockRules | None = field(default_factory=ClockRules)
+    link: AlarmRule | None = field(default_factory=lambda: rule_of(10.0, 0.0))
