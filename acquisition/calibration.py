@@ -104,7 +104,8 @@ def _channel_qualities(
 ) -> tuple[Quality, ...]:
     lowest = raw.counts.min(axis=1)
     highest = raw.counts.max(axis=1)
-    mean = raw.counts.mean(axis=1, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # infinities of both signs have no mean
+        mean = raw.counts.mean(axis=1, dtype=np.float64)
     judge = _quality_of_units if raw.counts.dtype == np.float32 else _quality_of_counts
     return tuple(
         judge(c, ok, float(lo), float(hi), float(m))

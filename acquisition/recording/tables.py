@@ -13,6 +13,15 @@ from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.recording.limits import FOOTER_BYTES_PER_COLUMN
 from acquisition.recording.manifest import RecordedUnit
+from acquisition.recording.pages import (
+    NUMBER,
+    REJECTED_COUNT,
+    REJECTED_REASON,
+    ColumnLimits,
+    PageError,
+    read_footer,
+    require_bounded,
+)
 from core.arrays import RawArray
 
 ZSTD_LEVEL = 1
@@ -30,6 +39,8 @@ _REJECTION = pa.struct(
         pa.field("n_samples", pa.int64(), nullable=False),
     ]
 )
+_REJECTED_LIMITS = (REJECTED_REASON, REJECTED_COUNT)
+_REJECTED_COUNT = "rejected.list.element.n_samples"
 _REJECTED = pa.list_(pa.field("element", _REJECTION, nullable=False))
 
 
@@ -92,13 +103,14 @@ def samples_writer(path: Path, unit: RecordedUnit) -> Any:
 
 
 def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Few and repetitive: dictionaries and zstd."""
+    """Few and repetitive: dictionaries and zstd; but no dictionary can multiply long texts."""
     schema = blocks_schema(unit)
     return pq.ParquetWriter(
         path,
         schema,
         compression="zstd",
         compression_level=ZSTD_LEVEL,
+        use_dictionary=[*schema.names, _REJECTED_COUNT],
         write_statistics=False,
         store_schema=False,
     )
@@ -114,9 +126,14 @@ def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> I
         If it is not, or if reading it fails inside the context.
     """
     with foreign_errors_of(path), path.open("rb") as stream:
-        _require_small_footer(stream, path, schema, -(-n_rows // rows_per_group))
+        full, last = divmod(n_rows, rows_per_group)
+        group_rows = [rows_per_group] * full + [last] * (last > 0)
+        footer_at = _small_footer(stream, path, schema, len(group_rows))
+        footer = read_footer(stream, footer_at)
+        stream.seek(0)
         with pq.ParquetFile(stream) as file:
-            _require_shape(file, path, schema, n_rows, rows_per_group)
+            _require_shape(file, path, schema, n_rows, group_rows)
+            require_bounded(stream, footer_at, footer, _limits(schema), group_rows)
             yield file
 
 
@@ -125,7 +142,8 @@ def foreign_errors_of(path: Path) -> Iterator[None]:
     """Rename what pyarrow and the disk raise to ConfigError, with the path in front."""
     try:
         yield
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:  # names may not be text
+    except (pa.ArrowException, OSError, PageError, UnicodeDecodeError) as error:
+        # names may not be text
         words = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ConfigError(f"{path}: {words.splitlines()[0]}") from error
 
@@ -142,8 +160,13 @@ def read_rows(file: Any, group: int, columns: list[str] | None = None) -> Iterab
     return rows
 
 
-def _require_small_footer(stream: Any, path: Path, schema: Any, n_groups: int) -> None:
-    """Refuse a footer that lists more than there can be, before anything parses it."""
+def _limits(schema: Any) -> list[ColumnLimits]:
+    numbers = [NUMBER for name in schema.names if name != "rejected"]
+    return numbers if len(numbers) == len(schema.names) else [*numbers, *_REJECTED_LIMITS]
+
+
+def _small_footer(stream: Any, path: Path, schema: Any, n_groups: int) -> int:
+    """Find the footer; refuse one that lists more than there can be, before anything parses it."""
     size = stream.seek(0, 2)
     stream.seek(max(0, size - _TAIL_BYTES))
     tail = stream.read(_TAIL_BYTES)
@@ -154,10 +177,12 @@ def _require_small_footer(stream: Any, path: Path, schema: Any, n_groups: int) -
     n_bytes = int.from_bytes(tail[:4], "little")
     if n_bytes > limit:
         raise ConfigError(f"{path}: footer of {n_bytes} bytes, at most {limit} belong to this one")
-    stream.seek(0)
+    if n_bytes > size - _TAIL_BYTES:
+        raise ConfigError(f"{path}: not a complete Parquet file")
+    return int(size) - _TAIL_BYTES - n_bytes
 
 
-def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, rows_per_group: int) -> None:
+def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, group_rows: list[int]) -> None:
     found = file.schema_arrow
     if not found.equals(schema):
         name = next((a for a, b in zip(found, schema, strict=False) if a != b), None)
@@ -168,7 +193,5 @@ def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, rows_per_gro
         raise ConfigError(f"{path}: {metadata.num_rows} rows, the manifest says {n_rows}")
     # never ask for a column's metadata: a lying footer makes pyarrow abort the process there
     found_rows = [metadata.row_group(n).num_rows for n in range(metadata.num_row_groups)]
-    full, last = divmod(n_rows, rows_per_group)
-    expected = [rows_per_group] * full + [last] * (last > 0)
-    if found_rows != expected:
-        raise ConfigError(f"{path}: not in row groups of {rows_per_group}")
+    if found_rows != group_rows:
+        raise ConfigError(f"{path}: not in row groups of {group_rows[0]}")
