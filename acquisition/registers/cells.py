@@ -1,0 +1,142 @@
+"""`Cell`: where one number stands in a device, and how its bytes are to be read."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from acquisition.errors import ConfigError
+
+REGISTER_FUNCTIONS = (3, 4)
+BIT_FUNCTIONS = (1, 2)
+FUNCTIONS = (*BIT_FUNCTIONS, *REGISTER_FUNCTIONS)
+
+BASES = (0, 1, 10001, 30001, 40001, 100001, 300001, 400001)
+"""Numbers that manuals give to the first register of a table."""
+
+ADDRESS_SPACE = 0x10000
+BITS_PER_REGISTER = 16
+
+
+class MapError(ConfigError):
+    """A register map that cannot be used.
+
+    Parameters
+    ----------
+    at
+        Where in the map: field names and element numbers.
+    """
+
+    def __init__(self, message: str, *at: int | str) -> None:
+        super().__init__(message)
+        self.at = at
+
+
+class NumberType(StrEnum):
+    """What a number's bytes stand for."""
+
+    INT16 = "int16"
+    UINT16 = "uint16"
+    INT32 = "int32"
+    UINT32 = "uint32"
+    FLOAT32 = "float32"
+    FLOAT64 = "float64"
+    BIT = "bit"
+
+
+DTYPES = {
+    NumberType.INT16: ">i2",
+    NumberType.UINT16: ">u2",
+    NumberType.INT32: ">i4",
+    NumberType.UINT32: ">u4",
+    NumberType.FLOAT32: ">f4",
+    NumberType.FLOAT64: ">f8",
+    NumberType.BIT: ">u2",
+}
+"""As numpy reads them once their bytes are in the order ABCD."""
+
+N_BYTES = {type_: int(name[-1]) for type_, name in DTYPES.items()}
+
+
+class ByteOrder(StrEnum):
+    """In which order four bytes come; A is the most significant.
+
+    Words first to last and bytes within a word may each be exchanged. Of a single register only
+    the bytes can be, and of four registers all words are.
+    """
+
+    ABCD = "ABCD"
+    CDAB = "CDAB"
+    BADC = "BADC"
+    DCBA = "DCBA"
+
+    @property
+    def low_word_first(self) -> bool:
+        """Whether the first register is the least significant."""
+        return self in (ByteOrder.CDAB, ByteOrder.DCBA)
+
+    @property
+    def low_byte_first(self) -> bool:
+        """Whether the first byte of a register is the least significant."""
+        return self in (ByteOrder.BADC, ByteOrder.DCBA)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One number in a device.
+
+    Parameters
+    ----------
+    address
+        As the manual writes it.
+    function
+        1 (coils) or 2 (discrete inputs) for single bits, 3 (holding) or 4 (input registers).
+    bit
+        Of a register, 0 the least significant; for type "bit" read by function 3 or 4.
+    """
+
+    address: int
+    function: int = 3
+    type: NumberType = NumberType.UINT16
+    byte_order: ByteOrder = ByteOrder.ABCD
+    bit: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.function not in FUNCTIONS:
+            raise MapError(f"must be 1, 2, 3 or 4, got {self.function}", "function")
+        is_bit, in_register = self.type is NumberType.BIT, self.function in REGISTER_FUNCTIONS
+        if not in_register and not is_bit:
+            raise MapError('must be "bit": functions 1 and 2 read single bits', "type")
+        if (self.bit is not None) != (is_bit and in_register):
+            raise MapError(
+                'is the number of a bit in a register: give it with type "bit" and function 3 or 4,'
+                " and only then",
+                "bit",
+            )
+        if self.bit is not None and not 0 <= self.bit < BITS_PER_REGISTER:
+            raise MapError(f"must be 0 to 15, got {self.bit}", "bit")
+
+    @property
+    def n_places(self) -> int:
+        """Registers that it takes, or 1 bit of functions 1 and 2."""
+        return N_BYTES[self.type] // 2
+
+    def start(self, base: int) -> int:
+        """Address on the wire, counted from 0."""
+        return self.address - base
+
+    def stop(self, base: int) -> int:
+        """First address on the wire after it."""
+        return self.start(base) + self.n_places
+
+    def require_in_space(self, base: int, *at: int | str) -> None:
+        """Refuse a cell that no device can have.
+
+        Raises
+        ------
+        MapError
+            With what is allowed.
+        """
+        last = base + ADDRESS_SPACE - self.n_places
+        if not base <= self.address <= last:
+            raise MapError(
+                f"must be {base} to {last}, since the map counts from {base}", *at, "address"
+            )

@@ -1,0 +1,277 @@
+"""What stands in a device's registers comes out as its manual says, in every byte order."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.registers.cells import ByteOrder, Cell, NumberType
+from acquisition.registers.decoding import MapDecoder, ValueState
+from acquisition.registers.device_time import CalendarTime, EpochTime
+from acquisition.registers.register_map import (
+    FlagCheck,
+    FullScale,
+    MapValue,
+    Meaning,
+    RegisterMap,
+    ScaleRegister,
+    Together,
+)
+
+STRUCT = {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f", "float64": "d"}
+
+
+def registers_of(number: float, type_: str, order: str) -> bytes:
+    """What a device of that byte order holds, made by another way than padwatch's."""
+    data = struct.pack(f">{STRUCT[type_]}", number)
+    words = [data[n : n + 2] for n in range(0, len(data), 2)]
+    if order in ("CDAB", "DCBA"):
+        words.reverse()
+    if order in ("BADC", "DCBA"):
+        words = [word[::-1] for word in words]
+    return b"".join(words)
+
+
+def words(*numbers: int) -> bytes:
+    return struct.pack(f">{len(numbers)}H", *(n % 65536 for n in numbers))
+
+
+def one(value: MapValue, content: bytes, **settings) -> tuple[float, ValueState]:
+    reading = MapDecoder(RegisterMap(values=(value,), **settings)).read(content)
+    return reading.values[0], reading.states[0]
+
+
+def test_the_four_byte_orders_of_a_known_float_are_those_of_the_manuals() -> None:
+    assert struct.pack(">f", 123.456).hex() == "42f6e979"
+    assert registers_of(123.456, "float32", "ABCD").hex() == "42f6e979"
+    assert registers_of(123.456, "float32", "CDAB").hex() == "e97942f6"
+    assert registers_of(123.456, "float32", "BADC").hex() == "f64279e9"
+    assert registers_of(123.456, "float32", "DCBA").hex() == "79e9f642"
+
+
+@pytest.mark.parametrize("order", [order.value for order in ByteOrder])
+@pytest.mark.parametrize("type_", list(STRUCT))
+def test_every_type_comes_back_from_every_byte_order(type_: str, order: str) -> None:
+    number = {"int16": -12345, "uint16": 54321, "int32": -1234567890, "uint32": 4012345678}.get(
+        type_, -0.15625
+    )
+    cell = Cell(address=7, type=NumberType(type_), byte_order=ByteOrder(order))
+
+    assert one(MapValue(id="v", cell=cell), registers_of(number, type_, order)) == (number, 0)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(sorted(STRUCT)),
+            st.sampled_from([order.value for order in ByteOrder]),
+            st.integers(-30000, 30000),
+            st.integers(0, 3),
+        ),
+        min_size=1,
+        max_size=20,
+    )
+)
+def test_any_map_finds_each_of_its_numbers(cells: list[tuple[str, str, int, int]]) -> None:
+    values, memory, address = [], {}, 0
+    for n, (type_, order, number, gap) in enumerate(cells):
+        number = abs(number) if type_.startswith("u") else number
+        address += gap
+        cell = Cell(address=address, type=NumberType(type_), byte_order=ByteOrder(order))
+        values.append(MapValue(id=f"v{n}", cell=cell))
+        data = registers_of(number, type_, order)
+        memory |= {address + i // 2: data[i : i + 2] for i in range(0, len(data), 2)}
+        address += cell.n_places
+    decoder = MapDecoder(RegisterMap(values=tuple(values)))
+
+    content = b"".join(memory[a] for r in decoder.plan.requests for a in range(r.start, r.stop))
+    reading = decoder.read(content)
+
+    expected = [abs(n) if t.startswith("u") else n for t, _, n, _ in cells]
+    np.testing.assert_array_equal(reading.values, expected)
+    assert set(reading.states) == {ValueState.OK}
+
+
+def test_an_skf_value_is_its_mantissa_times_its_scale_register() -> None:
+    value = MapValue(
+        id="v",
+        cell=Cell(address=609, type=NumberType.INT16),
+        scale_register=ScaleRegister(cell=Cell(address=610, type=NumberType.INT16)),
+    )
+    settings = {"base": 1, "together": (Together(address=609, count=2),)}
+
+    found, state = one(value, words(-16384, 200), **settings)
+
+    assert found == pytest.approx(-16384 / 32767 * 200)
+    assert state is ValueState.OK
+
+
+@pytest.mark.parametrize(
+    ("raw", "expected", "state"),
+    [
+        (0, -10.0, ValueState.CLIPPED),
+        (1, -10.0 + 60.0 / 65535, ValueState.OK),
+        (0xFFFE, 50.0 - 60.0 / 65535, ValueState.OK),
+        (0xFFFF, 50.0, ValueState.CLIPPED),
+    ],
+)
+def test_a_vm600_reading_at_the_end_of_its_scale_is_clipped(raw, expected, state) -> None:
+    low = Cell(address=100, function=4, type=NumberType.FLOAT32)
+    high = Cell(address=102, function=4, type=NumberType.FLOAT32)
+    value = MapValue(
+        id="v",
+        cell=Cell(address=1, function=4),
+        full_scale=FullScale(minimum=low, maximum=high),
+    )
+
+    found = one(value, words(raw) + struct.pack(">ff", -10.0, 50.0))
+
+    assert found == (pytest.approx(expected), state)
+
+
+def test_a_vm600_rack_that_gives_no_range_gives_no_value() -> None:
+    low = Cell(address=100, function=4, type=NumberType.FLOAT32)
+    high = Cell(address=102, function=4, type=NumberType.FLOAT32)
+    value = MapValue(
+        id="v", cell=Cell(address=1, function=4), full_scale=FullScale(minimum=low, maximum=high)
+    )
+
+    assert one(value, words(7, 0, 0, 0, 0))[1] is ValueState.INVALID
+
+
+@pytest.mark.parametrize(
+    ("flag", "word", "state"),
+    [
+        ({"mask": 0x0020, "set_means": Meaning.BAD}, 0x0020, ValueState.FLAGGED),
+        ({"mask": 0x0060, "set_means": Meaning.BAD}, 0x0040, ValueState.FLAGGED),
+        ({"mask": 0x0020, "set_means": Meaning.BAD}, 0xFFDF, ValueState.OK),
+        ({"mask": 0x0021, "set_means": Meaning.OK}, 0x0021, ValueState.OK),
+        ({"mask": 0x0021, "set_means": Meaning.OK}, 0x0001, ValueState.FLAGGED),
+        ({"ok_values": (1,), "clipped_values": (2,)}, 1, ValueState.OK),
+        ({"ok_values": (1,), "clipped_values": (2,)}, 2, ValueState.CLIPPED),
+        ({"ok_values": (1,), "clipped_values": (2,)}, 0, ValueState.FLAGGED),
+        ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x02FF, ValueState.OK),
+        ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x0300, ValueState.FLAGGED),
+    ],
+)
+def test_a_status_register_is_read_with_the_polarity_of_its_maker(flag, word, state) -> None:
+    check = FlagCheck(cell=Cell(address=1), **flag)
+    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
+
+    assert one(value, words(5, word)) == (5.0, state)
+
+
+def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
+    """VM600: bit 5 set means the sensor is OK, bits 6 to 11 set mean an error."""
+    status = Cell(address=1)
+    checks = (
+        FlagCheck(cell=status, mask=0x0021, set_means=Meaning.OK),
+        FlagCheck(cell=status, mask=0x0FC0, set_means=Meaning.BAD),
+    )
+    value = MapValue(id="v", cell=Cell(address=0), flags=checks)
+
+    states = [one(value, words(5, word))[1] for word in (0x0021, 0x0001, 0x0121, 0x003F)]
+
+    flagged = ValueState.FLAGGED
+    assert states == [ValueState.OK, flagged, flagged, ValueState.OK]
+
+
+@pytest.mark.parametrize(
+    ("type_", "settings", "raw", "is_valid"),
+    [
+        ("int16", {"invalid_values": (0x8000,)}, -32768, False),
+        ("int16", {"invalid_values": (-32768,)}, -32768, False),
+        ("uint16", {"invalid_values": (-1,)}, 0xFFFF, False),
+        ("int16", {"invalid_below": -32000}, -32001, False),
+        ("int16", {"invalid_below": -32000}, -32000, True),
+        ("int32", {"invalid_below": -32000}, -32001, False),
+        ("float32", {"invalid_below": -32000}, -32001.0, False),
+        ("uint32", {"invalid_above": 1e6}, 1000001, False),
+        ("float32", {}, math.nan, False),
+        ("float32", {}, -math.inf, False),
+        ("float32", {"invalid_values": (-9999.0,)}, -9999.0, False),
+        ("int16", {"scale": 100.0, "invalid_values": (100,)}, 1, True),
+    ],
+)
+def test_a_number_that_stands_for_an_error_is_no_value(type_, settings, raw, is_valid) -> None:
+    value = MapValue(id="v", cell=Cell(address=0, type=NumberType(type_)), **settings)
+
+    state = one(value, registers_of(raw, type_, "ABCD"))[1]
+
+    assert state is (ValueState.OK if is_valid else ValueState.INVALID)
+
+
+def test_bits_are_found_in_registers_coils_and_discrete_inputs() -> None:
+    bits = {
+        "low": Cell(address=3, type=NumberType.BIT, bit=0),
+        "high": Cell(address=3, type=NumberType.BIT, bit=15),
+        "coil": Cell(address=1010, function=1, type=NumberType.BIT),
+        "input": Cell(address=1001, function=2, type=NumberType.BIT),
+        "later": Cell(address=1010, function=2, type=NumberType.BIT),
+    }
+    values = tuple(MapValue(id=id_, cell=cell) for id_, cell in bits.items())
+    decoder = MapDecoder(RegisterMap(values=values, base=1, max_gap=10))
+    counts = [(r.function, r.start, r.count) for r in decoder.plan.requests]
+
+    assert counts == [(1, 1009, 1), (2, 1000, 10), (3, 2, 1)]
+    replies = b"\xfe" + b"\x01\xfd" + b"\x80\x00"
+    assert decoder.read(replies).values.tolist() == [0.0, 1.0, 0.0, 1.0, 0.0]
+    replies = b"\x01" + b"\xfe\x02" + b"\x00\x01"
+    assert decoder.read(replies).values.tolist() == [1.0, 0.0, 1.0, 0.0, 1.0]
+
+
+def test_scale_and_offset_are_taken_after_all_else() -> None:
+    value = MapValue(id="v", cell=Cell(address=0), scale=0.001, offset=-2.0)
+
+    assert one(value, words(3500))[0] == pytest.approx(1.5)
+
+
+def test_the_device_says_when_it_measured() -> None:
+    """AMC VIBRO: day first; GC-IMS: seconds with the low word first."""
+    value = MapValue(id="v", cell=Cell(address=0))
+    fields = ("day", "month", "year", "hour", "minute", "second")
+    calendar = CalendarTime(first=Cell(address=1), fields=fields, utc_offset_s=-10800)
+    epoch = EpochTime(
+        seconds=Cell(address=1, type=NumberType.UINT32, byte_order=ByteOrder.CDAB),
+        parts=Cell(address=3, type=NumberType.UINT32),
+    )
+    content = {
+        calendar: words(0, 31, 12, 25, 21, 30, 15),
+        epoch: words(0, 0x1234, 0x6789) + struct.pack(">I", 250_000),
+    }
+
+    times = [
+        MapDecoder(RegisterMap(values=(value,), time=t)).read(c).time_ns for t, c in content.items()
+    ]
+
+    assert times == [1_767_227_415_000_000_000, 0x67891234 * 10**9 + 250_000_000]
+
+
+def test_a_device_whose_clock_makes_no_sense_has_none() -> None:
+    value = MapValue(id="v", cell=Cell(address=0))
+    for time, content in (
+        (CalendarTime(first=Cell(address=1)), words(0, 25, 13, 1, 0, 0, 0)),
+        (EpochTime(seconds=Cell(address=1, type=NumberType.UINT32)), words(0, 0, 0)),
+    ):
+        decoder = MapDecoder(RegisterMap(values=(value,), time=time))
+        assert decoder.read(content).time_ns is None
+
+
+def test_a_heartbeat_alone_says_whether_the_device_lives() -> None:
+    value = MapValue(id="v", cell=Cell(address=0))
+    beating = MapDecoder(RegisterMap(values=(value,), heartbeat=Cell(address=1)))
+    silent = MapDecoder(RegisterMap(values=(value,)))
+
+    assert beating.read(words(1, 5)).alive == beating.read(words(2, 5)).alive
+    assert beating.read(words(1, 5)).alive != beating.read(words(1, 6)).alive
+    assert silent.read(words(1)).alive != silent.read(words(2)).alive
+
+
+def test_content_of_another_length_is_refused() -> None:
+    decoder = MapDecoder(RegisterMap(values=(MapValue(id="v", cell=Cell(address=0)),)))
+
+    with pytest.raises(ValueError, match="4 bytes instead of 2"):
+        decoder.read(words(1, 2))
