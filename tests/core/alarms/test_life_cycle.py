@@ -1,0 +1,229 @@
+"""Chosen lives of an alarm, each as an operator would tell it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from core.alarms.alarm import WITHIN, AlarmLevel, AlarmState, Condition, unknown
+from core.alarms.life_cycle import restored
+from core.alarms.operation import (
+    Acknowledge,
+    ActionRefusedError,
+    Reset,
+    ReturnToService,
+    Shelve,
+    TakeOutOfService,
+    Unshelve,
+    expire,
+)
+
+Make = Callable[..., Any]
+
+ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
+DANGER = Condition(AlarmLevel.DANGER, value=210.0, limit=200.0, reason="above_limit")
+LOST = unknown("sensor_failure")
+
+
+def test_an_alarm_that_comes_is_seen_and_goes_is_normal_again(life: Make) -> None:
+    alarm = life()
+
+    assert alarm.find(ALERT, 10) == ["raised"]
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+    assert alarm.ask(Acknowledge("A. Name", 1, "on my way"), 11) == ["acknowledged"]
+    assert alarm.alarm.state is AlarmState.ACKNOWLEDGED
+    assert alarm.find(WITHIN, 12) == ["returned"]
+    assert alarm.alarm.state is AlarmState.NORMAL
+
+    raised, seen, returned = alarm.events
+    assert (raised.time_ns, raised.value, raised.limit) == (10, 160.0, 150.0)
+    assert (raised.state_before, raised.state_after) == ("normal", "unacknowledged")
+    assert (seen.actor, seen.reason, seen.time_ns) == ("A. Name", "on my way", 11)
+    assert (returned.level, returned.occurrence) == (AlarmLevel.ALERT, 1)
+
+
+def test_one_that_goes_before_anybody_has_seen_it_stays_on_the_list(life: Make) -> None:
+    alarm = life()
+    alarm.find(ALERT, 0)
+
+    alarm.find(WITHIN, 1)
+
+    assert alarm.alarm.state is AlarmState.RETURNED_UNACKNOWLEDGED
+    alarm.ask(Acknowledge("A. Name", 1))
+    assert alarm.alarm.state is AlarmState.NORMAL
+
+
+def test_an_acknowledgement_of_the_last_occurrence_does_not_swallow_the_next(life: Make) -> None:
+    alarm = life()
+    for condition, now in ((ALERT, 0), (WITHIN, 1), (ALERT, 2)):
+        alarm.find(condition, now)
+
+    with pytest.raises(ActionRefusedError, match="occurrence 1 was meant, the newest is 2"):
+        alarm.ask(Acknowledge("A. Name", 1))
+
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+    assert alarm.ask(Acknowledge("A. Name", 2)) == ["acknowledged"]
+    assert alarm.ask(Acknowledge("B. Name", 2)) == []
+
+
+def test_what_gets_worse_must_be_seen_again_and_what_gets_better_need_not(life: Make) -> None:
+    alarm = life()
+    alarm.find(ALERT, 0)
+    alarm.ask(Acknowledge("A. Name", 1))
+
+    assert alarm.find(DANGER, 1) == ["escalated"]
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+    alarm.ask(Acknowledge("A. Name", 2))
+    assert alarm.find(ALERT, 2) == ["eased"]
+    assert alarm.alarm.state is AlarmState.ACKNOWLEDGED
+    assert alarm.alarm.level is AlarmLevel.ALERT
+
+
+def test_a_lost_probe_keeps_an_alarm_active_and_says_that_it_is_not_known(life: Make) -> None:
+    alarm = life()
+    alarm.find(DANGER, 0)
+
+    assert alarm.find(LOST, 1) == ["condition_unknown"]
+    assert alarm.find(LOST, 10**12) == []
+    assert alarm.alarm.level is AlarmLevel.DANGER
+    assert not alarm.alarm.condition.is_known
+    assert alarm.alarm.condition.value == 210.0  # the last that was known
+    assert alarm.events[-1].reason == "sensor_failure"
+    assert alarm.find(WITHIN, 10**12 + 1) == ["condition_known", "returned"]
+
+
+def test_what_is_pending_stays_pending_while_nothing_is_known(life: Make) -> None:
+    alarm = life(on=10)
+    alarm.find(ALERT, 0)
+    alarm.find(ALERT, 6)
+
+    assert alarm.find(LOST, 7) == []
+    assert not alarm.alarm.condition.is_known
+    assert alarm.find(ALERT, 100) == []  # what passed unseen does not count
+    assert alarm.find(ALERT, 103) == []
+    assert alarm.find(ALERT, 104) == ["raised"]
+
+
+def test_a_short_excursion_raises_nothing_and_a_short_return_ends_nothing(life: Make) -> None:
+    alarm = life(on=10, off=20)
+
+    assert alarm.find(ALERT, 0) == alarm.find(ALERT, 9) == alarm.find(WITHIN, 10) == []
+    assert alarm.find(ALERT, 11) == []
+    assert alarm.find(ALERT, 21) == ["raised"]
+    assert alarm.find(WITHIN, 22) == alarm.find(WITHIN, 41) == alarm.find(ALERT, 42) == []
+    assert alarm.find(WITHIN, 43) == []
+    assert alarm.find(WITHIN, 63) == ["returned"]
+
+
+def test_a_danger_too_short_to_count_counts_for_the_alert(life: Make) -> None:
+    alarm = life(on=10)
+    alarm.find(DANGER, 0)
+    alarm.find(ALERT, 6)
+
+    assert alarm.find(ALERT, 10) == ["raised"]
+    assert alarm.alarm.level is AlarmLevel.ALERT
+
+
+def test_a_clock_that_is_put_back_brings_no_delay_forward(life: Make) -> None:
+    alarm = life(on=10)
+
+    for now in (100, 50, 59, 0):
+        assert alarm.find(ALERT, now) == [], now
+    assert alarm.find(ALERT, 1) == ["raised"]  # after 9 ns and 1 ns more
+
+
+def test_a_latched_alarm_stays_until_it_is_seen_and_reset(life: Make) -> None:
+    alarm = life(latching=True)
+    alarm.find(DANGER, 0)
+
+    assert alarm.find(WITHIN, 1) == ["latched"]
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+    with pytest.raises(ActionRefusedError, match="acknowledged before"):
+        alarm.ask(Reset("A. Name"))
+    alarm.ask(Acknowledge("A. Name", 1))
+    assert alarm.alarm.state is AlarmState.ACKNOWLEDGED
+    assert alarm.ask(Reset("A. Name")) == ["reset"]
+    assert alarm.alarm.state is AlarmState.NORMAL
+    with pytest.raises(ActionRefusedError, match="nothing to reset"):
+        alarm.ask(Reset("A. Name"))
+
+
+def test_what_comes_again_while_it_is_latched_is_a_new_occurrence(life: Make) -> None:
+    alarm = life(latching=True)
+    alarm.find(DANGER, 0)
+    alarm.find(WITHIN, 1)
+    alarm.ask(Acknowledge("A. Name", 1))
+
+    assert alarm.find(ALERT, 2) == ["raised"]
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+    assert (alarm.alarm.level, alarm.alarm.is_latched) == (AlarmLevel.DANGER, True)
+    alarm.ask(Acknowledge("A. Name", 2))
+    assert alarm.ask(Reset("A. Name")) == ["reset"]
+    assert (alarm.alarm.level, alarm.alarm.state) == (AlarmLevel.ALERT, AlarmState.ACKNOWLEDGED)
+
+
+def test_a_latch_survives_a_restart(life: Make) -> None:
+    alarm = life(latching=True)
+    alarm.find(DANGER, 0)
+    alarm.find(WITHIN, 1)
+
+    alarm.alarm = restored(alarm.alarm)
+
+    assert alarm.find(WITHIN, 2) == []
+    assert (alarm.alarm.level, alarm.alarm.is_latched) == (AlarmLevel.DANGER, True)
+
+
+def test_a_shelved_alarm_comes_back_by_itself_and_is_announced_if_it_is_active(life: Make) -> None:
+    alarm = life()
+    alarm.find(ALERT, 0)
+    alarm.ask(Acknowledge("A. Name", 1))
+    alarm.ask(Shelve("A. Name", "cable being changed", 50), 5)
+    assert alarm.alarm.state is AlarmState.SHELVED
+
+    same, none = expire(alarm.alarm, 49)
+    back, [event] = expire(alarm.alarm, 50)
+
+    assert (same, none) == (alarm.alarm, ())
+    assert back.state is AlarmState.UNACKNOWLEDGED
+    assert (event.change, event.time_ns, event.actor) == ("unshelved", 50, "")
+
+
+def test_what_is_raised_and_returns_on_the_shelf_still_waits_to_be_seen(life: Make) -> None:
+    alarm = life()
+    alarm.ask(Shelve("A. Name", "test of the probes", 50), 0)
+
+    assert alarm.find(ALERT, 10) == ["raised"]
+    assert alarm.find(WITHIN, 20) == ["returned"]
+    assert alarm.ask(Unshelve("A. Name"), 30) == ["unshelved"]
+
+    assert alarm.alarm.state is AlarmState.RETURNED_UNACKNOWLEDGED
+    assert alarm.ask(Unshelve("A. Name"), 31) == []
+
+
+def test_shelving_needs_a_time_that_is_still_to_come(life: Make) -> None:
+    with pytest.raises(ActionRefusedError, match="has passed already"):
+        life().ask(Shelve("A. Name", "too late", 50), 50)
+
+
+def test_out_of_service_hides_more_than_the_shelf_and_ends_only_by_hand(life: Make) -> None:
+    alarm = life()
+    alarm.find(ALERT, 0)
+    alarm.ask(TakeOutOfService("B. Name", "overhaul"), 1)
+    alarm.ask(Shelve("A. Name", "noise", 50), 2)
+
+    assert alarm.alarm.state is AlarmState.OUT_OF_SERVICE
+    alarm.alarm, _ = expire(alarm.alarm, 60)
+    assert alarm.alarm.state is AlarmState.OUT_OF_SERVICE
+    assert alarm.ask(ReturnToService("B. Name"), 70) == ["returned_to_service"]
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+
+
+def test_a_machine_that_stands_suppresses_and_does_not_clear(life: Make) -> None:
+    alarm = life()
+    alarm.find(DANGER, 0)
+
+    assert alarm.find(unknown("standstill", "standstill"), 1) == ["suppressed"]
+    assert alarm.alarm.state is AlarmState.SUPPRESSED
+    assert alarm.alarm.level is AlarmLevel.DANGER
+    assert alarm.find(DANGER, 2) == ["unsuppressed"]
+    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
