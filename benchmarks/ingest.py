@@ -81,7 +81,7 @@ def padwatch(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 @contextmanager
 def daq(plant: Path) -> Iterator[dict[str, int]]:
     with padwatch("daq", str(plant)) as (_, line):
-        yield json.loads(line)
+        yield {unit: int(found["port"]) for unit, found in json.loads(line).items()}
 
 
 def measure_service(plant: Path, duration_s: float) -> dict[str, Any]:
