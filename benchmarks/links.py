@@ -1,7 +1,7 @@
 """Links that fail and return: when the service notices, and when samples are here again.
 
-The simulated DAQ is a process of its own. One is stopped and continued, so that the connection stays
-but nobody answers; a hundred in one process are started while the service already looks for them.
+The simulated DAQ is a process of its own. One is stopped and continued, so that the connection
+stays but nobody answers; a hundred in one process are started while the service looks for them.
 Times are counted in poll periods, since seconds depend on the plant file.
 """
 
