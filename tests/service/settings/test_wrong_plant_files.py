@@ -35,6 +35,18 @@ UJB = "unit[1].bearing[1]."
         ("port = 0", "port = 70000", f"{UNIT_1}source.port = 70000", "65535"),
         ("port = 0", "port = 502.5", f"{UNIT_1}source.port = 502.5", "integer"),
         (
+            'host = "127.0.0.1"\nport = 0',
+            'host = "127.0.0.1"\ndevice = "/dev/ttyS0"',
+            f"{UNIT_1}source.host = '127.0.0.1'",
+            "host (Modbus TCP) or device (serial line) must be given, found both",
+        ),
+        (
+            'host = "127.0.0.1"\nport = 0',
+            'device_id = 250\ndevice = "/dev/ttyS0"',
+            f"{UNIT_1}source.device_id = 250",
+            "on a serial line must be 1 to 247",
+        ),
+        (
             'kind = "modbus_ring"',
             'kind = "opc"',
             f"{UNIT_1}source.kind = 'opc'",
