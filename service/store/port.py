@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from core.account import Gap
+from core.alarms.alarm import Alarm
+from core.alarms.event import AlarmEvent, AlarmNews
 from core.assessment import Assessment
 from core.quality import Level, Reading
 from service.store.gap_reference import GapReference
@@ -89,11 +91,47 @@ class StoredReadings:
     readings: Mapping[str, Reading]
 
 
+@dataclass(frozen=True)
+class AlarmQuery:
+    """Which events of alarms are wanted, newest first; None where anything will do.
+
+    Parameters
+    ----------
+    before
+        Only events that were stored before this one.
+    limit
+        Most events that are read.
+    start_ns, end_ns
+        From the first, up to but not including the second.
+    """
+
+    before: int = 2**63 - 1
+    limit: int = 100
+    alarm: str | None = None
+    unit: str | None = None
+    kind: str | None = None
+    start_ns: int = 0
+    end_ns: int = 2**63 - 1
+
+
+@dataclass(frozen=True)
+class StoredEvent:
+    """An event of an alarm with the number that the store gave it; later ones have higher ones."""
+
+    id: int
+    event: AlarmEvent
+
+
 class Store(Protocol):
     """Durable results. What `append` has returned from is on the disk."""
 
-    def append(self, assessments: Sequence[Assessment], gaps: Sequence[UnitGap]) -> None:
-        """Write all or nothing; the same assessment twice counts once."""
+    def append(
+        self,
+        assessments: Sequence[Assessment],
+        gaps: Sequence[UnitGap],
+        alarms: Sequence[AlarmNews] = (),
+    ) -> None:
+        """Write all or nothing; the same assessment or event twice counts once."""
         ...
 
     def trend(self, query: TrendQuery) -> Trend:
@@ -118,6 +156,14 @@ class Store(Protocol):
 
     def reference_history(self, unit: str, bearing: str) -> Sequence[GapReference]:
         """Read what was ever set for a bearing, newest first; at most the newest thousand."""
+        ...
+
+    def alarms(self) -> Sequence[Alarm]:
+        """Read every alarm that ever had an event, as it was after its newest."""
+        ...
+
+    def alarm_events(self, query: AlarmQuery) -> Sequence[StoredEvent]:
+        """Read events of alarms, newest first."""
         ...
 
     def close(self) -> None:

@@ -72,6 +72,57 @@ MIGRATIONS = (
     CREATE TRIGGER gap_reference_kept BEFORE DELETE ON gap_reference
     BEGIN SELECT RAISE(ABORT, 'references are kept'); END;
     """,
+    """
+    CREATE TABLE alarm (
+        id TEXT PRIMARY KEY,
+        unit TEXT NOT NULL,
+        subject TEXT NOT NULL,
+        kind TEXT NOT NULL,
+        level INTEGER CHECK (level IN (1, 2)),
+        occurrence INTEGER NOT NULL CHECK (occurrence >= 0),
+        is_acknowledged INTEGER NOT NULL CHECK (is_acknowledged IN (0, 1)),
+        raised_ns INTEGER,
+        n_events INTEGER NOT NULL CHECK (n_events > 0),
+        is_known INTEGER NOT NULL CHECK (is_known IN (0, 1)),
+        condition_level INTEGER CHECK (condition_level IN (1, 2)),
+        value REAL,
+        limit_value REAL,
+        reason TEXT NOT NULL,
+        suppressed_by TEXT,
+        is_latched INTEGER NOT NULL CHECK (is_latched IN (0, 1)),
+        shelf_actor TEXT,
+        shelf_reason TEXT,
+        shelf_since_ns INTEGER,
+        shelf_until_ns INTEGER,
+        outage_actor TEXT,
+        outage_reason TEXT,
+        outage_since_ns INTEGER
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE alarm_event (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        alarm TEXT NOT NULL,
+        number INTEGER NOT NULL CHECK (number > 0),
+        unit TEXT NOT NULL,
+        subject TEXT NOT NULL,
+        kind TEXT NOT NULL,
+        change TEXT NOT NULL,
+        level INTEGER CHECK (level IN (1, 2)),
+        state_before TEXT NOT NULL,
+        state_after TEXT NOT NULL,
+        time_ns INTEGER NOT NULL,
+        occurrence INTEGER NOT NULL,
+        value REAL,
+        limit_value REAL,
+        actor TEXT NOT NULL,
+        reason TEXT NOT NULL,
+        UNIQUE (alarm, number)
+    ) STRICT;
+    CREATE INDEX alarm_event_of_unit ON alarm_event (unit, id);
+    CREATE TRIGGER alarm_event_kept_as_told BEFORE UPDATE ON alarm_event
+    BEGIN SELECT RAISE(ABORT, 'events of alarms are kept as they were told'); END;
+    CREATE TRIGGER alarm_event_kept BEFORE DELETE ON alarm_event
+    BEGIN SELECT RAISE(ABORT, 'events of alarms are kept'); END;
+    """,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -6,19 +6,20 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from threading import Lock
 
-import numpy as np
-
 from core.account import Gap
+from core.alarms.alarm import Alarm
+from core.alarms.event import AlarmNews
 from core.assessment import Assessment
-from core.quality import Level
 from core.quantities import CATALOGUE
 from service.origin import Origin
-from service.store.buckets import Readings, bucket_width_ns, bucketed, single_points
+from service.store.alarms import insert_alarms, select_alarms, select_events
+from service.store.buckets import bucket_width_ns, bucketed, single_points
 from service.store.codec import Layout, columns_of
 from service.store.gap_reference import GapReference
 from service.store.newest import select_newest
 from service.store.port import (
-    QueryTooLargeError,
+    AlarmQuery,
+    StoredEvent,
     StoredReadings,
     StoreError,
     Trend,
@@ -27,9 +28,7 @@ from service.store.port import (
 )
 from service.store.references import insert_reference, select_history, select_in_force
 from service.store.schema import migrate
-
-MAX_ROWS = 1_000_000
-"""Most readings that one query may touch: about 300 MB of rows and a few seconds."""
+from service.store.trends import select_readings, storable
 
 BUSY_TIMEOUT_S = 5.0
 
@@ -39,20 +38,6 @@ INSERT_ASSESSMENT = """
 """
 INSERT_GAP = "INSERT INTO gap VALUES (?,?,?,?,?) ON CONFLICT DO NOTHING"
 """Not OR IGNORE, which would silently drop a row that breaks any other rule, too."""
-
-MATCHING = """
-    FROM assessment
-    WHERE series = (SELECT id FROM series WHERE unit = :unit AND bearing = :bearing)
-    AND time_ns >= :start_ns AND time_ns < :end_ns
-    AND (:eccentricity_low IS NULL OR eccentricity_ratio >= :eccentricity_low)
-    AND (:eccentricity_high IS NULL OR eccentricity_ratio <= :eccentricity_high)
-    AND (:oil_low IS NULL OR oil_temperature_c >= :oil_low)
-    AND (:oil_high IS NULL OR oil_temperature_c <= :oil_high)
-"""
-COUNT_ROWS = "SELECT count(*)" + MATCHING
-SELECT_ROWS = (
-    "SELECT time_ns, layout, reading_values, reading_qualities" + MATCHING + "ORDER BY time_ns"
-)
 
 
 class SqliteStore:
@@ -91,8 +76,13 @@ class SqliteStore:
         with self._lock:
             self._writer.close()
 
-    def append(self, assessments: Sequence[Assessment], gaps: Sequence[UnitGap]) -> None:
-        """Write assessments and gaps in one transaction; durable when this returns.
+    def append(
+        self,
+        assessments: Sequence[Assessment],
+        gaps: Sequence[UnitGap],
+        alarms: Sequence[AlarmNews] = (),
+    ) -> None:
+        """Write assessments, gaps and news of alarms in one transaction; durable when this returns.
 
         Raises
         ------
@@ -103,13 +93,15 @@ class SqliteStore:
             rows = [self._row(assessment) for assessment in assessments]
             self._writer.executemany(INSERT_ASSESSMENT, rows)
             self._writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
+            insert_alarms(self._writer, alarms)
 
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
-        readings = self._readings(query)
+        with self._reader() as reader:
+            readings = select_readings(reader, query)
         if readings.time_ns.size <= query.max_points:
             return single_points(readings, query.hole_ns)
-        start_ns, end_ns = _storable(query.start_ns), _storable(query.end_ns)
+        start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)
         return bucketed(readings, bucket_width_ns(start_ns, end_ns, query.max_points))
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
@@ -118,7 +110,7 @@ class SqliteStore:
             rows = reader.execute(
                 "SELECT epoch, first_index, n_samples, stop_ns FROM gap"
                 " WHERE unit = ? AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index",
-                (unit, _storable(start_ns), _storable(end_ns)),
+                (unit, storable(start_ns), storable(end_ns)),
             )
             return [Gap(*row) for row in rows]
 
@@ -147,6 +139,16 @@ class SqliteStore:
         """Read what was ever set for a bearing, newest first."""
         with self._reader() as reader:
             return select_history(reader, unit, bearing)
+
+    def alarms(self) -> list[Alarm]:
+        """Read every alarm that ever had an event, as it was after its newest."""
+        with self._reader() as reader:
+            return select_alarms(reader)
+
+    def alarm_events(self, query: AlarmQuery) -> list[StoredEvent]:
+        """Read events of alarms, newest first."""
+        with self._reader() as reader:
+            return select_events(reader, query)
 
     def _row(self, assessment: Assessment) -> tuple[object, ...]:
         values, qualities = self._layout.encode(assessment.readings)
@@ -196,21 +198,6 @@ class SqliteStore:
         )
         return int(found.fetchone()[0])
 
-    def _readings(self, query: TrendQuery) -> Readings:
-        arguments = _arguments(query)
-        with self._reader() as reader:
-            n_rows = int(reader.execute(COUNT_ROWS, arguments).fetchone()[0])
-            if n_rows > MAX_ROWS:
-                raise QueryTooLargeError(
-                    f"{n_rows} readings in this range, at most {MAX_ROWS} are read at once"
-                )
-            rows = reader.execute(SELECT_ROWS, arguments).fetchall()
-            layouts = {
-                id_: Layout.loads(quantities, reasons)
-                for id_, quantities, reasons in reader.execute("SELECT * FROM layout")
-            }
-        return _decoded(rows, layouts, query.quantities)
-
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         self._writer.execute("BEGIN IMMEDIATE")
@@ -242,40 +229,3 @@ class SqliteStore:
 def _gap_row(found: UnitGap) -> tuple[object, ...]:
     gap = found.gap
     return (found.unit, gap.epoch, gap.first_index, gap.n_samples, gap.stop_ns)
-
-
-def _storable(time_ns: int) -> int:
-    """The nearest time that a row can have: from 1970 to 2262."""
-    return max(0, min(time_ns, 2**63 - 1))
-
-
-def _arguments(query: TrendQuery) -> dict[str, object]:
-    return {
-        "unit": query.unit,
-        "bearing": query.bearing,
-        "start_ns": _storable(query.start_ns),
-        "end_ns": _storable(query.end_ns),
-        "eccentricity_low": query.eccentricity_ratio.low,
-        "eccentricity_high": query.eccentricity_ratio.high,
-        "oil_low": query.oil_temperature_c.low,
-        "oil_high": query.oil_temperature_c.high,
-    }
-
-
-def _decoded(
-    rows: list[tuple[int, int, bytes, bytes]],
-    layouts: dict[int, Layout],
-    quantities: tuple[str, ...],
-) -> Readings:
-    time_ns = np.array([row[0] for row in rows], dtype=np.int64)
-    layout_of_row = np.array([row[1] for row in rows], dtype=np.int64)
-    value = {name: np.full(len(rows), np.nan) for name in quantities}
-    level = {name: np.full(len(rows), Level.BAD, dtype=np.uint8) for name in quantities}
-    for id_ in np.unique(layout_of_row).tolist():
-        layout, where = layouts[id_], np.flatnonzero(layout_of_row == id_)
-        numbers, levels = layout.decode([rows[i][2] for i in where], [rows[i][3] for i in where])
-        for name in set(quantities) & set(layout.quantities):
-            column = layout.quantities.index(name)
-            value[name][where] = numbers[:, column]
-            level[name][where] = levels[:, column]
-    return Readings(time_ns, value, level)

@@ -8,7 +8,7 @@ import httpx2
 import pytest
 
 from core.assessment import Assessment
-from service.store import sqlite
+from service.store import trends
 
 AsProblem = Callable[[httpx2.Response], dict[str, Any]]
 
@@ -164,7 +164,7 @@ async def test_nothing_can_be_written(running: Any, as_problem: AsProblem, metho
 async def test_a_range_that_could_take_all_memory_is_refused(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sqlite, "MAX_ROWS", 3)
+    monkeypatch.setattr(trends, "MAX_ROWS", 3)
 
     problem = await running.problem(TRENDS, 422, **GOOD)
 

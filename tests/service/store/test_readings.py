@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from core.assessment import Assessment
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
 from core.quantities import CATALOGUE
-from service.store import sqlite
+from service.store import sqlite, trends
 from service.store.codec import Layout
 from service.store.port import QueryTooLargeError, StoreError, TrendQuery, UnitGap, ValueRange
 from service.store.sqlite import SqliteStore
@@ -196,7 +196,7 @@ def test_a_query_that_could_take_all_memory_is_refused_with_its_size(
     store: SqliteStore, assessment: Build, query: Ask, at: At, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store.append([assessment(at(i), speed_rpm=92.3) for i in range(11)], [])
-    monkeypatch.setattr(sqlite, "MAX_ROWS", 10)
+    monkeypatch.setattr(trends, "MAX_ROWS", 10)
 
     with pytest.raises(QueryTooLargeError, match="11 readings in this range, at most 10"):
         store.trend(query())

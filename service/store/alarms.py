@@ -1,0 +1,157 @@
+"""Alarms in SQLite: what each is now, and every event there ever was, numbered without a hole."""
+
+import sqlite3
+from collections.abc import Iterable
+from typing import Any
+
+from core.alarms.alarm import (
+    Alarm,
+    AlarmIdentity,
+    AlarmKind,
+    AlarmLevel,
+    AlarmState,
+    Condition,
+    Hold,
+)
+from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from service.store.port import AlarmQuery, StoredEvent, StoreError
+
+ALARM_COLUMNS = (
+    "id, unit, subject, kind, level, occurrence, is_acknowledged, raised_ns, n_events, is_known,"
+    " condition_level, value, limit_value, reason, suppressed_by, is_latched,"
+    " shelf_actor, shelf_reason, shelf_since_ns, shelf_until_ns,"
+    " outage_actor, outage_reason, outage_since_ns"
+)
+N_ALARM_COLUMNS = len(ALARM_COLUMNS.split(","))
+UPSERT = (
+    f"INSERT OR REPLACE INTO alarm ({ALARM_COLUMNS})"  # noqa: S608
+    f" SELECT {', '.join(f'?{n + 1}' for n in range(N_ALARM_COLUMNS))}"
+    " WHERE NOT EXISTS (SELECT 1 FROM alarm WHERE id = ?1 AND n_events > ?9)"
+)
+"""What is written twice, as after an interrupted write, never overwrites what came later."""
+
+EVENT_COLUMNS = (
+    "alarm, number, unit, subject, kind, change, level, state_before, state_after, time_ns,"
+    " occurrence, value, limit_value, actor, reason"
+)
+INSERT_EVENT = (
+    f"INSERT INTO alarm_event ({EVENT_COLUMNS})"  # noqa: S608
+    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?) ON CONFLICT (alarm, number) DO NOTHING"
+)
+SELECT_EVENTS = f"""
+    SELECT id, {EVENT_COLUMNS} FROM alarm_event
+    WHERE id < :before
+    AND (:alarm IS NULL OR alarm = :alarm)
+    AND (:unit IS NULL OR unit = :unit)
+    AND (:kind IS NULL OR kind = :kind)
+    AND time_ns >= :start_ns AND time_ns < :end_ns
+    ORDER BY id DESC LIMIT :limit
+"""  # noqa: S608
+
+
+def insert_alarms(writer: sqlite3.Connection, news: Iterable[AlarmNews]) -> None:
+    """Add events and bring the alarms to what they are after them."""
+    for told in news:
+        writer.executemany(INSERT_EVENT, [_event_row(event) for event in told.events])
+        writer.execute(UPSERT, _alarm_row(told.alarm))
+
+
+def select_alarms(reader: sqlite3.Connection) -> list[Alarm]:
+    """Every alarm that ever had an event, as it was after its newest."""
+    return [_alarm(row) for row in reader.execute(f"SELECT {ALARM_COLUMNS} FROM alarm ORDER BY id")]  # noqa: S608
+
+
+def select_events(reader: sqlite3.Connection, query: AlarmQuery) -> list[StoredEvent]:
+    """Events, newest first."""
+    rows = reader.execute(SELECT_EVENTS, vars(query))
+    return [StoredEvent(int(row[0]), _event(row[1:])) for row in rows]
+
+
+def _alarm_row(alarm: Alarm) -> tuple[object, ...]:
+    identity, condition = alarm.identity, alarm.condition
+    shelf, outage = alarm.shelf, alarm.outage
+    return (
+        *(identity.id, identity.unit, identity.subject, identity.kind.value),
+        *(alarm.level, alarm.occurrence, alarm.is_acknowledged, alarm.raised_ns, alarm.n_events),
+        *(condition.is_known, condition.level, condition.value, condition.limit),
+        *(str(condition.reason), alarm.suppressed_by, alarm.is_latched),
+        *(*_hold_row(shelf), shelf.until_ns if shelf else None),
+        *_hold_row(outage),
+    )
+
+
+def _hold_row(hold: Hold | None) -> tuple[str | None, str | None, int | None]:
+    return (None, None, None) if hold is None else (hold.actor, hold.reason, hold.since_ns)
+
+
+def _event_row(event: AlarmEvent) -> tuple[object, ...]:
+    identity = event.identity
+    return (
+        *(identity.id, event.number, identity.unit, identity.subject, identity.kind.value),
+        *(event.change.value, event.level, event.state_before.value, event.state_after.value),
+        *(event.time_ns, event.occurrence, event.value, event.limit, event.actor),
+        str(event.reason),
+    )
+
+
+def _alarm(row: tuple[Any, ...]) -> Alarm:
+    found = dict(zip(ALARM_COLUMNS.split(", "), row, strict=True))
+    try:
+        return Alarm(
+            identity=_identity(found),
+            level=_level(found["level"]),
+            occurrence=found["occurrence"],
+            is_acknowledged=bool(found["is_acknowledged"]),
+            raised_ns=found["raised_ns"],
+            n_events=found["n_events"],
+            condition=Condition(
+                level=_level(found["condition_level"]),
+                is_known=bool(found["is_known"]),
+                value=found["value"],
+                limit=found["limit_value"],
+                reason=found["reason"],
+                suppressed_by=found["suppressed_by"],
+            ),
+            suppressed_by=found["suppressed_by"],
+            shelf=_hold(found, "shelf", found["shelf_until_ns"]),
+            outage=_hold(found, "outage", None),
+            is_latched=bool(found["is_latched"]),
+        )
+    except ValueError as error:
+        raise StoreError(f"alarm {found['id']}: {error}") from error
+
+
+def _event(row: tuple[Any, ...]) -> AlarmEvent:
+    found = dict(zip(EVENT_COLUMNS.split(", "), row, strict=True))
+    try:
+        return AlarmEvent(
+            identity=_identity(found),
+            number=found["number"],
+            change=AlarmChange(found["change"]),
+            level=_level(found["level"]),
+            state_before=AlarmState(found["state_before"]),
+            state_after=AlarmState(found["state_after"]),
+            time_ns=found["time_ns"],
+            occurrence=found["occurrence"],
+            value=found["value"],
+            limit=found["limit_value"],
+            actor=found["actor"],
+            reason=found["reason"],
+        )
+    except ValueError as error:
+        raise StoreError(f"event {found['number']} of alarm {found['alarm']}: {error}") from error
+
+
+def _identity(found: dict[str, Any]) -> AlarmIdentity:
+    return AlarmIdentity(found["unit"], found["subject"], AlarmKind(found["kind"]))
+
+
+def _level(number: int | None) -> AlarmLevel | None:
+    return None if number is None else AlarmLevel(number)
+
+
+def _hold(found: dict[str, Any], name: str, until_ns: int | None) -> Hold | None:
+    if found[f"{name}_actor"] is None:
+        return None
+    reason, since_ns = found[f"{name}_reason"], found[f"{name}_since_ns"]
+    return Hold(found[f"{name}_actor"], reason, since_ns, until_ns)

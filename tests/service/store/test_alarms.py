@@ -1,0 +1,179 @@
+"""Alarms on the disk: as they are, with all that has ever happened to them."""
+
+import sqlite3
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from core.alarms.alarm import (
+    Alarm,
+    AlarmIdentity,
+    AlarmKind,
+    AlarmLevel,
+    AlarmRule,
+    Condition,
+    unknown,
+)
+from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.life_cycle import advance
+from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
+from service.store.port import AlarmQuery, StoreError, UnitGap
+from service.store.sqlite import SqliteStore
+
+T0 = 1_767_225_600_000_000_000
+ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+
+
+def identity(subject: str = "UJB", unit: str = "U1") -> AlarmIdentity:
+    return AlarmIdentity(unit, subject, AlarmKind.SHAFT_X)
+
+
+def raised(n_ns: int = T0, subject: str = "UJB", unit: str = "U1") -> AlarmNews:
+    alarm, events = advance(Alarm(identity(subject, unit)), ALERT, n_ns, AlarmRule())
+    return AlarmNews(alarm, events)
+
+
+def then(news: AlarmNews, condition: Condition, now_ns: int) -> AlarmNews:
+    return AlarmNews(*advance(news.alarm, condition, now_ns, AlarmRule()))
+
+
+def as_stored(alarm: Alarm) -> Alarm:
+    """All of an alarm but its timers, which a restart forgets."""
+    condition = replace(alarm.condition, suppressed_by=alarm.suppressed_by)
+    return replace(Alarm(alarm.identity), **{**vars(alarm), "condition": condition, "timers": X})
+
+
+X = Alarm(identity()).timers
+
+ACTIONS = [
+    lambda alarm: Acknowledge("A. Name", alarm.occurrence, "seen, Ünïcode 'quoted'"),
+    lambda _: Shelve("B. Name", "cable", T0 + 10**12),
+    lambda _: TakeOutOfService("C. Name", "overhaul"),
+]
+
+LIFE = st.lists(
+    st.sampled_from(
+        [
+            ALERT,
+            Condition(AlarmLevel.DANGER, value=250.0, limit=200.0),
+            Condition(value=3.0),
+            unknown("sensor_failure"),
+            unknown("standstill", "standstill"),
+            *ACTIONS,
+        ]
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+@given(steps=LIFE)
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_an_alarm_and_its_events_are_read_as_they_were_written(
+    tmp_path: Path, steps: list[object]
+) -> None:
+    path = tmp_path / "padwatch.sqlite3"
+    path.unlink(missing_ok=True)
+    store = SqliteStore(path)
+    alarm, told = Alarm(identity()), list[AlarmEvent]()
+    for number, step in enumerate(steps):
+        if isinstance(step, Condition):
+            alarm, events = advance(alarm, step, T0 + number, AlarmRule())
+        else:
+            alarm, events = operate(alarm, step(alarm), T0 + number)
+        if events:
+            store.append([], [], [AlarmNews(alarm, events)])
+            told += events
+            assert store.alarms() == [as_stored(alarm)]
+    found = [stored.event for stored in store.alarm_events(AlarmQuery(limit=1000))]
+    store.close()
+    assert found == told[::-1]
+
+
+def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later(
+    store: SqliteStore,
+) -> None:
+    first = raised()
+    second = then(first, Condition(), T0 + 5)
+
+    store.append([], [], [first])
+    store.append([], [], [first, second])
+    store.append([], [], [first])
+
+    assert store.alarms() == [as_stored(second.alarm)]
+    assert [s.event.number for s in store.alarm_events(AlarmQuery())] == [2, 1]
+
+
+def test_news_of_alarms_stands_or_falls_with_the_gap_it_came_with(
+    store: SqliteStore, path: Path, gap: Callable[..., UnitGap]
+) -> None:
+    with pytest.raises(StoreError, match="NOT NULL"):
+        store.append([], [gap(unit=None)], [raised()])
+    assert store.alarms() == []
+
+    refuse = "CREATE TRIGGER no BEFORE INSERT ON alarm BEGIN SELECT RAISE(ABORT, 'no'); END;"
+    with sqlite3.connect(path) as connection:
+        connection.execute(refuse)
+    connection.close()
+    with pytest.raises(StoreError, match="no"):
+        store.append([], [gap()], [raised()])
+    assert store.gaps("U1", 0, 2**62) == []
+    assert store.alarm_events(AlarmQuery()) == []
+
+
+def test_events_are_found_by_alarm_unit_kind_and_time_page_by_page(store: SqliteStore) -> None:
+    store.append([], [], [raised(T0 + n, "UJB" if n % 2 else "LJB", f"U{n}") for n in range(10)])
+
+    def found(**wanted: object) -> list[str]:
+        events = store.alarm_events(AlarmQuery(**wanted))  # type: ignore[arg-type]
+        return [stored.event.identity.id for stored in events]
+
+    assert found(unit="U3") == ["U3:UJB:order1_shaft_x"]
+    assert found(alarm="U4:LJB:order1_shaft_x") == ["U4:LJB:order1_shaft_x"]
+    assert found(kind="link_lost") == []
+    assert len(found(kind="order1_shaft_x")) == 10
+    assert len(found(start_ns=T0 + 2, end_ns=T0 + 5)) == 3
+    pages, before = [], 2**63 - 1
+    while page := store.alarm_events(AlarmQuery(before=before, limit=4)):
+        pages.append([stored.event.time_ns - T0 for stored in page])
+        before = page[-1].id
+    assert pages == [[9, 8, 7, 6], [5, 4, 3, 2], [1, 0]]
+
+
+@pytest.mark.parametrize(
+    "statement", ["UPDATE alarm_event SET actor = 'x'", "DELETE FROM alarm_event"]
+)
+def test_no_event_is_ever_changed_or_taken_away(
+    store: SqliteStore, path: Path, statement: str
+) -> None:
+    store.append([], [], [raised()])
+    connection = sqlite3.connect(path)
+    with pytest.raises(sqlite3.IntegrityError, match="are kept"):
+        connection.execute(statement)
+    connection.close()
+
+
+def test_a_database_from_before_alarms_is_brought_up_to_date(path: Path) -> None:
+    from service.store.schema import APPLICATION_IDS, MIGRATIONS, Origin
+
+    path.parent.mkdir(parents=True)
+    connection = sqlite3.connect(path)
+    for script in MIGRATIONS[:3]:
+        connection.executescript(script)
+    connection.execute("INSERT INTO gap VALUES ('U1', 1, 2, 3, 4)")
+    connection.execute(f"PRAGMA application_id = {APPLICATION_IDS[Origin.LIVE]}")
+    connection.execute("PRAGMA user_version = 3")
+    connection.commit()
+    connection.close()
+
+    store = SqliteStore(path)
+    store.append([], [], [raised()])
+
+    assert len(store.alarms()) == len(store.gaps("U1", 0, 10)) == 1
+    store.close()
