@@ -3,11 +3,13 @@
 import asyncio
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import structlog
 
 from acquisition.clock import Clock
+from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from service.live import LiveView
 from service.store.port import Store, StoreError, UnitGap
@@ -16,13 +18,19 @@ log = structlog.get_logger()
 
 RETRY_S = 1.0
 
+MAX_NEWS = 100_000
+"""News of alarms that wait for a store that does not answer; about 100 MB."""
+
+T = TypeVar("T")
+
 
 @dataclass(frozen=True)
 class Findings:
     """What one block has taught: to be stored together or not at all."""
 
-    assessments: Sequence[Assessment]
-    gaps: Sequence[UnitGap]
+    assessments: Sequence[Assessment] = ()
+    gaps: Sequence[UnitGap] = ()
+    alarms: Sequence[AlarmNews] = ()
 
 
 class Recorder:
@@ -32,43 +40,59 @@ class Recorder:
     ----------
     capacity
         Most findings that wait for a store that does not answer; beyond it the oldest are given up
-        and counted in :attr:`LiveView.n_unstored`.
+        and counted in :attr:`LiveView.n_unstored`. News of alarms wait apart from them, up to
+        `MAX_NEWS`, and are given up last.
     """
 
     def __init__(self, store: Store, live: LiveView, clock: Clock, capacity: int = 5000) -> None:
         self._store, self._live, self._clock = store, live, clock
         self._capacity = capacity
         self._waiting: deque[Findings] = deque()
+        self._alarms: deque[AlarmNews] = deque()
         self._news = asyncio.Event()
+        self._progress = asyncio.Condition()
 
     def put(self, findings: Findings) -> None:
         """Queue findings."""
-        if len(self._waiting) >= self._capacity:
+        if findings.assessments or findings.gaps:
+            self._waiting.append(replace(findings, alarms=()))
+        if len(self._waiting) > self._capacity:
             self._waiting.popleft()
             self._live.n_unstored += 1
-        self._waiting.append(findings)
+        self._alarms += findings.alarms
+        while len(self._alarms) > MAX_NEWS:
+            self._alarms.popleft()
+            self._live.n_unstored += 1
         self._news.set()
+
+    async def stored(self) -> None:
+        """Wait until all news of alarms that there is now is on the disk, however long it takes."""
+        mine = self._alarms[-1] if self._alarms else None
+        async with self._progress:
+            await self._progress.wait_for(lambda: all(news is not mine for news in self._alarms))
 
     async def run(self) -> None:
         """Write whatever is queued, for ever."""
         while True:
             await self._news.wait()
             self._news.clear()
-            while self._waiting:
+            while self._waiting or self._alarms:
                 if not await self._write():
                     await self._clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
         """Write what is queued now, once; used at the end."""
-        if self._waiting and not await self._write():
-            log.error("results are lost", n_findings=len(self._waiting))
+        if (self._waiting or self._alarms) and not await self._write():
+            log.error(
+                "results are lost", n_findings=len(self._waiting), n_alarm_news=len(self._alarms)
+            )
 
     async def _write(self) -> bool:
-        batch = list(self._waiting)
+        batch, alarms = list(self._waiting), list(self._alarms)
         assessments = [a for findings in batch for a in findings.assessments]
         gaps = [gap for findings in batch for gap in findings.gaps]
         try:
-            await asyncio.to_thread(self._store.append, assessments, gaps)
+            await asyncio.to_thread(self._store.append, assessments, gaps, alarms)
         except StoreError as error:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
@@ -77,7 +101,15 @@ class Recorder:
         if self._live.store_error is not None:
             log.info("results are being stored again")
         self._live.store_error = None
-        written = {id(findings) for findings in batch}
-        while self._waiting and id(self._waiting[0]) in written:
-            self._waiting.popleft()
+        _drop(self._waiting, batch)
+        _drop(self._alarms, alarms)
+        async with self._progress:
+            self._progress.notify_all()
         return True
+
+
+def _drop(queue: deque[T], written: Sequence[T]) -> None:
+    """Take off the queue what has been written, and nothing that has come since."""
+    ids = {id(entry) for entry in written}
+    while queue and id(queue[0]) in ids:
+        queue.popleft()

@@ -5,6 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from core.estimators import PREFERENCE, Estimator
+from service.settings.alarms import BearingAlarmSettings
 from service.settings.base import Identifier, MisfitError, Settings
 
 MicrometrePair = tuple[
@@ -106,11 +107,19 @@ class BearingSettings(Settings):
     that has a number. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
     "ratio_order1"."""
 
+    alarms: BearingAlarmSettings = BearingAlarmSettings()
+    """Limits that raise alarms; none unless given."""
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         probes = (self.opposite_x, self.opposite_y)
         if any(probes) != (self.opposite_reference_um is not None):
             raise MisfitError(
                 "opposite probes and their reference need each other", "opposite_reference_um"
+            )
+        if self.alarms.oil_temperature_c is not None and self.oil_temperature is None:
+            raise MisfitError(
+                "needs the bearing's oil_temperature, the slow channel that measures it",
+                *("alarms", "oil_temperature_c"),
             )
         return self

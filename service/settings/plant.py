@@ -6,6 +6,7 @@ from typing import Annotated, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from core.units import hz_from_rpm
+from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
 from service.settings.units import UnitSettings
 
@@ -147,6 +148,12 @@ class PlantFile(Settings):
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments and averaging."""
+
+    alarms: AlarmSettings = AlarmSettings()
+    """What raises an alarm on every unit."""
+
+    capture: CaptureSettings = CaptureSettings()
+    """Samples that are kept around an alarm."""
 
     unit: Annotated[tuple[UnitSettings, ...], Field(min_length=1, max_length=200)]
     """Generating units."""

@@ -1,0 +1,148 @@
+"""`AlarmEngine`: the alarms of all units, fed by the runner, the clock and people."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.alarm import Alarm, AlarmKind, AlarmState
+from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.operation import Action
+from core.alarms.unit_alarms import UnitAlarms
+from core.assessment import Assessment
+from core.blocks import SampleBlock
+from service.recorder import Findings
+
+log = structlog.get_logger()
+
+TICK_S = 0.5
+
+LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
+
+
+@dataclass(frozen=True)
+class AlarmCount:
+    """How many alarms are on the list.
+
+    Parameters
+    ----------
+    n_active
+        Active and not hidden.
+    n_unacknowledged
+        Active or returned, not hidden, and nobody has seen their newest occurrence.
+    n_hidden
+        Shelved, suppressed or out of service.
+    n_unjudged
+        Not active, not hidden, and what they watch cannot be judged now.
+    """
+
+    n_active: int
+    n_unacknowledged: int
+    n_hidden: int
+    n_unjudged: int
+
+
+class AlarmEngine:
+    """Keeps all alarms; works on the event loop and never waits.
+
+    Parameters
+    ----------
+    units
+        Alarms of each unit.
+    put
+        Takes what is to be stored.
+    """
+
+    def __init__(
+        self, units: Mapping[str, UnitAlarms], put: Callable[[Findings], None], clock: Clock
+    ) -> None:
+        self._units, self._put, self._clock = units, put, clock
+
+    def restore(self, alarms: Iterable[Alarm]) -> None:
+        """Go on where the service stopped, before anything else arrives."""
+        now_ns, found = self._clock.now_ns(), list(alarms)
+        for unit, own in self._units.items():
+            mine = [alarm for alarm in found if alarm.identity.unit == unit]
+            self._publish(own.restore(mine, now_ns))
+
+    def take(self, block: SampleBlock, assessments: Sequence[Assessment]) -> list[AlarmNews]:
+        """Take in a block and what it has taught; the news is to be stored with it."""
+        news = self._units[block.unit].take(block, assessments, self._clock.now_ns())
+        _log(news)
+        return news
+
+    def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
+        """Note whether samples of a unit arrive."""
+        self._publish(self._units[unit].link(is_connected, reason, self._clock.now_ns()))
+
+    async def run(self) -> None:
+        """Let time pass for lost links and for what is shelved, for ever."""
+        while True:
+            await self._clock.sleep(TICK_S)
+            self.tick()
+
+    def tick(self) -> None:
+        """Look at the host's clock once."""
+        for own in self._units.values():
+            self._publish(own.tick(self._clock.now_ns()))
+
+    def operate(self, id_: str, action: Action) -> Alarm:
+        """Do what somebody asks for; return the alarm as it is then.
+
+        Raises
+        ------
+        LookupError
+            If there is no such alarm.
+        ActionRefusedError
+            If it does not fit the alarm as it is now.
+        """
+        own = self._units[id_.partition(":")[0]]
+        self._publish(own.operate(id_, action, self._clock.now_ns()))
+        return own.alarm(id_)
+
+    def alarm(self, id_: str) -> Alarm:
+        """Look an alarm up. Raises `LookupError` if there is none."""
+        return self._units[id_.partition(":")[0]].alarm(id_)
+
+    @property
+    def alarms(self) -> list[Alarm]:
+        """All alarms, whatever their state."""
+        return [alarm for own in self._units.values() for alarm in own.alarms]
+
+    def is_judged(self, alarm: Alarm) -> bool:
+        """Whether what an alarm watches is known now; without a link nothing but the link is."""
+        if alarm.identity.kind is AlarmKind.LINK_LOST:
+            return True
+        return alarm.condition.is_known and self._units[alarm.identity.unit].is_connected
+
+    def count(self) -> AlarmCount:
+        """How many alarms are on the list."""
+        alarms = self.alarms
+        hidden = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
+        shown = [alarm for alarm in alarms if alarm.state not in hidden]
+        return AlarmCount(
+            n_active=sum(alarm.level is not None for alarm in shown),
+            n_unacknowledged=sum(not alarm.is_acknowledged for alarm in shown),
+            n_hidden=len(alarms) - len(shown),
+            n_unjudged=sum(a.level is None and not self.is_judged(a) for a in shown),
+        )
+
+    def _publish(self, news: list[AlarmNews]) -> None:
+        """Store what no block has brought."""
+        _log(news)
+        if news:
+            self._put(Findings(alarms=news))
+
+
+def _log(news: Iterable[AlarmNews]) -> None:
+    for told in news:
+        for event in told.events:
+            if event.change in LOGGED:
+                _log_event(event)
+
+
+def _log_event(event: AlarmEvent) -> None:
+    level = event.level.name.lower() if event.level else None
+    tell = log.info if event.change is AlarmChange.RETURNED else log.warning
+    tell(f"alarm {event.change}", alarm=event.identity.id, level=level, reason=str(event.reason))
