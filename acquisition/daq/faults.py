@@ -6,7 +6,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.modbus.profile import U32, Slot
+from acquisition.modbus.ring_layout import U32
+from acquisition.modbus.slot import Slot
 
 SlotFault: TypeAlias = Callable[[Slot], Slot | None]
 """Takes the right slot, gives what is written instead; None if nothing is."""
@@ -21,6 +22,11 @@ def torn(slot: Slot) -> Slot:
     return dataclasses.replace(slot, trailer=slot.trailer ^ 0x5A5A)
 
 
+def damaged(slot: Slot) -> Slot:
+    """Write a checksum that does not fit; in version 1, where there is none, nothing happens."""
+    return dataclasses.replace(slot, damage=slot.damage ^ 0x5A5A5A5A)
+
+
 def wrong_sequence(slot: Slot) -> Slot:
     """Write a sequence number that does not belong into this place."""
     sequence = (slot.sequence + 1) % U32
@@ -32,9 +38,31 @@ def wrong_index(slot: Slot) -> Slot:
     return dataclasses.replace(slot, first_index=(slot.first_index + 1) % U32)
 
 
-def impossible_time(slot: Slot) -> Slot:
+def wrong_time(slot: Slot) -> Slot:
     """Stamp the slot with 2106."""
     return dataclasses.replace(slot, seconds=U32 - 1)
+
+
+def impossible_time(slot: Slot) -> Slot:
+    """Stamp the slot with a second of a million and more microseconds."""
+    return dataclasses.replace(slot, microseconds=slot.microseconds + 1_000_000)
+
+
+class Repetition:
+    """Write the samples of the slot before once more, with the next sequence number."""
+
+    def __init__(self) -> None:
+        self._before: Slot | None = None
+
+    def note(self, slot: Slot) -> None:
+        """Remember a slot, in case it is to be repeated."""
+        self._before = slot
+
+    def __call__(self, slot: Slot) -> Slot:
+        """Give the remembered slot under the number of this one."""
+        if self._before is None:
+            return slot
+        return dataclasses.replace(self._before, sequence=slot.sequence, trailer=slot.trailer)
 
 
 class RandomLoss:

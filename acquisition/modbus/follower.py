@@ -4,9 +4,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from acquisition.errors import ConfigError
-from acquisition.modbus.assembly import PlacedSlot, raw_blocks
-from acquisition.modbus.profile import U32, RingHeader, RingLayout, Slot
+from acquisition.modbus.profile import RingHeader
+from acquisition.modbus.ring_layout import U32, RingLayout
 from acquisition.modbus.ring_reader import RingReader
+from acquisition.modbus.slot import Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from acquisition.raw import RawBlock
 from core.blocks import Rejection
@@ -45,18 +46,25 @@ class RingFollower:
         """Epoch and newest sequence the device has shown."""
         return None if self._header is None else (self._header.epoch, self._header.newest)
 
-    def require_expected(self, layout: RingLayout) -> None:
-        """Refuse a device that cannot deliver what is configured.
+    async def header(self, reader: RingReader) -> RingHeader:
+        """Read the header of a device that delivers what is configured.
 
         Raises
         ------
         ConfigError
-            Naming the field, what was found and what was expected.
+            If it does not, naming the field, what was found and what was expected.
+        LinkError, FrameError
+            As the reader does.
         """
-        found = (layout.n_channels, layout.rate_mhz, layout.n_slow)
+        header = await reader.header()
+        ring = header.layout
+        found = (ring.n_channels, ring.rate_mhz, ring.n_slow)
         for (name, expected), value in zip(self._expected.items(), found, strict=True):
             if value != expected:
-                raise ConfigError(f"block ring: {name} is {value}, expected {expected}")
+                raise ConfigError(
+                    f"{reader.where}: block ring: {name} is {value}, expected {expected}"
+                )
+        return header
 
     async def advance(self, reader: RingReader) -> list[RawBlock]:
         """Read everything that is new, in order.
@@ -66,20 +74,22 @@ class RingFollower:
         LinkError, FrameError, ConfigError
             As the reader does; nothing is forgotten then.
         """
-        header, slow = await reader.header_and_slow(self._n_slow)
-        self.require_expected(header.layout)
+        header = await self.header(reader)
+        layout = header.layout
+        slow = () if layout.checked else await reader.slow_values(self._n_slow)
         await self._enter(reader, header)
         wanted = self._unread(header)
-        slots = await self._read(reader, header.layout, wanted)
         if not wanted:
             return []
-        epoch, newest = await reader.progress()
-        if epoch != header.epoch:
-            return []
+        found = list(zip(wanted, await self._read(reader, layout, wanted), strict=True))
+        if not layout.checked:
+            epoch, newest = await reader.progress()
+            if epoch != header.epoch:
+                return []
+            oldest = newest - (layout.n_slots - 2)
+            found = [(sequence, slot) for sequence, slot in found if ahead(sequence, oldest) >= 0]
         self._handled = header.newest
-        oldest = newest - (header.layout.n_slots - 2)
-        kept = [(s, slot) for s, slot in zip(wanted, slots, strict=True) if ahead(s, oldest) >= 0]
-        return raw_blocks(self._place(kept, header), header.layout, slow)
+        return self._placed(found, header, slow)
 
     async def _enter(self, reader: RingReader, header: RingHeader) -> None:
         """Find the place to read from, when this is not simply the one after the last."""
@@ -89,11 +99,11 @@ class RingFollower:
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
             slot = await self._newest_slot(reader, header)
-            self._timeline = Timeline(header.layout)
-            self._handled = header.newest - 1
+            n_resets = self._timeline.n_resets + 1 if before.epoch == header.epoch else 0
+            self._timeline = Timeline(header.layout, n_resets)
             if slot is not None:
                 self._timeline.anchor(slot)
-                self._go_back_to_start(slot, header)
+            self._go_back_to_start(slot, header)
         elif ahead(header.newest, self._handled) < 0:
             slot = await self._newest_slot(reader, header)
             if slot is not None and not self._timeline.repeats(slot):
@@ -101,9 +111,14 @@ class RingFollower:
                 self._go_back_to_start(slot, header)
         self._header = header
 
-    def _go_back_to_start(self, newest: Slot, header: RingHeader) -> None:
-        """Stand before the first slot of a new epoch, if the ring still holds it."""
-        n_before = newest.first_index // header.layout.samples_per_slot
+    def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:
+        """Stand before the first slot of a new epoch, if the ring still holds it.
+
+        Where slots name their epoch, all can be looked at when the newest is of no help.
+        """
+        n_before = header.layout.n_slots if header.layout.checked else 0
+        if newest is not None:
+            n_before = newest.first_index // header.layout.samples_per_slot
         self._handled = header.newest - 1 - min(n_before, header.layout.n_slots - 2)
 
     def _unread(self, header: RingHeader) -> list[int]:
@@ -113,44 +128,73 @@ class RingFollower:
 
     async def _newest_slot(self, reader: RingReader, header: RingHeader) -> Slot | None:
         [slot] = await self._read(reader, header.layout, [header.newest])
-        usable = slot.sequence == header.newest and not slot.torn and not slot.blank
-        return slot if usable else None
+        known = slot.epoch in (None, header.epoch) and slot.sequence == header.newest
+        return slot if known and slot.whole and not slot.blank else None
 
     async def _read(
         self, reader: RingReader, layout: RingLayout, wanted: Sequence[int]
     ) -> list[Slot]:
-        """Read slots, torn ones again: the device may be writing them just now."""
+        """Read slots, doubtful ones again: the device may be writing them just now."""
         slots = await reader.slots(layout, wanted)
         for i, sequence in enumerate(wanted):
             for _ in range(_N_REREADS):
-                if not slots[i].torn:
+                if not _doubtful(slots[i], sequence, layout):
                     break
                 [slots[i]] = await reader.slots(layout, [sequence])
         return slots
 
-    def _place(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[PlacedSlot]:
-        placed = []
+    def _placed(
+        self, found: Sequence[tuple[int, Slot]], header: RingHeader, slow: tuple[float, ...]
+    ) -> list[RawBlock]:
+        blocks = []
         for sequence, slot in found:
-            index = self._judge(sequence, slot, header.layout.n_slots)
+            index = self._judge(sequence, slot, header)
             if isinstance(index, Refusal):
                 self._rejected[index] += header.layout.samples_per_slot
             elif index is not None:
-                epoch = header.epoch + self._timeline.n_resets * U32
-                placed.append(PlacedSlot(slot, epoch, index, self._taken_rejections()))
-        return placed
+                blocks.append(self._raw_block(slot, index, header, slow))
+        return blocks
 
-    def _judge(self, sequence: int, slot: Slot, n_slots: int) -> int | Refusal | None:
+    def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
         """Index of the slot's first sample; None if it was never written or is gone."""
-        if slot.blank:
+        if slot.blank or _overwritten_or_old(slot, sequence, header.layout):
             return None
+        if slot.damage:
+            return Refusal.DAMAGED
         if slot.sequence != sequence:
-            same_place = slot.sequence % n_slots == sequence % n_slots
-            return None if same_place else Refusal.WRONG_SEQUENCE
+            return Refusal.WRONG_SEQUENCE
+        if slot.epoch not in (None, header.epoch):
+            return None
         if slot.torn:
             return Refusal.TORN
         return self._timeline.place(slot)
 
-    def _taken_rejections(self) -> tuple[Rejection, ...]:
-        rejections = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
+    def _raw_block(
+        self, slot: Slot, index: int, header: RingHeader, slow: tuple[float, ...]
+    ) -> RawBlock:
+        rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
-        return rejections
+        return RawBlock(
+            epoch=header.epoch + self._timeline.n_resets * U32,
+            first_index=index,
+            start_ns=slot.start_ns,
+            rate_hz=header.layout.rate_mhz / 1000.0,
+            counts=slot.counts,
+            ok=tuple(bool(slot.ok_bits >> c & 1) for c in range(header.layout.n_channels)),
+            slow=slot.slow if header.layout.checked else slow,
+            rejected=rejected,
+        )
+
+
+def _overwritten_or_old(slot: Slot, sequence: int, layout: RingLayout) -> bool:
+    """Whether another slot lies here that belongs into the same place."""
+    other = slot.sequence != sequence
+    return other and slot.sequence % layout.n_slots == sequence % layout.n_slots
+
+
+def _doubtful(slot: Slot, sequence: int, layout: RingLayout) -> bool:
+    """Whether a slot may look different when it is read again."""
+    if slot.blank:
+        return False
+    misplaced = slot.sequence != sequence and not _overwritten_or_old(slot, sequence, layout)
+    return misplaced or not slot.whole

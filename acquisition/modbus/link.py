@@ -19,9 +19,8 @@ from acquisition.modbus.replies import (
     fifo_registers,
     identification_objects,
 )
-from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
 
-ADDRESS_SPACE = 0x10000
 _MAX_BITS_PER_READ = 2000
 _REGISTER_REQUESTS = {
     READ_HOLDING_REGISTERS: ReadHoldingRegistersRequest,

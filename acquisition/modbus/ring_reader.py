@@ -2,48 +2,69 @@
 
 from collections.abc import Iterator, Sequence
 
+from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.profile import (
     HEADER_REGISTERS,
     PROGRESS_OFFSET,
     PROGRESS_REGISTERS,
     RingHeader,
-    RingLayout,
-    Slot,
     decode_header,
     decode_progress,
-    decode_slot,
-    decode_slow,
 )
+from acquisition.modbus.ring_layout import RingLayout
+from acquisition.modbus.slot import Slot, decode_slot, decode_slow
+
+_N_TRIES = 4
+"""A header is short and quickly written; still wrong after this many reads, it is wrong."""
 
 
 class RingReader:
-    """One device's ring, as it is found: nothing is judged here."""
+    """One device's ring, as it is found: slots are not judged here."""
 
     def __init__(self, link: ModbusLink, base_address: int, function: int) -> None:
         self._link = link
         self._base = base_address
         self._function = function
 
-    async def header(self) -> RingHeader:
-        """Read and decode the header alone."""
-        return decode_header(await self._registers(self._base, HEADER_REGISTERS))
+    @property
+    def where(self) -> str:
+        """Host and port, or path of the serial port."""
+        return self._link.where
 
-    async def header_and_slow(self, n_slow: int) -> tuple[RingHeader, tuple[float, ...]]:
-        """Read the header and the slow values behind it."""
-        data = await self._registers(self._base, HEADER_REGISTERS + 2 * n_slow)
-        return decode_header(data[: 2 * HEADER_REGISTERS]), decode_slow(
-            data[2 * HEADER_REGISTERS :]
-        )
+    async def header(self) -> RingHeader:
+        """Read and decode the header alone.
+
+        Raises
+        ------
+        ConfigError
+            If this is no block ring.
+        FrameError
+            If its checksum is wrong, however often it is read.
+        LinkError
+            As the link says.
+        """
+        n_tries = 0
+        while True:
+            data = await self._registers(self._base, HEADER_REGISTERS)
+            n_tries += 1
+            try:
+                return decode_header(data)
+            except (ConfigError, FrameError) as error:
+                if n_tries == _N_TRIES:
+                    raise type(error)(f"{self.where}: {error}") from error
+
+    async def slow_values(self, n_slow: int) -> tuple[float, ...]:
+        """Read the slow values behind the header."""
+        if not n_slow:
+            return ()
+        return decode_slow(await self._registers(self._base + HEADER_REGISTERS, 2 * n_slow))
 
     async def progress(self) -> tuple[int, int]:
         """Read epoch and newest sequence, in one request so that they belong together."""
         return decode_progress(
             await self._registers(self._base + PROGRESS_OFFSET, PROGRESS_REGISTERS)
         )
-
-    async def _registers(self, address: int, n_registers: int) -> bytes:
-        return await self._link.read(address, n_registers, self._function)
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
         """Read the places where these sequence numbers belong, whatever lies there.
@@ -61,6 +82,9 @@ class RingReader:
                 decode_slot(data[2 * layout.slot_stride * i :], layout) for i in range(n_slots)
             ]
         return found
+
+    async def _registers(self, address: int, n_registers: int) -> bytes:
+        return await self._link.read(address, n_registers, self._function)
 
 
 def _runs(layout: RingLayout, sequences: Sequence[int]) -> Iterator[tuple[int, int]]:

@@ -10,10 +10,10 @@ from acquisition.delivery import Delivery
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.follower import RingFollower
 from acquisition.modbus.link import ModbusLink
-from acquisition.modbus.profile import ADDRESS_SPACE, HEADER_REGISTERS
+from acquisition.modbus.profile import HEADER_REGISTERS
 from acquisition.modbus.replies import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
 from acquisition.modbus.ring_reader import RingReader
-from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
 from core.blocks import SampleBlock
 
 _MIN_STALE_SLOTS = 3
@@ -99,8 +99,7 @@ class ModbusRingSource:
             link.close()
 
     async def _identify(self, reader: RingReader) -> None:
-        header = await reader.header()
-        self._follower.require_expected(header.layout)
+        header = await self._follower.header(reader)
         self._stale_after_s = max(
             self._settings.stale_after_s, _MIN_STALE_SLOTS * header.layout.slot_duration_s
         )

@@ -2,11 +2,13 @@
 
 from enum import StrEnum
 
-from acquisition.modbus.profile import U32, RingLayout, Slot
+from acquisition.modbus.ring_layout import U32, RingLayout
+from acquisition.modbus.slot import Slot
+from core.units import NS_PER_S
 
-_NS_PER_S = 1_000_000_000
-_CLOCK_TOLERANCE_NS = _NS_PER_S
-_CLOCK_DRIFT = 1e-3
+_US_PER_S = 1_000_000
+_TOLERANCE_NS = NS_PER_S
+_DRIFT = 1e-3
 """A device's clock may be corrected by a second and run a permille wrong; the index is exact."""
 
 
@@ -14,6 +16,7 @@ class Refusal(StrEnum):
     """Why the samples of a slot are not used; the names become counters."""
 
     TORN = "torn_slot"
+    DAMAGED = "damaged_slot"
     WRONG_SEQUENCE = "wrong_sequence"
     INCONSISTENT_INDEX = "inconsistent_index"
     IMPOSSIBLE_TIME = "impossible_time"
@@ -27,18 +30,23 @@ def ahead(sequence: int, of: int) -> int:
 class Timeline:
     """The sample axis of one epoch.
 
-    A slot fits if sequence number, sample index and time have advanced by the same amount since
-    the last slot that did. A single slot that does not is refused. Two in a row that agree with
-    each other show that the device's clock was set (accepted from then on) or that its counters
-    were reset (a new epoch, since the old axis has ended).
+    A slot fits if sequence number and sample index have advanced by the same amount since the last
+    slot that did. A single slot that does not is refused. Two in a row that agree with each other
+    show that the counters were reset: a new epoch, since the old axis has ended. Stamps decide
+    nothing here; they are judged where all adapters' stamps are.
+
+    Attributes
+    ----------
+    n_resets
+        How often the counters were reset.
     """
 
-    def __init__(self, layout: RingLayout) -> None:
+    def __init__(self, layout: RingLayout, n_resets: int = 0) -> None:
         self._layout = layout
         self._accepted: Slot | None = None
         self._accepted_index = 0
         self._refused: Slot | None = None
-        self.n_resets = 0
+        self.n_resets = n_resets
 
     def anchor(self, slot: Slot) -> None:
         """Start the axis at a slot, at the index it names itself."""
@@ -51,37 +59,35 @@ class Timeline:
 
     def place(self, slot: Slot) -> int | Refusal:
         """Index of the slot's first sample on the unwrapped axis, or why it has none."""
-        if slot.microseconds >= 1_000_000:
+        if slot.microseconds >= _US_PER_S:
             return Refusal.IMPOSSIBLE_TIME
         if self._accepted is None:
             self.anchor(slot)
-            return self._accepted_index
-        misfit = self._misfit(self._accepted, slot)
-        if misfit is not None and (self._refused is None or self._misfit(self._refused, slot)):
-            self._refused = slot
-            return misfit
-        if misfit is Refusal.INCONSISTENT_INDEX:
-            self.restart(slot)
-        else:
+        elif self._on_one_axis(self._accepted, slot):
             self._accepted_index += self._n_samples(self._accepted, slot)
             self._accepted, self._refused = slot, None
+        elif self._refused is not None and self._on_one_axis(self._refused, slot):
+            self.restart(slot)
+        else:
+            self._refused = slot
+            return Refusal.INCONSISTENT_INDEX
         return self._accepted_index
 
     def repeats(self, slot: Slot) -> bool:
-        """Whether a slot is an older one of this axis, offered again."""
-        return self._accepted is not None and self._misfit(self._accepted, slot) is None
+        """Whether a slot is an older one of this axis, offered again.
 
-    def _misfit(self, reference: Slot, slot: Slot) -> Refusal | None:
+        A device that was reset counts the same numbers again, but not at the same time.
+        """
+        before = self._accepted
+        if before is None or not self._on_one_axis(before, slot):
+            return False
+        expected_ns = self._n_samples(before, slot) * 1000 * NS_PER_S // self._layout.rate_mhz
+        deviation_ns = slot.start_ns - before.start_ns - expected_ns
+        return abs(deviation_ns) <= _TOLERANCE_NS + _DRIFT * abs(expected_ns)
+
+    def _on_one_axis(self, reference: Slot, slot: Slot) -> bool:
         n_samples = self._n_samples(reference, slot)
-        if (slot.first_index - reference.first_index - n_samples) % U32:
-            return Refusal.INCONSISTENT_INDEX
-        expected_ns = n_samples * 1000 * _NS_PER_S // self._layout.rate_mhz
-        elapsed_ns = slot.start_ns - reference.start_ns
-        tolerance_ns = _CLOCK_TOLERANCE_NS + _CLOCK_DRIFT * abs(expected_ns)
-        backwards = elapsed_ns * n_samples < 0 or (elapsed_ns == 0) != (n_samples == 0)
-        if backwards or abs(elapsed_ns - expected_ns) > tolerance_ns:
-            return Refusal.IMPOSSIBLE_TIME
-        return None
+        return (slot.first_index - reference.first_index - n_samples) % U32 == 0
 
     def _n_samples(self, reference: Slot, slot: Slot) -> int:
         return ahead(slot.sequence, reference.sequence) * self._layout.samples_per_slot

@@ -8,6 +8,7 @@ from acquisition.errors import ConfigError
 Parity: TypeAlias = Literal["none", "even", "odd"]
 
 MAX_REGISTERS_PER_READ = 125
+ADDRESS_SPACE = 0x10000
 _MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
 _MAX_SERIAL_DEVICE_ID = 247
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data

@@ -6,9 +6,11 @@ import pytest
 from acquisition.daq import faults
 from acquisition.daq.ledger import Ledger
 from acquisition.daq.register_memory import RegisterMemory
-from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import ConfigError
-from acquisition.modbus.profile import decode_header, decode_slot, decode_slow
+from acquisition.modbus.profile import decode_header
+from acquisition.modbus.slot import decode_slot, decode_slow
 
 
 def slot_in(device: RingDevice, sequence: int):

@@ -5,7 +5,8 @@ import asyncio
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
-from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.errors import LinkError
 from acquisition.modbus.profile import decode_header

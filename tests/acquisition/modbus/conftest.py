@@ -7,7 +7,8 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.daq.register_memory import RegisterMemory
-from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource

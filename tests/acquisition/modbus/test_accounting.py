@@ -4,15 +4,16 @@ import dataclasses
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from acquisition.daq import faults
-from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
+from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
 from core.blocks import SampleBlock
 
-N_LOSSES = 1000
 N_SLOTS = 16
-SLOT = 20
+SLOT = 50
 
 
 class LossyPlant:
@@ -27,18 +28,18 @@ class LossyPlant:
             "torn_slot": faults.torn,
             "wrong_sequence": faults.wrong_sequence,
             "inconsistent_index": self._wrong_index,
-            "impossible_time": self._wrong_time,
+            "impossible_time": faults.impossible_time,
         }
+        if device.layout.checked:
+            self._faults["damaged_slot"] = self._damage
         self.lost: Counter[str] = Counter()
-
-    @property
-    def n_losses(self) -> int:
-        return self.lost.total() // SLOT
+        self.n_gaps = 0
 
     def run(self) -> None:
         """Fill the ring not quite, ending with a good slot, or run it over."""
         if self._random.random() < 0.1:
             n_overwritten = int(self._random.integers(1, 3 * N_SLOTS))
+            self.n_gaps += 1
             self.lost["gap"] += n_overwritten * SLOT
             self._misplaced.clear()
             self._device.produce(N_SLOTS - 1 + n_overwritten)
@@ -48,7 +49,7 @@ class LossyPlant:
         self._good()
 
     def _one(self) -> None:
-        if self._random.random() < 0.5:
+        if self._random.random() < 0.4:
             self._good()
             return
         kind = str(self._random.choice(list(self._faults)))
@@ -60,6 +61,7 @@ class LossyPlant:
             self._misplaced.add(place)
         elif kind != "gap":
             self._misplaced.discard(place)
+        self.n_gaps += 1
         self.lost[kind] += SLOT
 
     def _good(self) -> None:
@@ -70,8 +72,8 @@ class LossyPlant:
         shift = int(self._random.integers(1, 2**31))
         return dataclasses.replace(slot, first_index=(slot.first_index + shift) % 2**32)
 
-    def _wrong_time(self, slot):
-        return dataclasses.replace(slot, seconds=int(self._random.integers(0, 2**32)))
+    def _damage(self, slot):
+        return dataclasses.replace(slot, damage=int(self._random.integers(1, 2**32)))
 
 
 async def read_all(stream, device: RingDevice, blocks: list[SampleBlock]) -> None:
@@ -79,14 +81,17 @@ async def read_all(stream, device: RingDevice, blocks: list[SampleBlock]) -> Non
         blocks.append(await anext(stream))
 
 
-async def test_a_thousand_injected_losses_are_counted_exactly(counting_feed, source_at):
-    settings = RingDeviceSettings(samples_per_slot=SLOT, n_slots=N_SLOTS)
-    device = RingDevice(counting_feed(n_channels=3), settings=settings)
+@pytest.mark.parametrize(("version", "n_gaps"), [(1, 2000), (2, 10_000)])
+async def test_every_one_of_ten_thousand_injected_gaps_is_found_and_counted_exactly(
+    version, n_gaps, counting_feed, source_at, counts_calibration
+):
+    settings = RingDeviceSettings(samples_per_slot=SLOT, n_slots=N_SLOTS, version=version)
+    device = RingDevice(counting_feed(n_channels=1), settings=settings)
     plant = LossyPlant(device, seed=20261121)
     blocks: list[SampleBlock] = []
     async with ModbusRingServer(device) as server:
-        source = source_at(server.port)
-        while plant.n_losses < N_LOSSES:
+        source = source_at(server.port, calibration=counts_calibration(n_channels=1))
+        while plant.n_gaps < n_gaps:
             async with source.connect() as stream:
                 await read_all(stream, device, blocks)
                 for _ in range(20):
@@ -107,6 +112,6 @@ async def test_a_thousand_injected_losses_are_counted_exactly(counting_feed, sou
         stop = block.stop_index
     n_stored = sum(block.n_samples for block in blocks)
     assert len({block.epoch for block in blocks}) == 1
-    assert plant.n_losses >= N_LOSSES
+    assert plant.n_gaps >= n_gaps
     assert found == plant.lost
     assert n_stored + found.total() == device.ledger.n_samples("U1")

@@ -11,16 +11,12 @@ from hypothesis.extra.numpy import arrays
 from acquisition.errors import ConfigError
 from acquisition.modbus.profile import (
     RingHeader,
-    RingLayout,
-    Slot,
     decode_header,
     decode_progress,
-    decode_slot,
-    decode_slow,
     encode_header,
-    encode_slot,
-    encode_slow,
 )
+from acquisition.modbus.ring_layout import RingLayout
+from acquisition.modbus.slot import Slot, decode_slot, decode_slow, encode_slot, encode_slow
 
 u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)

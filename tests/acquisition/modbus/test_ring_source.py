@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from acquisition.daq import faults
-from acquisition.daq.ring_device import RingDevice, RingDeviceSettings
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
-from acquisition.modbus.profile import RingHeader, encode_header, encode_slot
+from acquisition.modbus.profile import RingHeader, encode_header
+from acquisition.modbus.slot import encode_slot
 from core.blocks import Rejection
 from core.quality import Reason
 

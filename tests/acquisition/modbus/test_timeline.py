@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.modbus.profile import U32, RingLayout, Slot
+from acquisition.modbus.ring_layout import U32, RingLayout
+from acquisition.modbus.slot import Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 
 LAYOUT = RingLayout(1, 50, 8, 600_000, 0, 16, 61)
