@@ -1,1 +1,1 @@
-"""Recordings from the formats that other tools write."""
+"""Runs that other tools recorded: their files read in a process of little memory, never guessed."""

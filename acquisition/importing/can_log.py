@@ -1,0 +1,77 @@
+"""CAN logs of candump and BLF, in batches of frames."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.errors import ConfigError
+from acquisition.importing.frames import MAX_DATA, FrameBatch
+from acquisition.importing.job import ImportJob
+from acquisition.importing.libraries import library
+
+_BATCH = 8192
+_LENGTHS = {*range(9), 12, 16, 20, 24, 32, 48, 64}
+"""That a CAN FD frame can have; a classic one up to 8."""
+
+
+def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]]:
+    """Data frames of a log and the share of it that has been read.
+
+    candump writes seconds since 1970 in UTC. BLF has the clock of whoever recorded it: its time
+    zone is that of the mapping.
+
+    Raises
+    ------
+    ConfigError
+        If a frame cannot have been on a bus.
+    """
+    io = library("can.io", "a CAN log")
+    size = max(path.stat().st_size, 1)
+    with path.open("r" if job.format == "candump" else "rb") as stream:
+        reader = (io.CanutilsLogReader if job.format == "candump" else io.BLFReader)(stream)
+        waiting: list[Any] = []
+        for number, frame in enumerate(reader):
+            _require_possible(frame, number + 1)
+            if not (frame.is_error_frame or frame.is_remote_frame):
+                waiting.append(frame)
+            if len(waiting) == _BATCH:
+                yield _batch(waiting, job), min(_position(stream) / size, 1.0)
+                waiting = []
+        if waiting:
+            yield _batch(waiting, job), 1.0
+
+
+def _position(stream: Any) -> int:
+    return int(getattr(stream, "buffer", stream).tell())
+
+
+def _require_possible(frame: Any, number: int) -> None:
+    n_bytes = len(frame.data)
+    limit = MAX_DATA if frame.is_fd else 8
+    id_limit = 2**29 if frame.is_extended_id else 2**11
+    is_sound = n_bytes <= limit and n_bytes in _LENGTHS and 0 <= frame.arbitration_id < id_limit
+    if not is_sound or (not frame.is_remote_frame and frame.dlc != n_bytes):
+        raise ConfigError(
+            f"frame {number}: id {frame.arbitration_id:#x}, length {frame.dlc}, {n_bytes} bytes of"
+            " data cannot have been on a bus"
+        )
+    if not abs(frame.timestamp) < 2**33:  # NaN, too
+        raise ConfigError(f"frame {number}: {frame.timestamp} s is no time")
+
+
+def _batch(frames: list[Any], job: ImportJob) -> FrameBatch:
+    data = np.zeros((len(frames), MAX_DATA), np.uint8)
+    for row, frame in zip(data, frames, strict=True):
+        row[: len(frame.data)] = np.frombuffer(frame.data, np.uint8)
+    # a double of seconds since 1970 is good to a fourth of a microsecond
+    us = np.rint(np.array([frame.timestamp for frame in frames]) * 1e6).astype(np.int64)
+    offset_s = job.time.utc_offset_s if job.format == "blf" else 0
+    return FrameBatch(
+        times_ns=us * 1000 - offset_s * 1_000_000_000,
+        ids=np.array([frame.arbitration_id for frame in frames], np.uint32),
+        extended=np.array([frame.is_extended_id for frame in frames], np.bool_),
+        lengths=np.array([len(frame.data) for frame in frames], np.uint8),
+        data=data,
+    )
