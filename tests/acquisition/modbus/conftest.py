@@ -1,18 +1,19 @@
 """A device that lies: a raw Modbus TCP server that spoils its replies on demand."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 
 import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import LinkSettings, TcpTransport
+from core.blocks import SampleBlock
 
 HONEST_REQUEST_BYTES = 12
 
@@ -70,10 +71,32 @@ class HostileServer:
             await writer.drain()
 
 
+async def blocks_until(stream, stop_index: int) -> list[SampleBlock]:
+    """Blocks up to the one that ends at an index."""
+    blocks = [await anext(stream)]
+    while blocks[-1].stop_index != stop_index:
+        blocks.append(await anext(stream))
+    return blocks
+
+
 @pytest.fixture
-def device(counting_feed) -> RingDevice:
+def read_until() -> Callable[..., Awaitable[list[SampleBlock]]]:
+    """Takes blocks of a stream up to the one that ends at an index."""
+    return blocks_until
+
+
+@pytest.fixture(params=[1, 2], ids=["v1", "v2"])
+def version(request) -> int:
+    """Both versions of the block-ring profile."""
+    return request.param
+
+
+@pytest.fixture
+def device(counting_feed, version) -> RingDevice:
     """Three channels of 50 samples: a slot takes two reads."""
-    return RingDevice(counting_feed(n_channels=3), settings=RingDeviceSettings(n_slots=8))
+    return RingDevice(
+        counting_feed(n_channels=3), settings=RingDeviceSettings(n_slots=8, version=version)
+    )
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
-"""Block-ring profile v1: what is written is what is read."""
+"""Block-ring profile: what is written is what is read, and what is changed is seen."""
 
 import dataclasses
+import zlib
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from acquisition.errors import ConfigError
+from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.profile import (
     RingHeader,
     decode_header,
@@ -20,31 +21,33 @@ from acquisition.modbus.slot import Slot, decode_slot, decode_slow, encode_slot,
 
 u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)
-LAYOUT = RingLayout(
+V1 = RingLayout(
     n_channels=3,
     samples_per_slot=4,
     n_slots=8,
     rate_mhz=600_000,
     n_slow=2,
     ring_address=20,
-    slot_stride=23,
+    slot_stride=31,
+    version=1,
 )
+V2 = dataclasses.replace(V1, version=2)
 
 
 @st.composite
 def layouts(draw: st.DrawFn) -> RingLayout:
-    n_channels = draw(st.integers(1, 32))
-    samples_per_slot = draw(st.integers(1, 200))
-    n_registers = 11 + n_channels * samples_per_slot
-    return RingLayout(
-        n_channels=n_channels,
-        samples_per_slot=samples_per_slot,
+    layout = RingLayout(
+        n_channels=draw(st.integers(1, 32)),
+        samples_per_slot=draw(st.integers(1, 200)),
         n_slots=draw(st.integers(2, 4)),
         rate_mhz=draw(st.integers(1, 2**32 - 1)),
         n_slow=draw(st.integers(0, 100)),
         ring_address=draw(st.integers(16, 500)),
-        slot_stride=n_registers + draw(st.integers(0, 9)),
+        slot_stride=0,
+        version=draw(st.integers(1, 2)),
     )
+    stride = layout.slot_registers + draw(st.integers(0, 9))
+    return dataclasses.replace(layout, slot_stride=stride)
 
 
 @given(layout=layouts(), epoch=u32, newest=u32)
@@ -55,8 +58,22 @@ def test_a_header_reads_back_as_it_was_written(layout, epoch, newest):
 
 @given(epoch=u32, newest=u32)
 def test_epoch_and_newest_lie_where_progress_is_read(epoch, newest):
-    data = encode_header(RingHeader(LAYOUT, epoch, newest))
+    data = encode_header(RingHeader(V1, epoch, newest))
     assert decode_progress(data[14:22]) == (epoch, newest)
+
+
+@given(epoch=u32, newest=u32, position=st.integers(0, 31), flip=st.integers(1, 255))
+def test_no_header_of_version_2_with_a_changed_byte_is_believed(epoch, newest, position, flip):
+    data = bytearray(encode_header(RingHeader(V2, epoch, newest)))
+    data[position] ^= flip
+    with pytest.raises((ConfigError, FrameError)):
+        decode_header(bytes(data))
+
+
+def equal_slots(a: Slot, b: Slot) -> bool:
+    nothing = np.empty(0)
+    a, b = (dataclasses.replace(slot, counts=nothing) for slot in (a, b))
+    return repr(a) == repr(dataclasses.replace(b, blank=a.blank))
 
 
 @given(
@@ -64,14 +81,53 @@ def test_epoch_and_newest_lie_where_progress_is_read(epoch, newest):
     trailer=u16,
     counts=arrays(np.int16, (3, 4)),
 )
-def test_a_slot_reads_back_as_it_was_written(numbers, trailer, counts):
+def test_a_slot_of_version_1_reads_back_as_it_was_written(numbers, trailer, counts):
     slot = Slot(*numbers, counts=counts, trailer=trailer)
-    data = encode_slot(slot)
-    assert len(data) == 2 * LAYOUT.slot_registers
-    read = decode_slot(data, LAYOUT)
+    data = encode_slot(slot, V1)
+    assert len(data) == 2 * V1.slot_registers
+    read = decode_slot(data, V1)
     np.testing.assert_array_equal(read.counts, counts)
-    nothing = np.empty(0)
-    assert dataclasses.replace(read, counts=nothing) == dataclasses.replace(slot, counts=nothing)
+    assert equal_slots(read, slot)
+
+
+@given(
+    numbers=st.tuples(u32, u32, u32, u32, u32),
+    trailer=u16,
+    counts=arrays(np.int16, (3, 4)),
+    epoch=u32,
+    slow=st.tuples(*[st.floats(width=32, allow_nan=False)] * 2),
+    damage=u32,
+)
+def test_a_slot_of_version_2_reads_back_with_epoch_slow_values_and_damage(
+    numbers, trailer, counts, epoch, slow, damage
+):
+    slot = Slot(*numbers, counts=counts, trailer=trailer, epoch=epoch, slow=slow, damage=damage)
+    data = encode_slot(slot, V2)
+    assert len(data) == 2 * V2.slot_registers
+    read = decode_slot(data + b"next", V2)
+    np.testing.assert_array_equal(read.counts, counts)
+    assert equal_slots(read, slot)
+
+
+@given(
+    counts=arrays(np.int16, (3, 4)),
+    flips=st.dictionaries(
+        st.integers(0, 2 * V2.slot_registers - 1), st.integers(1, 255), min_size=1
+    ),
+)
+def test_a_slot_of_version_2_with_changed_bytes_is_not_whole(counts, flips):
+    data = bytearray(encode_slot(Slot(3, 12, 5, 6, 7, counts, 3, epoch=1, slow=(1.0, 2.0)), V2))
+    assert decode_slot(bytes(data), V2).whole
+    for position, flip in flips.items():
+        data[position] ^= flip
+    assert not decode_slot(bytes(data), V2).whole
+
+
+def test_a_slot_of_zeros_is_blank_and_a_written_one_is_not():
+    for layout in (V1, V2):
+        assert decode_slot(bytes(2 * layout.slot_registers), layout).blank
+        first = Slot(0, 0, 0, 0, 0, np.ones((3, 4), np.int16), 0, epoch=0, slow=(0.0, 0.0))
+        assert not decode_slot(encode_slot(first, layout), layout).blank
 
 
 @given(st.lists(st.floats(width=32)))
@@ -79,28 +135,44 @@ def test_slow_values_read_back_as_they_were_written(values):
     np.testing.assert_array_equal(decode_slow(encode_slow(values)), values)
 
 
-def test_samples_lie_channel_by_channel_behind_ten_registers():
+def test_samples_of_version_1_lie_channel_by_channel_behind_ten_registers():
     counts = np.arange(12, dtype=np.int16).reshape(3, 4)
     slot = Slot(0x0001_0002, 0x0003_0004, 5, 6, 0b101, counts, 0x0002)
-    words = np.frombuffer(encode_slot(slot), ">u2")
+    words = np.frombuffer(encode_slot(slot, V1), ">u2")
     assert words.tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, *range(12), 2]
 
 
+def test_a_slot_of_version_2_has_epoch_and_slow_values_before_and_a_checksum_behind_the_samples():
+    counts = np.arange(12, dtype=np.int16).reshape(3, 4)
+    slot = Slot(
+        0x0001_0002, 0x0003_0004, 5, 6, 0b101, counts, 2, epoch=0x0007_0008, slow=(1.0, 2.0)
+    )
+    data = encode_slot(slot, V2)
+    words = np.frombuffer(data, ">u2")
+    assert words[:12].tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, 7, 8]
+    assert words[12:16].tolist() == [0x3F80, 0, 0x4000, 0]
+    assert words[16:29].tolist() == [*range(12), 2]
+    assert int.from_bytes(data[-4:], "big") == zlib.crc32(data[:-4])
+
+
+@pytest.mark.parametrize("layout", [V1, V2], ids=["v1", "v2"])
 @pytest.mark.parametrize(
     ("register", "value", "complaint"),
     [
         (0, 0x5058, "magic is 0x5058, expected 0x5057"),
-        (1, 2, "version is 2, expected 1"),
+        (1, 3, "version is 3, known are 1 and 2"),
         (2, 0, "n_channels is 0"),
         (2, 33, "n_channels is 33"),
         (3, 0, "samples_per_slot is 0"),
         (4, 1, "n_slots is 1"),
         (4, 60000, "end of the ring is"),
-        (13, 22, "slot stride is 22, allowed is 23"),
+        (13, 22, "slot stride is 22, allowed is"),
     ],
 )
-def test_a_header_that_cannot_be_is_refused_with_what_was_found(register, value, complaint):
-    words = np.frombuffer(encode_header(RingHeader(LAYOUT, 1, 1)), ">u2").copy()
+def test_a_header_that_cannot_be_is_refused_with_what_was_found(layout, register, value, complaint):
+    words = np.frombuffer(encode_header(RingHeader(layout, 1, 1)), ">u2").copy()
     words[register] = value
+    data = words.tobytes()[:28]
+    checksum = zlib.crc32(data) if layout.checked else 0
     with pytest.raises(ConfigError, match=complaint):
-        decode_header(words.tobytes())
+        decode_header(data + checksum.to_bytes(4, "big"))

@@ -5,14 +5,19 @@ import pytest
 
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.modbus.profile import RingHeader, encode_header
 from acquisition.modbus.slot import encode_slot
 from core.blocks import Rejection
+from core.device_clock import StampFault
 from core.quality import Reason
 
 U32 = 2**32
+
+
+def samples_of(blocks) -> np.ndarray:
+    return np.concatenate([block.samples[0] for block in blocks])
 
 
 async def test_only_the_newest_slot_is_read_on_the_first_connection(device, server, source_at):
@@ -22,14 +27,16 @@ async def test_only_the_newest_slot_is_read_on_the_first_connection(device, serv
     assert (block.first_index, block.stop_index) == (300, 350)
 
 
-async def test_slots_that_follow_each_other_come_as_one_block(device, server, source_at):
+async def test_slots_that_follow_each_other_come_as_blocks_without_a_gap(
+    device, server, source_at, read_until
+):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(6)
-        block = await anext(stream)
-    assert (block.first_index, block.stop_index) == (50, 350)
-    expected = np.arange(50, 350) + np.arange(3)[:, np.newaxis]
-    np.testing.assert_array_equal(block.samples, expected)
+        blocks = await read_until(stream, 350)
+    assert [block.first_index for block in blocks] == [50, 100, 150, 200, 250, 300]
+    samples = np.concatenate([block.samples for block in blocks], axis=1)
+    np.testing.assert_array_equal(samples, np.arange(50, 350) + np.arange(3)[:, np.newaxis])
 
 
 async def test_a_slot_that_was_never_written_is_an_exact_gap(device, server, source_at):
@@ -42,15 +49,17 @@ async def test_a_slot_that_was_never_written_is_an_exact_gap(device, server, sou
 
 
 async def test_a_reader_that_falls_behind_records_exactly_what_was_overwritten(
-    device, server, source_at
+    device, server, source_at, read_until
 ):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(7)
-        assert (await anext(stream)).first_index == 50
+        blocks = await read_until(stream, 400)
+        assert blocks[0].first_index == 50
         device.produce(8)
-        block = await anext(stream)
-    assert (block.first_index, block.stop_index, block.rejected) == (450, 800, ())
+        blocks = await read_until(stream, 800)
+    assert blocks[0].first_index == 450
+    assert not any(block.rejected for block in blocks)
 
 
 @pytest.mark.parametrize(
@@ -62,16 +71,55 @@ async def test_a_reader_that_falls_behind_records_exactly_what_was_overwritten(
         (faults.impossible_time, "impossible_time"),
     ],
 )
-async def test_a_nonsense_slot_is_refused_and_counted(fault, reason, device, server, source_at):
+async def test_a_nonsense_slot_is_refused_and_counted(
+    fault, reason, device, server, source_at, read_until
+):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(1)
         device.produce(1, fault)
         device.produce(2)
-        before, after = await anext(stream), await anext(stream)
+        before, after, _ = await read_until(stream, 250)
     assert (before.first_index, before.stop_index) == (50, 100)
-    assert (after.first_index, after.stop_index) == (150, 250)
-    assert after.rejected == (Rejection(reason, 50),)
+    assert (after.first_index, after.rejected) == (150, (Rejection(reason, 50),))
+
+
+async def test_a_slot_with_a_wrong_stamp_keeps_its_samples_and_says_so(
+    device, server, source_at, read_until
+):
+    async with source_at(server.port).connect() as stream:
+        [first] = await read_until(stream, 50)
+        device.produce(1, faults.wrong_time)
+        device.produce(1)
+        wrong, right = await read_until(stream, 150)
+    assert wrong.stamp_fault is StampFault.JUMPED
+    assert abs(wrong.start_ns - first.start_ns - 50e9 / 600) < 2000
+    assert right.stamp_fault is None
+    assert not wrong.rejected
+
+
+async def test_a_device_clock_that_was_set_costs_no_sample(counting_feed, source_at, read_until):
+    feed = counting_feed(n_channels=3)
+    device = RingDevice(feed)
+    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
+        first = await anext(stream)
+        feed._start_ns += 3600 * 10**9
+        device.produce(3)
+        blocks = await read_until(stream, 200)
+    assert [block.stamp_fault for block in blocks] == [StampFault.JUMPED, None, None]
+    assert [block.first_index for block in blocks] == [50, 100, 150]
+    assert {block.epoch for block in blocks} == {first.epoch}
+    assert blocks[1].start_ns - first.start_ns > 3600 * 10**9
+
+
+@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
+async def test_a_damaged_slot_is_refused_and_counted(device, server, source_at):
+    async with source_at(server.port).connect() as stream:
+        await anext(stream)
+        device.produce(1, faults.damaged)
+        device.produce(1)
+        block = await anext(stream)
+    assert (block.first_index, block.rejected) == (100, (Rejection("damaged_slot", 50),))
 
 
 async def test_a_slot_that_is_being_written_is_read_again(device, server, source_at):
@@ -85,7 +133,7 @@ async def test_a_slot_that_is_being_written_is_read_again(device, server, source
             if read_address == address and len(written) == 1:
                 written.append(None)
             elif read_address == address:
-                device.memory.write(address, encode_slot(written[0]))
+                device.memory.write(address, encode_slot(written[0], device.layout))
 
         device.memory.before_read = finish_writing
         block = await anext(stream)
@@ -93,7 +141,7 @@ async def test_a_slot_that_is_being_written_is_read_again(device, server, source
 
 
 async def test_slots_overwritten_while_they_are_read_are_a_gap_and_never_a_mixture(
-    device, server, source_at
+    device, server, source_at, read_until
 ):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
@@ -108,17 +156,19 @@ async def test_slots_overwritten_while_they_are_read_are_a_gap_and_never_a_mixtu
                 device.produce(4)
 
         device.memory.before_read = run_on
-        first, second = await anext(stream), await anext(stream)
-    assert (first.first_index, first.stop_index) == (200, 350)
-    assert (second.first_index, second.stop_index) == (350, 550)
-    np.testing.assert_array_equal(first.samples[0], np.arange(200, 350))
+        blocks = await read_until(stream, 550)
+    # version 1 leaves the slot alone that may just be overwritten; version 2 sees whether it was
+    assert blocks[0].first_index == (200 if device.layout.version == 1 else 150)
+    np.testing.assert_array_equal(samples_of(blocks), np.arange(blocks[0].first_index, 550))
 
 
-async def test_a_sequence_that_goes_back_for_a_moment_repeats_nothing(device, server, source_at):
+async def test_a_sequence_that_goes_back_for_a_moment_repeats_nothing(
+    device, server, source_at, read_until
+):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(3)
-        await anext(stream)
+        await read_until(stream, 200)
         device.memory.write(0, encode_header(RingHeader(device.layout, device.epoch, 2)))
         n_polls = 0
 
@@ -133,67 +183,106 @@ async def test_a_sequence_that_goes_back_for_a_moment_repeats_nothing(device, se
     assert (block.first_index, block.stop_index) == (200, 250)
 
 
-async def test_counters_wrap_without_a_trace(counting_feed, source_at):
-    settings = RingDeviceSettings(n_slots=8, first_sequence=U32 - 3, first_index=U32 - 120)
+async def test_counters_wrap_without_a_trace(counting_feed, source_at, read_until, version):
+    settings = RingDeviceSettings(
+        n_slots=8, first_sequence=U32 - 3, first_index=U32 - 146, version=version
+    )
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         blocks = [await anext(stream)]
-        for _ in range(4):
+        for n in range(1, 5):
             device.produce(3)
-            blocks.append(await anext(stream))
-    assert [b.first_index - (U32 - 120) for b in blocks] == [0, 50, 200, 350, 500]
-    samples = np.concatenate([b.samples[0] for b in blocks])
-    np.testing.assert_array_equal(samples, np.arange(650))
+            blocks += await read_until(stream, U32 - 146 + 50 + n * 150)
+    assert [b.first_index - (U32 - 146) for b in blocks] == list(range(0, 650, 50))
+    np.testing.assert_array_equal(samples_of(blocks), np.arange(650))
 
 
 async def test_a_restarted_device_starts_a_new_epoch_from_its_first_sample(
-    device, server, source_at
+    device, server, source_at, read_until
 ):
     async with source_at(server.port).connect() as stream:
         before = await anext(stream)
         device.produce(2)
-        await anext(stream)
+        await read_until(stream, 150)
         device.restart()
         device.produce(2)
-        after = await anext(stream)
-    assert after.epoch != before.epoch
-    assert (after.first_index, after.stop_index) == (0, 150)
-    np.testing.assert_array_equal(after.samples[0], np.arange(150, 300))
+        after = await read_until(stream, 150)
+    assert after[0].epoch != before.epoch
+    assert after[0].first_index == 0
+    np.testing.assert_array_equal(samples_of(after), np.arange(150, 300))
+
+
+@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
+async def test_a_new_epoch_is_read_from_its_start_though_its_newest_slot_is_lost(
+    device, server, source_at, read_until
+):
+    async with source_at(server.port).connect() as stream:
+        await anext(stream)
+        device.produce(7)
+        await read_until(stream, 400)
+        device.restart()
+        device.produce(2)
+        device.produce(1, faults.dropped)
+        [first, second, third] = await read_until(stream, 150)
+        device.produce(1)
+        block = await anext(stream)
+    assert (first.first_index, second.first_index, third.first_index) == (0, 50, 100)
+    assert (block.first_index, block.epoch) == (200, first.epoch)
+
+
+@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
+async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
+    device, server, source_at
+):
+    async with source_at(server.port).connect() as stream:
+        await anext(stream)
+        device.produce(1)
+        await anext(stream)
+        address = device.layout.slot_address(1)
+        left_behind = device.memory.read(address, device.layout.slot_registers)
+        device.restart()
+        device.produce(1, faults.dropped)
+        device.memory.write(address, left_behind)
+        device.produce(1)
+        blocks = [await anext(stream), await anext(stream)]
+    assert [block.first_index for block in blocks] == [0, 100]
+    np.testing.assert_array_equal(blocks[1].samples[0], np.arange(200, 250))
 
 
 async def test_a_restart_that_the_device_does_not_tell_is_a_new_epoch_all_the_same(
-    device, server, source_at
+    device, server, source_at, read_until
 ):
     async with source_at(server.port).connect() as stream:
         before = await anext(stream)
         device.produce(200)
-        await anext(stream)
+        await read_until(stream, 201 * 50)
         device.restart(next_epoch=False)
         device.produce(2)
-        after = await anext(stream)
-    assert after.epoch != before.epoch
-    assert (after.first_index, after.stop_index) == (0, 150)
+        after = await read_until(stream, 150)
+    assert after[0].epoch != before.epoch
+    assert after[0].first_index == 0
 
 
 async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
-    counting_feed, source_at
+    counting_feed, source_at, read_until, version
 ):
-    settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000)
+    settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000, version=version)
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         before = await anext(stream)
         device.first_sequence = 0
         device.restart(next_epoch=False)
         device.produce(2)
-        after = await anext(stream)
-    assert after.epoch != before.epoch
-    assert (after.first_index, after.stop_index) == (50, 150)
-    assert after.rejected == (Rejection("inconsistent_index", 50),)
+        after = await read_until(stream, 150)
+    assert after[0].epoch != before.epoch
+    assert (after[0].first_index, after[0].rejected) == (50, (Rejection("inconsistent_index", 50),))
 
 
-async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(counting_feed, source_at):
+async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(
+    counting_feed, source_at, version
+):
     feed = counting_feed(n_channels=3)
-    device = RingDevice(feed)
+    device = RingDevice(feed, settings=RingDeviceSettings(version=version))
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(1)
@@ -208,22 +297,40 @@ async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(counti
     ]
 
 
-async def test_slots_with_padding_between_them_are_read_one_by_one(counting_feed, source_at):
-    settings = RingDeviceSettings(n_slots=8, slot_padding=5)
+async def test_slots_with_padding_between_them_are_read_one_by_one(
+    counting_feed, source_at, read_until, version
+):
+    settings = RingDeviceSettings(n_slots=8, slot_padding=5, version=version)
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(3)
-        block = await anext(stream)
-    np.testing.assert_array_equal(block.samples[0], np.arange(50, 200))
+        blocks = await read_until(stream, 200)
+    np.testing.assert_array_equal(samples_of(blocks), np.arange(50, 200))
 
 
 async def test_more_slow_values_than_fit_one_read_arrive_in_order(
-    counting_feed, counts_calibration, source_at
+    counting_feed, counts_calibration, source_at, version
 ):
-    device = RingDevice(counting_feed(n_channels=3, slow=tuple(float(i) for i in range(80))))
+    feed = counting_feed(n_channels=3, slow=tuple(float(i) for i in range(80)))
+    device = RingDevice(feed, settings=RingDeviceSettings(version=version))
     async with ModbusRingServer(device) as server:
         source = source_at(server.port, calibration=counts_calibration(n_channels=3, n_slow=80))
         async with source.connect() as stream:
             block = await anext(stream)
     assert [reading.value for reading in block.slow.values()] == list(range(80))
+
+
+async def test_slow_values_belong_to_their_samples_whenever_the_reader_looks(
+    counting_feed, source_at, read_until
+):
+    feed = counting_feed(n_channels=3)
+    device = RingDevice(feed)
+    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
+        await anext(stream)
+        for degrees in (46.0, 47.0, 48.0):
+            feed.slow = (degrees, float("nan"))
+            device.produce(1)
+        blocks = await read_until(stream, 200)
+    assert [block.slow["slow0"].value for block in blocks] == [46.0, 47.0, 48.0]
+    assert all(block.slow["slow1"].value is None for block in blocks)
