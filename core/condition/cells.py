@@ -1,0 +1,87 @@
+"""Cells of eccentricity and oil temperature (and attitude): within one, like meets like."""
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+
+Cell: TypeAlias = tuple[int, ...]
+"""Bin numbers of eccentricity ratio, oil temperature and, where it counts, attitude angle."""
+
+CellArray: TypeAlias = npt.NDArray[np.int64]
+"""(n_axes, n) bin numbers."""
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """Widths of the bins; the first bin of each axis begins at zero.
+
+    Parameters
+    ----------
+    eccentricity_width, temperature_width_c
+        Of eccentricity ratio and oil temperature.
+    attitude_width_deg
+        Of the attitude angle; must divide the full circle. None if it does not count.
+
+    Raises
+    ------
+    ValueError
+        With key and value, if a width is not a number above zero, or does not divide the circle.
+    """
+
+    eccentricity_width: float = 0.05
+    temperature_width_c: float = 2.5
+    attitude_width_deg: float | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("eccentricity_width", "temperature_width_c", "attitude_width_deg"):
+            value = getattr(self, key)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{key} = {value:g} must be a number above 0")
+        turn = 360.0 / (self.attitude_width_deg or 360.0)
+        if abs(turn - round(turn)) > 1e-9:
+            raise ValueError(f"attitude_width_deg = {self.attitude_width_deg:g} must divide 360")
+
+    @property
+    def has_attitude(self) -> bool:
+        """Whether the attitude angle counts."""
+        return self.attitude_width_deg is not None
+
+    def cells(
+        self,
+        eccentricity_ratio: FloatArray,
+        oil_temperature_c: FloatArray,
+        attitude_deg: FloatArray,
+    ) -> CellArray:
+        """Cell of each reading; only where `is_known`.
+
+        Returns
+        -------
+        (n_axes, n)
+        """
+        axes = [
+            eccentricity_ratio / self.eccentricity_width,
+            oil_temperature_c / self.temperature_width_c,
+        ]
+        if self.attitude_width_deg is not None:
+            axes.append(np.mod(attitude_deg, 360.0) / self.attitude_width_deg)
+        return np.floor(np.nan_to_num(np.stack(axes))).astype(np.int64)
+
+    def is_known(
+        self,
+        eccentricity_ratio: FloatArray,
+        oil_temperature_c: FloatArray,
+        attitude_deg: FloatArray,
+    ) -> npt.NDArray[np.bool_]:
+        """(n,) whether a reading has everything that its cell depends on."""
+        known = np.isfinite(eccentricity_ratio) & np.isfinite(oil_temperature_c)
+        return known & np.isfinite(attitude_deg) if self.has_attitude else known
+
+    def centre(self, cell: Cell) -> tuple[float, ...]:
+        """Eccentricity ratio, oil temperature and attitude angle in the middle of a cell."""
+        widths = (self.eccentricity_width, self.temperature_width_c, self.attitude_width_deg)
+        return tuple((i + 0.5) * w for i, w in zip(cell, widths, strict=False) if w is not None)

@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+
+from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import (
+    NEVER_SEEN,
+    OperatingReading,
+    OperatingState,
+    Operation,
+    advance,
+)
+from core.condition.operation_history import operation_history
+
+LIMITS = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
+MINUTE_NS = 60_000_000_000
+
+
+def run(
+    speeds_rpm: list[float], powers_mw: list[float], step_ns: int = MINUTE_NS
+) -> list[Operation]:
+    operation, found = NEVER_SEEN, []
+    for index, (speed_rpm, power_mw) in enumerate(zip(speeds_rpm, powers_mw, strict=True)):
+        reading = OperatingReading(index * step_ns, speed_rpm, power_mw)
+        operation = advance(operation, reading, LIMITS)
+        found.append(operation)
+    return found
+
+
+def test_a_start_and_a_stop_pass_through_every_state() -> None:
+    found = run(
+        [0.0, 40.0, 92.3, 92.3, 92.3, 92.3, 40.0, 0.0], [0.0, 0.0, 0.0, 150.0, 320.0, 0.0, 0.0, 0.0]
+    )
+    assert [operation.state.name for operation in found] == [
+        "STANDSTILL",
+        "RUN_UP",
+        "SPEED_NO_LOAD",
+        "PART_LOAD",
+        "FULL_LOAD",
+        "SPEED_NO_LOAD",
+        "RUN_DOWN",
+        "STANDSTILL",
+    ]
+
+
+def test_power_that_hovers_at_a_limit_does_not_change_the_state() -> None:
+    powers_mw = [280.0 + swing for swing in (-20.0, 3.0, -3.0, 3.0, -3.0)]
+    assert {o.state for o in run([92.3] * 5, powers_mw)} == {OperatingState.PART_LOAD}
+
+
+def test_a_state_settles_only_after_its_time() -> None:
+    settled = [o.is_settled(LIMITS) for o in run([92.3] * 40, [200.0] * 40)]
+    assert settled == [False] * 30 + [True] * 10
+
+
+def test_a_shaft_that_turns_in_between_after_a_gap_is_unknown() -> None:
+    before = advance(NEVER_SEEN, OperatingReading(0, 92.3, 200.0), LIMITS)
+    after = advance(before, OperatingReading(120 * MINUTE_NS, 50.0, 0.0), LIMITS)
+    assert after.state is OperatingState.UNKNOWN
+
+
+def test_without_speed_or_power_the_state_is_unknown() -> None:
+    states = [o.state for o in run([float("nan"), 92.3], [200.0, float("nan")])]
+    assert states == [OperatingState.UNKNOWN] * 2
+
+
+def test_time_cannot_stand_still() -> None:
+    operation = advance(NEVER_SEEN, OperatingReading(5, 92.3, 200.0), LIMITS)
+    with pytest.raises(ValueError, match="not after 5 ns"):
+        advance(operation, OperatingReading(5, 92.3, 200.0), LIMITS)
+
+
+def wander(random: np.random.Generator, n: int, top: float) -> np.ndarray:
+    """From nothing to a little above the top and back, with rests at both."""
+    swing = np.cumsum(random.normal(0.0, 0.1, n))
+    return top * np.clip(0.5 + 0.7 * np.sin(swing) + random.normal(0.0, 0.01, n), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_history_has_the_states_that_its_readings_have_one_by_one(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    n = 4000
+    speed_rpm = wander(random, n, 95.0)
+    power_mw = wander(random, n, 340.0)
+    speed_rpm[random.random(n) < 0.03] = np.nan
+    power_mw[random.random(n) < 0.03] = np.nan
+    step_ns = np.where(random.random(n) < 0.05, 90 * MINUTE_NS, 7 * MINUTE_NS)
+    time_ns = np.cumsum(step_ns).astype(np.int64)
+    operation, states, settled = NEVER_SEEN, [], []
+    for now_ns, rpm, mw in zip(time_ns, speed_rpm, power_mw, strict=True):
+        operation = advance(operation, OperatingReading(int(now_ns), rpm, mw), LIMITS)
+        states.append(int(operation.state))
+        settled.append(operation.is_settled(LIMITS))
+    found = operation_history(time_ns, speed_rpm, power_mw, LIMITS)
+    assert found.state.tolist() == states
+    assert found.is_settled.tolist() == settled
+    assert len(set(states)) >= len(OperatingState) - 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("settling_s", 0.0),
+        ("rated_power_mw", float("nan")),
+        ("full_load_above", -1.0),
+        ("full_load_above", 0.06),
+        ("speed_hysteresis", 0.1),
+    ],
+)
+def test_impossible_limits_are_refused_with_key_and_value(key: str, value: float) -> None:
+    settings = {"rated_speed_rpm": 92.3, "rated_power_mw": 330.0, key: value}
+    with pytest.raises(ValueError, match=f"{key}|hysteresis") as refusal:
+        OperatingLimits(**settings)
+    assert f"{value:g}" in str(refusal.value)
