@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 
 from core.arrays import SampleArray
 from core.cross_spectrum import CrossSpectrum
@@ -10,6 +11,14 @@ from core.quality import Quality, Reading
 from core.runout import RunoutVerdict
 from core.speed import SpeedSource
 from core.uncertainty import Budget
+
+
+class Evidence(StrEnum):
+    """What results stand on. The names appear in the API."""
+
+    WAVEFORMS = "waveforms"
+    AMPLITUDE_AND_PHASE = "amplitude_and_phase"
+    AMPLITUDE_ONLY = "amplitude_only"
 
 
 @dataclass(frozen=True)
@@ -77,6 +86,9 @@ class Assessment:
     runout
         Whether the slow-roll vector was taken off 1× of the newest segment, by "shaft_x" and
         "shaft_y".
+    evidence
+        Waveforms, or what a rack has made of them: then there is no coherence, and equation (5)
+        cannot tell noise from motion.
     """
 
     unit: str
@@ -91,3 +103,4 @@ class Assessment:
     spectrum: CrossSpectrum
     orbit: OrbitTrace | None
     runout: Mapping[str, RunoutVerdict]
+    evidence: Evidence = Evidence.WAVEFORMS

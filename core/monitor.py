@@ -1,11 +1,11 @@
 """`UnitMonitor`: sample blocks of one unit in, assessments of its bearings out."""
 
 from collections.abc import Iterator
-from dataclasses import fields
 
 import numpy as np
 
 from core.account import Gap, SampleAccount
+from core.adoption import bearings_with_new_references, require_same_machine
 from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.bearing_results import BearingResults
 from core.blocks import SampleBlock
@@ -69,13 +69,9 @@ class UnitMonitor:
         ValueError
             If it does; the message says where, and gives both.
         """
-        here, there = _fixed_parts(self.unit), _fixed_parts(unit)
-        for name, value in here.items():
-            if there[name] != value:
-                raise ValueError(f"{name} is {there[name]!r}, is {value!r} here")
-        for before, after in zip(self.unit.bearings, unit.bearings, strict=True):
-            if _references(before) != _references(after):
-                self._growth.pop(before.id, None)  # it counts from a reference
+        require_same_machine(self.unit, unit)
+        for bearing in bearings_with_new_references(self.unit, unit):
+            self._growth.pop(bearing, None)  # it counts from a reference
         self.unit = unit
 
     def drain_gaps(self) -> list[Gap]:
@@ -193,16 +189,6 @@ class UnitMonitor:
         traces = signs * window.samples[rows]
         traces -= traces.mean(axis=1, keepdims=True)
         return OrbitTrace(window.start_ns, window.rate_hz, traces[0], traces[1])
-
-
-def _fixed_parts(unit: Unit) -> dict[str, object]:
-    """What stays as long as a monitor lives, by name."""
-    fixed: dict[str, object] = {field.name: getattr(unit, field.name) for field in fields(unit)}
-    return fixed | {"bearings": tuple((b.id, b.channels) for b in unit.bearings)}
-
-
-def _references(bearing: Bearing) -> tuple[object, ...]:
-    return (bearing.gap_reference_um, bearing.opposite_reference_um)
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:

@@ -1,0 +1,47 @@
+"""The port through which the program hands sample blocks to the numerics of one unit."""
+
+from typing import Protocol
+
+from core.account import Gap, SampleAccount
+from core.assessment import Assessment
+from core.blocks import SampleBlock
+from core.machine import Unit
+
+
+class Monitor(Protocol):
+    """Watches one unit.
+
+    :class:`core.monitor.UnitMonitor` does it by waveforms,
+    :class:`core.vector_monitor.VectorMonitor` by what a rack has made of them.
+    """
+
+    unit: Unit
+
+    @property
+    def account(self) -> SampleAccount:
+        """Where every sample went that the unit's device offered."""
+        ...
+
+    def adopt(self, unit: Unit) -> None:
+        """Take a new description of the same unit, from the next assessment on.
+
+        Raises
+        ------
+        ValueError
+            If more than references, clearances and brackets differ.
+        """
+        ...
+
+    def drain_gaps(self) -> list[Gap]:
+        """Hand over the gaps found since the last call, to be recorded."""
+        ...
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return what has been learnt by it.
+
+        Raises
+        ------
+        ValueError
+            If the block does not fit the unit.
+        """
+        ...

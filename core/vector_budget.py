@@ -1,0 +1,71 @@
+"""Uncertainty of equation (5) when a rack gives amplitudes and no waveforms."""
+
+import math
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.bracket import BracketDynamics
+from core.stiffness_budget import BEARING_GAIN, BRACKET, RUNOUT, SHAFT_GAIN
+from core.uncertainty import BearingAccuracy, Budget, random_line, systematic_line
+
+SPREAD = "spread of polls"
+COHERENCE = "coherence not known"
+
+
+def vector_ratio_budget(
+    shaft_um_pk: FloatArray,
+    bearing_um_pk: FloatArray,
+    frequency_hz: float,
+    bracket: BracketDynamics,
+    accuracy: BearingAccuracy,
+    coherence: float,
+    runout_um_pk: float = 0.0,
+) -> Budget | None:
+    """Uncertainty of ``|X_b| / |U| k_b`` over some polls.
+
+    A rack may be asked more often than it measures: only polls whose amplitudes differ from the
+    ones before count as independent.
+
+    Parameters
+    ----------
+    shaft_um_pk, bearing_um_pk : (n_polls,)
+        Amplitudes of the same polls; shaft amplitudes above zero.
+    coherence
+        Squared, of the two; without phases the least that would be accepted of waveforms.
+    runout_um_pk
+        Largest runout at this line, not taken off.
+
+    Returns
+    -------
+    None with fewer than two independent polls.
+    """
+    independent = n_independent(shaft_um_pk, bearing_um_pk)
+    if independent < 2:
+        return None
+    shaft = float(np.sqrt(np.mean(shaft_um_pk**2)))
+    value = float(np.sqrt(np.mean(bearing_um_pk**2))) / shaft * bracket.stiffness_n_per_m
+    each = bearing_um_pk / shaft_um_pk * bracket.stiffness_n_per_m
+    random = float(np.std(each, ddof=1)) / math.sqrt(independent)
+    omega = 2.0 * math.pi * frequency_hz
+    inertia = bracket.mass_kg * omega**2 / bracket.stiffness_n_per_m
+    return Budget(
+        value,
+        (
+            random_line(SPREAD, random, independent - 1.0),
+            systematic_line(SHAFT_GAIN, accuracy.shaft_gain, -value),
+            systematic_line(BEARING_GAIN, accuracy.bearing_gain, value),
+            systematic_line(BRACKET, accuracy.bracket_stiffness, value),
+            systematic_line(COHERENCE, 1.0 / math.sqrt(coherence) - 1.0, value),
+            systematic_line("bracket inertia left out", inertia, value),
+            systematic_line(RUNOUT, runout_um_pk, value / shaft),
+        ),
+    )
+
+
+def n_independent(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> int:
+    """Polls in which at least one of two amplitudes differs from the poll before."""
+    if shaft_um_pk.size == 0:
+        return 0
+    changed = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
+    return 1 + int(np.count_nonzero(changed))

@@ -1,0 +1,196 @@
+"""`VectorMonitor`: what a rack has measured in, assessments of the unit's bearings out."""
+
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from core.account import Gap, SampleAccount
+from core.adoption import bearings_with_new_references, require_same_machine
+from core.assessment import Assessment, AveragingWindow
+from core.blocks import SampleBlock
+from core.cross_spectrum import CrossSpectrum
+from core.machine import Bearing, Unit
+from core.monitor import JUDGED
+from core.position_results import measured_growth
+from core.probe_axes import Growth
+from core.quality import worst
+from core.ring import Ring
+from core.runout import RunoutVerdict, runout_verdict
+from core.settings import AnalysisSettings
+from core.vector_polls import Poll, PollReader
+from core.vector_results import VectorResults
+from core.vector_rows import VectorRow
+from core.vector_settings import VectorSettings
+
+
+class VectorMonitor:
+    """Watches a unit by the vectors of its rack. All state of its analysis is here.
+
+    Results depend on the polls and their indices alone, not on how they were cut into blocks.
+
+    Parameters
+    ----------
+    unit
+        Its rate is that of the polls.
+    rows
+        What the rows of a block are.
+    settings
+        What counts as evidence; segments play no part here.
+    averaging
+        Which polls make a result.
+
+    Raises
+    ------
+    ValueError
+        If a row is of a channel that the unit has not.
+    """
+
+    def __init__(
+        self,
+        unit: Unit,
+        rows: Sequence[VectorRow],
+        settings: AnalysisSettings,
+        averaging: VectorSettings | None = None,
+    ) -> None:
+        self.unit = unit
+        self._settings = settings
+        self._averaging = averaging or VectorSettings()
+        self._reader = PollReader(unit, rows, settings)
+        self._ring = Ring(len(rows), 1)  # for the index rules and the account; polls are kept here
+        self._polls: deque[Poll] = deque()
+        self._first_index: int | None = None
+        self._n_hops = -1
+        self._gaps: list[Gap] = []
+        self._growth: dict[str, Growth] = {}
+
+    @property
+    def account(self) -> SampleAccount:
+        """Where every poll went."""
+        return self._ring.account
+
+    def adopt(self, unit: Unit) -> None:
+        """Take a new description of the same unit, from the next assessment on.
+
+        Raises
+        ------
+        ValueError
+            If more than references, clearances and brackets differ; says where, and gives both.
+        """
+        require_same_machine(self.unit, unit)
+        for bearing in bearings_with_new_references(self.unit, unit):
+            self._growth.pop(bearing, None)  # it counts from a reference
+        self.unit = unit
+
+    def drain_gaps(self) -> list[Gap]:
+        """Hand over the gaps found since the last call, to be recorded."""
+        gaps, self._gaps = self._gaps, []
+        return gaps
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return what has been learnt by it.
+
+        Parameters
+        ----------
+        block
+            Rows as given, a sample for each poll; repeated polls are dropped.
+
+        Returns
+        -------
+        One assessment for each bearing and each hop that the block completes; mostly none.
+
+        Raises
+        ------
+        ValueError
+            If the block is not of this unit, or has another rate or number of rows.
+        """
+        if block.unit != self.unit.id:
+            raise ValueError(f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}")
+        if block.rate_hz != self.unit.rate_hz:
+            raise ValueError(f"polls at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
+        epoch, taken_up_to = self._ring.epoch, self._ring.stop_index
+        gap = self._ring.write(block)
+        if gap is not None:
+            self._gaps.append(gap)
+        if block.epoch != epoch:
+            self._begin(block.first_index)
+            taken_up_to = 0
+        fresh = [poll for poll in self._reader.polls(block) if poll.index >= taken_up_to]
+        return [assessment for poll in fresh for assessment in self._take(block.epoch, poll)]
+
+    def _begin(self, first_index: int) -> None:
+        self._polls.clear()
+        self._first_index = first_index
+        self._n_hops = first_index // self._averaging.hop_polls
+
+    def _take(self, epoch: int, poll: Poll) -> list[Assessment]:
+        self._polls.append(poll)
+        while self._polls[0].index <= poll.index - self._averaging.n_polls:
+            self._polls.popleft()
+        n_hops = (poll.index + 1) // self._averaging.hop_polls
+        if n_hops == self._n_hops:
+            return []
+        self._n_hops = n_hops
+        return [self._assess(epoch, bearing) for bearing in self.unit.bearings]
+
+    def _assess(self, epoch: int, bearing: Bearing) -> Assessment:
+        polls = list(self._polls)
+        newest = polls[-1]
+        n_possible = newest.index + 1 - (self._first_index or 0)
+        results = VectorResults(
+            self.unit,
+            bearing,
+            self._settings,
+            self._averaging,
+            polls,
+            min(self._averaging.n_polls, n_possible),
+            self._growth.get(bearing.id),
+        )
+        growth = measured_growth(results.readings)
+        if growth is not None:
+            self._growth[bearing.id] = growth
+        stop_index = newest.index + 1
+        return Assessment(
+            unit=self.unit.id,
+            bearing=bearing.id,
+            time_ns=newest.time_ns,
+            window=AveragingWindow(
+                epoch=epoch,
+                first_index=polls[0].index,
+                stop_index=stop_index,
+                n_segments=results.n_polls,
+                n_segments_wanted=self._averaging.n_polls,
+                n_voided=0,
+                coverage=results.coverage,
+                duration_s=(stop_index - polls[0].index) / self.unit.rate_hz,
+            ),
+            speed_source=newest.speed.source,
+            quality=worst(r.quality for name, r in results.readings.items() if name in JUDGED),
+            readings=results.readings,
+            budgets=results.budgets,
+            estimators=results.estimators,
+            spectrum=no_spectrum(),
+            orbit=None,
+            runout={
+                "shaft_x": self._runout(bearing.shaft_x),
+                "shaft_y": self._runout(bearing.shaft_y),
+            },
+            evidence=results.evidence,
+        )
+
+    def _runout(self, id_: str) -> RunoutVerdict:
+        """A rack's phase has another reference than a slow-roll vector of padwatch's."""
+        channel = next(channel for channel in self.unit.channels if channel.id == id_)
+        return runout_verdict(
+            channel.slow_roll, channel.probe, self.unit.rated_speed_rpm, has_key_phase=False
+        )
+
+
+def no_spectrum() -> CrossSpectrum:
+    """The spectrum of what has no waveform: no lines, of no segments."""
+    return CrossSpectrum(
+        frequency_hz=np.empty(0),
+        matrix=np.empty((0, 4, 4), dtype=np.complex128),
+        power=np.empty((0, 4, 4)),
+        n_segments=np.zeros((4, 4), dtype=np.int64),
+    )

@@ -1,0 +1,409 @@
+"""A rack that gives amplitudes, and perhaps phases, is enough for equation (5); no more is said."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.assessment import Assessment, Evidence
+from core.blocks import SampleBlock
+from core.machine import Channel, Measurand, Unit
+from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing
+from core.quantities import CATALOGUE
+from core.settings import AnalysisSettings
+from core.speed import SpeedSource
+from core.stiffness_budget import BEARING_GAIN, BRACKET, SHAFT_GAIN
+from core.uncertainty import BearingAccuracy
+from core.vector_budget import COHERENCE, SPREAD
+from core.vector_monitor import VectorMonitor
+from core.vector_rows import VectorPart, VectorRow
+from core.vector_settings import VectorSettings
+
+RATE_HZ = 0.2
+K_B = 1.18e9
+AVERAGING = VectorSettings(n_polls=60, hop_polls=12, min_polls=4)
+AMPLITUDES = tuple(VectorRow(id_, VectorPart.ORDER1_AMPLITUDE) for id_ in ("sx", "sy", "bx", "by"))
+PHASES = tuple(VectorRow(id_, VectorPart.ORDER1_PHASE) for id_ in ("sx", "sy", "bx", "by"))
+GAPS = tuple(VectorRow(id_, VectorPart.GAP) for id_ in ("sx", "sy"))
+VORTEX = tuple(VectorRow(id_, VectorPart.VORTEX_AMPLITUDE) for id_ in ("sx", "sy", "bx", "by"))
+SLOW = {"speed": Reading(92.3), "power": Reading(650.0), "oil": Reading(45.0)}
+
+
+@pytest.fixture
+def rack(unit: Unit) -> Callable[..., VectorMonitor]:
+    """Builds monitors of the unit, whose shaft channels count motion towards the probe."""
+    channels = tuple(replace(channel, direction=1) for channel in unit.channels)
+
+    def build(rows: tuple[VectorRow, ...] = AMPLITUDES, **changes) -> VectorMonitor:
+        averaging = changes.pop("averaging", AVERAGING)
+        bearing = replace(unit.bearings[0], **changes.pop("bearing", {}))
+        there = replace(unit, rate_hz=RATE_HZ, bearings=(bearing,), channels=channels, **changes)
+        return VectorMonitor(there, rows, AnalysisSettings(), averaging)
+
+    return build
+
+
+def polls(
+    *rows: float, n: int = 60, noise: float = 0.01, seed: int = 1, **settings
+) -> list[SampleBlock]:
+    """Polls of constant rows with a little relative noise."""
+    wobble = 1.0 + noise * np.random.default_rng(seed).normal(size=(len(rows), n))
+    return blocks_of(np.array(rows)[:, np.newaxis] * wobble, **settings)
+
+
+def blocks_of(
+    values,
+    first_index: int = 0,
+    epoch: int = 1,
+    slow: dict[str, Reading] = SLOW,
+    quality: dict[int, Quality] | None = None,
+    n_each: int = 1,
+) -> list[SampleBlock]:
+    n_rows, n = values.shape
+    return [
+        SampleBlock(
+            unit="U1",
+            epoch=epoch,
+            first_index=first_index + start,
+            start_ns=round((first_index + start) / RATE_HZ * 1e9),
+            rate_hz=RATE_HZ,
+            samples=values[:, start : start + n_each].astype(np.float32),
+            channel_quality=tuple((quality or {}).get(row, GOOD) for row in range(n_rows)),
+            slow=slow,
+        )
+        for start in range(0, n, n_each)
+    ]
+
+
+def watch(monitor: VectorMonitor, stream: list[SampleBlock]) -> list[Assessment]:
+    return [assessment for block in stream for assessment in monitor.ingest(block)]
+
+
+def test_equation_5_is_computed_from_the_amplitudes_of_a_rack(rack) -> None:
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, noise=1e-6))[-1]
+
+    value = {name: reading.value for name, reading in newest.readings.items()}
+    assert value["order1_shaft_x_um_pk"] == pytest.approx(60.0, rel=1e-5)
+    assert value["order1_bearing_y_um_pk"] == pytest.approx(10.0, rel=1e-5)
+    assert value["order1_k_eff_xx_n_per_m"] == pytest.approx(20.0 / 60.0 * K_B, rel=1e-5)
+    assert value["order1_k_eff_yy_n_per_m"] == pytest.approx(10.0 / 50.0 * K_B, rel=1e-5)
+    assert newest.readings["stiffness_xx_n_per_m"] == newest.readings["order1_k_eff_xx_n_per_m"]
+    assert newest.estimators == {"xx": "ratio_order1", "yy": "ratio_order1"}
+    assert newest.evidence is Evidence.AMPLITUDE_ONLY
+    assert newest.quality == GOOD
+    assert newest.speed_source is SpeedSource.SLOW_CHANNEL
+    assert (value["speed_rpm"], value["power_mw"], value["oil_temperature_c"]) == (92.3, 650, 45)
+
+
+def test_every_quantity_of_the_catalogue_has_a_number_or_a_reason(rack) -> None:
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0))[-1]
+
+    assert set(newest.readings) == {quantity.name for quantity in CATALOGUE}
+
+
+def test_what_takes_waveforms_is_missing_and_never_a_number(rack) -> None:
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0))[-1]
+
+    absent = [
+        name
+        for name in newest.readings
+        if name.startswith(("dynamic_", "vortex_shaft", "vortex_k", "vortex_transfer"))
+        or any(word in name for word in ("coherence", "roundness", "transfer", "gap", "centre"))
+    ]
+    assert len(absent) > 30
+    for name in absent:
+        assert newest.readings[name] == missing(Reason.NOT_MEASURED), name
+    assert newest.orbit is None
+    assert newest.spectrum.frequency_hz.size == 0
+    assert not newest.spectrum.n_segments.any()
+
+
+def test_results_come_every_hop_whatever_the_blocks(rack) -> None:
+    values = np.abs(np.random.default_rng(5).normal(40.0, 1.0, size=(4, 100)))
+    results = [watch(rack(), blocks_of(values, n_each=n_each)) for n_each in (1, 7, 100)]
+
+    assert [a.window.stop_index for a in results[0]] == list(range(12, 101, 12))
+    for other in results[1:]:
+        assert [a.readings for a in other] == [a.readings for a in results[0]]
+        assert [a.window for a in other] == [a.window for a in results[0]]
+
+
+def test_velocity_and_acceleration_become_displacement_at_the_speed_of_the_poll(
+    unit: Unit,
+) -> None:
+    omega = 2 * np.pi * 92.3 / 60
+    channels = (
+        *unit.channels[:2],
+        Channel("bx", Measurand.VELOCITY_MM_S),
+        Channel("by", Measurand.ACCELERATION_M_S2),
+    )
+    monitor = VectorMonitor(
+        replace(unit, rate_hz=RATE_HZ, channels=channels), AMPLITUDES, AnalysisSettings()
+    )
+    newest = watch(monitor, polls(60, 60, 20e-3 * omega, 20e-6 * omega**2, noise=0.0, n=12))[-1]
+
+    assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(20.0, rel=1e-5)
+    assert newest.readings["order1_bearing_y_um_pk"].value == pytest.approx(20.0, rel=1e-5)
+
+
+def test_the_spread_of_the_polls_is_the_random_part(rack) -> None:
+    scatter = 0.05
+    newest = watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=scatter))[-1]
+
+    k_eff = newest.readings["order1_k_eff_xx_n_per_m"]
+    assert k_eff.u_random == pytest.approx(k_eff.value * scatter * np.sqrt(2.0 / 60.0), rel=0.25)
+
+
+def test_the_stated_random_part_is_true(rack) -> None:
+    results = [
+        watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.05, seed=seed))[-1].readings
+        for seed in range(60)
+    ]
+    k_eff = [readings["order1_k_eff_xx_n_per_m"] for readings in results]
+
+    found = np.std([reading.value for reading in k_eff])
+    stated = np.mean([reading.u_random for reading in k_eff])
+    assert found == pytest.approx(stated, rel=0.3)
+
+
+def test_transducers_bracket_and_the_unknown_coherence_are_the_systematic_part(rack) -> None:
+    accuracy = BearingAccuracy(shaft_gain=0.03, bearing_gain=0.04, bracket_stiffness=0.1)
+    monitor = rack(bearing={"accuracy": accuracy})
+    newest = watch(monitor, polls(60.0, 60.0, 20.0, 20.0))[-1]
+
+    budget = newest.budgets["order1_k_eff_xx_n_per_m"]
+    share = {line.name: line.contribution / budget.value for line in budget.lines}
+    third = 1.0 / np.sqrt(3.0)
+    assert share[SHAFT_GAIN] == pytest.approx(0.03 * third)
+    assert share[BEARING_GAIN] == pytest.approx(0.04 * third)
+    assert share[BRACKET] == pytest.approx(0.1 * third)
+    assert share[COHERENCE] == pytest.approx((1 / np.sqrt(0.9) - 1) * third)
+    assert share[SPREAD] > 0.0
+
+
+def test_a_rack_asked_more_often_than_it_measures_is_not_believed_more(rack) -> None:
+    rng = np.random.default_rng(7)
+    measured = np.array([[60.0], [60.0], [20.0], [20.0]]) * (1 + 0.05 * rng.normal(size=(4, 12)))
+    often = watch(rack(), blocks_of(np.repeat(measured, 5, axis=1)))[-1]
+    once = watch(rack(), blocks_of(measured))[-1]
+
+    name = "order1_k_eff_xx_n_per_m"
+    assert often.readings[name].value == pytest.approx(once.readings[name].value)
+    assert often.readings[name].u_random == pytest.approx(once.readings[name].u_random, rel=0.05)
+
+
+def test_a_rack_that_repeats_itself_is_doubted(rack) -> None:
+    newest = watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.0))[-1]
+
+    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.reason is Reason.FEW_SEGMENTS
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "changes", "reason"),
+    [
+        ((60.0, 60.0, 3.9, 20.0), {}, Reason.INSUFFICIENT_EXCITATION),
+        ((0.0, 60.0, 20.0, 20.0), {}, Reason.INSUFFICIENT_EXCITATION),
+        ((60.0, 60.0, 20.0, 20.0), {"runout_um_pk": 20.0}, Reason.INSUFFICIENT_EXCITATION),
+        ((60.0, 60.0, 4.1, 20.0), {"runout_um_pk": 14.0}, Reason.OK),
+    ],
+)
+def test_too_little_motion_gives_no_stiffness(rack, amplitudes, changes, reason) -> None:
+    newest = watch(rack(bearing=changes), polls(*amplitudes))[-1]
+
+    k_eff = newest.readings["order1_k_eff_xx_n_per_m"]
+    assert k_eff.quality.reason is reason
+    assert (k_eff.value is None) == (reason is not Reason.OK)
+    assert newest.readings["stiffness_xx_n_per_m"].quality.reason is reason
+
+
+def test_a_lost_probe_is_never_shown_as_a_number(rack) -> None:
+    monitor = rack()
+    watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=48))
+    lost = polls(
+        60.0, 50.0, 20.0, 10.0, n=12, first_index=48, quality={0: bad(Reason.SENSOR_FAILURE)}
+    )
+    newest = watch(monitor, lost)[-1]
+
+    for name in ("order1_shaft_x_um_pk", "order1_k_eff_xx_n_per_m", "stiffness_xx_n_per_m"):
+        assert newest.readings[name] == missing(Reason.SENSOR_FAILURE)
+    assert newest.readings["order1_k_eff_yy_n_per_m"].value is not None
+    assert newest.quality.level is Level.BAD
+
+
+def test_no_number_that_a_rack_flags_enters_an_average(rack) -> None:
+    monitor = rack()
+    watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=40, noise=0.0))
+    wrong = polls(
+        9e9, 50.0, 20.0, 10.0, n=8, noise=0.0, first_index=40, quality={0: bad(Reason.CLIPPED)}
+    )
+    watch(monitor, wrong)
+    newest = watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=12, noise=0.0, first_index=48))[-1]
+
+    assert newest.readings["order1_shaft_x_um_pk"].value == pytest.approx(60.0)
+    assert newest.window.n_segments == 52
+    assert newest.window.coverage == pytest.approx(52 / 60)
+
+
+def test_a_standing_machine_gives_nothing(rack) -> None:
+    standing = SLOW | {"speed": Reading(3.0)}
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, slow=standing))[-1]
+
+    assert newest.readings["speed_rpm"] == missing(Reason.STANDSTILL)
+    assert newest.readings["order1_shaft_x_um_pk"] == missing(Reason.STANDSTILL)
+    assert newest.readings["stiffness_xx_n_per_m"] == missing(Reason.STANDSTILL)
+
+
+def test_without_a_speed_the_rated_one_is_taken_and_doubted(rack) -> None:
+    unknown = SLOW | {"speed": missing(Reason.NOT_MEASURED)}
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, slow=unknown))[-1]
+
+    assert newest.speed_source is SpeedSource.RATED
+    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.level is Level.UNCERTAIN
+
+
+def test_gaps_give_the_shaft_centre(rack) -> None:
+    newest = watch(
+        rack(AMPLITUDES + GAPS), polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, noise=1e-6)
+    )[-1]
+
+    assert newest.readings["gap_x_um"].value == pytest.approx(1970.0, rel=1e-4)
+    assert newest.readings["shaft_centre_x_um"].value == pytest.approx(30.0, abs=0.1)
+    assert newest.readings["eccentricity_ratio"].value == pytest.approx(0.25, abs=0.001)
+
+
+def test_the_vortex_order_is_its_own_line_without_runout(rack) -> None:
+    rows = AMPLITUDES + VORTEX
+    bearing = {"runout_um_pk": 100.0}
+    newest = watch(
+        rack(rows, bearing=bearing), polls(60.0, 50.0, 20.0, 10.0, 30.0, 30.0, 12.0, 12.0)
+    )[-1]
+
+    quiet = Reason.INSUFFICIENT_EXCITATION
+    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.reason is quiet
+    assert newest.readings["vortex_k_eff_xx_n_per_m"].value == pytest.approx(0.4 * K_B, rel=0.02)
+    assert newest.readings["vortex_frequency_hz"].value == pytest.approx(0.25 * 92.3 / 60)
+    assert newest.estimators["xx"] == "ratio_vortex"
+
+
+def test_a_turbine_without_vortex_has_that_order_switched_off(rack) -> None:
+    newest = watch(rack(has_vortex=False), polls(60.0, 50.0, 20.0, 10.0))[-1]
+
+    assert newest.readings["vortex_k_eff_xx_n_per_m"] == missing(Reason.SWITCHED_OFF)
+    assert newest.readings["vortex_shaft_x_um_pk"] == missing(Reason.SWITCHED_OFF)
+
+
+FILM = 0.5e9 + 1j * 0.04e9
+
+
+def vectors(noise_deg: float = 0.0, n: int = 60) -> list[SampleBlock]:
+    """A forward circle of the shaft; the bearing follows through the film: X_b = U·k/k_b."""
+    bearing = FILM / K_B * 60.0
+    angle = np.rad2deg(np.angle(bearing))
+    rows = np.array([60.0, 60.0, abs(bearing), abs(bearing), 40.0, -50.0, 40 + angle, angle - 50])
+    rng = np.random.default_rng(3)
+    values = np.repeat(rows[:, np.newaxis], n, axis=1)
+    values[:4] *= 1 + 0.001 * rng.normal(size=(4, n))
+    values[4:] += noise_deg * rng.normal(size=(4, n))
+    return blocks_of(values)
+
+
+def test_with_phases_stiffness_and_damping_are_told_apart(rack) -> None:
+    newest = watch(rack(AMPLITUDES + PHASES), vectors(noise_deg=0.5))[-1]
+
+    omega = 2 * np.pi * 92.3 / 60
+    k = newest.readings["order1_transfer_k_xx_n_per_m"]
+    c = newest.readings["order1_transfer_c_yy_n_s_per_m"]
+    assert k.value == pytest.approx(FILM.real, rel=2e-3)
+    assert c.value * omega == pytest.approx(FILM.imag, rel=0.05)
+    assert k.u_random is not None
+    assert newest.readings["order1_roundness"].value == pytest.approx(1.0, abs=1e-3)
+    assert newest.readings["order1_coherence_xx"] == missing(Reason.NOT_MEASURED)
+    assert newest.evidence is Evidence.AMPLITUDE_AND_PHASE
+    assert newest.estimators == {"xx": "transfer_order1", "yy": "transfer_order1"}
+
+
+def test_vectors_that_do_not_hang_together_give_no_stiffness(rack) -> None:
+    newest = watch(rack(AMPLITUDES + PHASES), vectors(noise_deg=60.0))[-1]
+
+    for name in ("order1_k_eff_xx_n_per_m", "order1_transfer_k_xx_n_per_m"):
+        assert newest.readings[name] == missing(Reason.INSUFFICIENT_EXCITATION)
+
+
+def test_exchanged_phases_are_doubted_as_exchanged_axes(rack) -> None:
+    monitor = rack(AMPLITUDES + PHASES, rotation_sense=-1)
+    newest = watch(monitor, vectors())[-1]
+
+    assert newest.readings["stiffness_xx_n_per_m"].quality.reason is Reason.SWAPPED_AXES
+
+
+def test_a_phase_that_is_bad_is_no_phase(rack) -> None:
+    blocks = [
+        replace(b, channel_quality=(GOOD,) * 6 + (bad(Reason.SENSOR_FAILURE),) * 2)
+        for b in vectors()
+    ]
+    newest = watch(rack(AMPLITUDES + PHASES), blocks)[-1]
+
+    assert newest.readings["order1_transfer_k_xx_n_per_m"] == missing(Reason.NOT_MEASURED)
+    assert newest.readings["order1_k_eff_xx_n_per_m"].value is not None
+    assert newest.evidence is Evidence.AMPLITUDE_ONLY
+
+
+def test_missed_polls_are_an_exact_gap_and_repeated_ones_are_dropped(rack) -> None:
+    monitor = rack()
+    stream = polls(60.0, 50.0, 20.0, 10.0, n=40)
+    watch(monitor, stream[:10])
+    watch(monitor, stream[15:20])
+    watch(monitor, stream[18:24])
+
+    [gap] = monitor.drain_gaps()
+    assert (gap.first_index, gap.n_samples) == (10, 5)
+    assert monitor.drain_gaps() == []
+    account = monitor.account
+    assert (account.n_stored, account.n_gap, account.n_repeated) == (19, 5, 2)
+    assert account.n_offered == 24
+
+
+def test_a_restart_begins_a_new_average(rack) -> None:
+    monitor = rack()
+    watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=48))
+    newest = watch(monitor, polls(60.0, 50.0, 40.0, 10.0, n=12, epoch=2, noise=0.0))[-1]
+
+    assert newest.window.n_segments == 12
+    assert newest.window.epoch == 2
+    assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(40.0)
+
+
+def test_a_new_reference_moves_the_centre_and_nothing_else_may_change(rack) -> None:
+    monitor = rack(AMPLITUDES + GAPS)
+    stream = polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, n=24, noise=0.0)
+    before = watch(monitor, stream[:12])[-1]
+    [bearing] = monitor.unit.bearings
+    moved = replace(bearing, gap_reference_um=(1970.0, 1960.0))
+    monitor.adopt(replace(monitor.unit, bearings=(moved,)))
+    after = watch(monitor, stream[12:])[-1]
+
+    assert before.readings["eccentricity_ratio"].value == pytest.approx(0.25)
+    assert after.readings["eccentricity_ratio"].value == pytest.approx(0.0)
+    with pytest.raises(ValueError, match="rated_speed_rpm is 100"):
+        monitor.adopt(replace(monitor.unit, rated_speed_rpm=100.0))
+
+
+def test_a_block_of_something_else_is_refused(rack) -> None:
+    [block] = polls(60.0, 50.0, 20.0, 10.0, n=1)
+    with pytest.raises(ValueError, match="block of unit 'U2'"):
+        rack().ingest(replace(block, unit="U2"))
+    with pytest.raises(ValueError, match=r"1\.0 Hz, configured 0\.2 Hz"):
+        rack().ingest(replace(block, rate_hz=1.0))
+    with pytest.raises(ValueError, match="4 channels offered to a ring of 6"):
+        rack(AMPLITUDES + GAPS).ingest(block)
+    with pytest.raises(ValueError, match="no channel of unit"):
+        rack((VectorRow("nowhere", VectorPart.GAP),))
+    with pytest.raises(ValueError, match="are the same"):
+        rack((AMPLITUDES[0], AMPLITUDES[0]))
+
+
+@pytest.mark.parametrize("wrong", [{"hop_polls": 0}, {"hop_polls": 61}, {"min_polls": 1}])
+def test_an_impossible_average_is_refused(wrong) -> None:
+    with pytest.raises(ValueError, match="polls"):
+        VectorSettings(**({"n_polls": 60} | wrong))
