@@ -8,7 +8,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.machine import Bearing, Unit
-from core.monitor import UnitMonitor
+from core.monitor_port import Monitor
 from service.store.gap_reference import GapReference
 from service.store.port import Store, StoreError
 
@@ -49,7 +49,7 @@ class ReferencesInForce:
         By unit; as built from the plant file, whose references hold where none is stored.
     """
 
-    def __init__(self, monitors: Mapping[str, UnitMonitor], store: Store, clock: Clock) -> None:
+    def __init__(self, monitors: Mapping[str, Monitor], store: Store, clock: Clock) -> None:
         self._monitors, self._store, self._clock = monitors, store, clock
         self._bearings: dict[Key, Bearing] = {
             (unit, bearing.id): bearing
