@@ -1,0 +1,130 @@
+"""`Assembler`: from admitted frames, in the order in which they arrived, to raw blocks."""
+
+from collections import Counter
+from collections.abc import Iterable
+
+from acquisition.can.counted import CountedInstants, Placed
+from acquisition.can.gate import Frame
+from acquisition.can.instants import Instant, Refusal, RefusalCounts
+from acquisition.can.plan import Part, Plan
+from acquisition.can.raw_blocks import RawBlockBuilder
+from acquisition.can.uncounted import UncountedInstants
+from acquisition.errors import FrameError
+from acquisition.raw import RawBlock
+
+
+class Assembler:
+    """Keeps its place on the sample axis across connections.
+
+    Parameters
+    ----------
+    n_channels, n_slow
+        Waveform and slow channels of the unit.
+    hold_s
+        For how long a message without counter is valid.
+
+    Attributes
+    ----------
+    refused
+        Frames that were not used, by reason.
+    """
+
+    def __init__(
+        self, plan: Plan, n_channels: int, n_slow: int, rate_hz: float, hold_s: float
+    ) -> None:
+        self._plan = plan
+        self._hold = max(1, round(hold_s * rate_hz))
+        self.refused: RefusalCounts = Counter()
+        self._counted = CountedInstants(plan, rate_hz, self.refused)
+        self._uncounted = UncountedInstants(plan, rate_hz, self.refused)
+        self._builder = RawBlockBuilder(plan, n_channels, n_slow, rate_hz)
+        self._early: dict[str | int, float] = {}
+        self._ready: list[Instant] = []
+        self._epoch = 0
+
+    def take(self, frames: Iterable[Frame], arrived_ns: int) -> list[RawBlock]:
+        """Take the frames of a batch; return the blocks that this completes, in order.
+
+        Parameters
+        ----------
+        arrived_ns
+            By the host's clock, when the last of them had arrived.
+        """
+        blocks: list[RawBlock] = []
+        for key, data in frames:
+            try:
+                blocks += self._take(key, data, arrived_ns)
+            except FrameError:
+                self.refused[Refusal.UNDECODABLE] += 1
+        if not self._plan.counted:
+            self._ready = self._uncounted.confirmed(arrived_ns)
+        return blocks + self._built(arrived_ns)
+
+    def _take(self, key: int, data: bytes | None, arrived_ns: int) -> list[RawBlock]:
+        message = self._plan.messages[key]
+        if data is None:
+            if message.multiplexer is None:
+                self._refuse(message.parts[0])
+            return []
+        number = int(message.multiplexer(data)) if message.multiplexer else 0
+        if number not in message.parts:
+            return []
+        part = message.parts[number]
+        if part.counter is not None:
+            return self._take_counted(part, data, arrived_ns)
+        self._note_now(part, data)
+        if part.wave is not None:
+            self._uncounted.put(part.wave, data)
+        return []
+
+    def _take_counted(self, part: Part, data: bytes, arrived_ns: int) -> list[RawBlock]:
+        if part.counter is None:
+            return []
+        placed = self._counted.take(part, part.counter, data, arrived_ns)
+        blocks = self._after_restart(self._counted.epoch, arrived_ns) if placed else []
+        for frame in placed:
+            self._note(frame)
+            instant = self._counted.complete(frame)
+            if instant is not None:
+                self._ready.append(instant)
+        return blocks
+
+    def _refuse(self, part: Part) -> None:
+        if self._plan.counted:
+            self._counted.refuse_frame(part)
+        else:
+            self._uncounted.refuse_frame(part)
+
+    def _after_restart(self, epoch: int, arrived_ns: int) -> list[RawBlock]:
+        """Finish what belongs to the epoch that has ended."""
+        if epoch == self._epoch:
+            return []
+        blocks = self._built(arrived_ns)
+        self._epoch = epoch
+        self._builder.begin_epoch()
+        return blocks
+
+    def _note(self, frame: Placed) -> None:
+        """Take over what a frame says beside its waveforms, for the samples it belongs to."""
+        for key, value in self._early.items():
+            self._builder.tracks.set(key, frame.index, value, self._hold)
+        self._early.clear()
+        part = frame.part
+        hold = self._plan.hold_samples if part.wave is None else self._plan.samples_per_frame
+        for key, read in part.values:
+            self._builder.tracks.set(key, frame.index, read(frame.data), hold)
+
+    def _note_now(self, part: Part, data: bytes) -> None:
+        """Take over what a message without counter says: it holds from now on, for a while."""
+        if part.epoch is not None and self._uncounted.set_epoch(int(part.epoch(data))):
+            self._builder.begin_epoch()
+        start = self._counted.now if self._plan.counted else self._uncounted.next_index
+        for key, read in part.values:
+            if start is None:
+                self._early[key] = read(data)
+            else:
+                self._builder.tracks.set(key, start, read(data), self._hold)
+
+    def _built(self, arrived_ns: int) -> list[RawBlock]:
+        ready, self._ready = self._ready, []
+        return self._builder.blocks(ready, arrived_ns)

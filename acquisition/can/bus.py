@@ -1,0 +1,112 @@
+"""Opening a bus of python-can; the one place where its interfaces are called by name."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import can
+from cantools.errors import Error as CantoolsError
+from serial import SerialException
+
+from acquisition.can.settings import CanLinkSettings
+from acquisition.can.slcan import open_slcan
+from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
+
+_ID_MASK = 0x1FFFFFFF
+_NO_SUCH_FAMILY = 97
+_SLCAN_CLOCK_HZ = 80_000_000
+_SAMPLE_POINT_PERCENT = 80.0
+_FILTERED_BY_KERNEL = ("socketcan",)
+"""Interfaces that filter before Python sees a frame, and let error frames through all the same."""
+
+LINUX_ERROR_FRAMES = ("socketcan", "slcan", "gs_usb", "virtual")
+"""Interfaces whose error frames have the format of Linux."""
+
+
+@contextmanager
+def foreign_errors_renamed(where: str) -> Iterator[None]:
+    """Let no exception of python-can, pyserial, cantools or the system through as it is."""
+    try:
+        yield
+    except AcquisitionError:
+        raise
+    except can.CanInterfaceNotImplementedError as exc:
+        raise ConfigError(f"{where}: {exc}") from exc
+    except (can.CanError, SerialException, OSError, EOFError) as exc:
+        raise LinkError(f"{where}: {exc or type(exc).__name__}") from exc
+    except (CantoolsError, ValueError) as exc:
+        raise FrameError(f"{where}: {exc}") from exc
+
+
+def open_bus(settings: CanLinkSettings, ids: Iterable[int] | None) -> can.BusABC:
+    """Open a bus for listening.
+
+    Parameters
+    ----------
+    ids
+        Frame ids that are wanted, as standard and as extended ones, so that a confusion of the two
+        is seen; None for all.
+
+    Raises
+    ------
+    LinkError
+        If it is not there now.
+    ConfigError
+        If this interface can never work here, or does not know an option.
+    """
+    where = str(settings)
+    with foreign_errors_renamed(where):
+        try:
+            return _opened(settings, None if ids is None else sorted(set(ids)))
+        except OSError as exc:
+            if exc.errno == _NO_SUCH_FAMILY:
+                raise ConfigError(
+                    f"{where}: this system's kernel has no SocketCAN; load its can modules, or use"
+                    " another interface"
+                ) from exc
+            if exc.errno is None:  # a vendor's library that is not installed
+                raise ConfigError(f"{where}: {exc}") from exc
+            raise
+        except (ValueError, TypeError, NotImplementedError, NameError, AttributeError) as exc:
+            # python-can's interfaces check their arguments, and their vendors' libraries, in all
+            # of these ways
+            if isinstance(exc, can.CanError | UnicodeError):
+                raise
+            raise ConfigError(f"{where}: cannot be opened with these settings: {exc}") from exc
+
+
+def _opened(settings: CanLinkSettings, ids: list[int] | None) -> can.BusABC:
+    options: dict[str, Any] = dict(settings.options)
+    if settings.interface == "slcan":
+        return open_slcan(settings.channel, ids, **_slcan_speed(settings), **options)
+    if settings.bitrate is not None:
+        options["bitrate"] = settings.bitrate
+    if settings.fd:
+        options["fd"] = True
+    if settings.data_bitrate is not None:
+        options["data_bitrate"] = settings.data_bitrate
+    if ids is not None and settings.interface in _FILTERED_BY_KERNEL:
+        options["can_filters"] = [{"can_id": i, "can_mask": _ID_MASK} for i in ids]
+    return can.Bus(
+        channel=settings.channel, interface=settings.interface, ignore_config=True, **options
+    )
+
+
+def _slcan_speed(settings: CanLinkSettings) -> dict[str, Any]:
+    """Listen only unless an option says otherwise: some bus needs a second node to acknowledge."""
+    speed: dict[str, Any] = {}
+    if "listen_only" not in settings.options:
+        speed["listen_only"] = True
+    if "sleep_after_open" not in settings.options and "://" in settings.channel:
+        speed["sleep_after_open"] = 0.0
+    if settings.data_bitrate is not None and settings.bitrate is not None:
+        speed["timing"] = can.BitTimingFd.from_sample_point(
+            f_clock=_SLCAN_CLOCK_HZ,
+            nom_bitrate=settings.bitrate,
+            nom_sample_point=_SAMPLE_POINT_PERCENT,
+            data_bitrate=settings.data_bitrate,
+            data_sample_point=_SAMPLE_POINT_PERCENT,
+        )
+    elif settings.bitrate is not None:
+        speed["bitrate"] = settings.bitrate
+    return speed

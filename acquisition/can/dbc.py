@@ -1,0 +1,188 @@
+"""A DBC file, read by cantools and turned into plain values; the one place that knows cantools."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cantools.database import load_string
+from cantools.database.can import Database, Message, Signal
+from cantools.database.errors import Error as DatabaseError
+
+from acquisition.errors import ConfigError, FrameError
+
+MAX_FILE_BYTES = 8_000_000
+_FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+_EXTENDED_FLAG = 1 << 31
+
+
+@dataclass(frozen=True)
+class DbcSignal:
+    """A signal and where it lies in its message.
+
+    Parameters
+    ----------
+    start
+        Bit number as in the DBC: of the lowest bit in Intel order, of the highest in Motorola.
+    multiplexer_ids
+        Values of the message's multiplexer at which the signal is there; empty if always.
+    """
+
+    message: "DbcMessage"
+    name: str
+    start: int
+    n_bits: int
+    big_endian: bool
+    signed: bool
+    is_float: bool
+    scale: float
+    offset: float
+    unit: str
+    multiplexer_ids: tuple[int, ...]
+
+    @property
+    def path(self) -> str:
+        """Message.Signal, as the plant file names it."""
+        return f"{self.message.name}.{self.name}"
+
+
+@dataclass(frozen=True)
+class DbcMessage:
+    """A message; frames are told apart by `key`, which standard and extended ids never share.
+
+    Parameters
+    ----------
+    length
+        Bytes that a frame of it has on the wire.
+    multiplexer
+        Name of its multiplexer signal, if it has one.
+    """
+
+    name: str
+    frame_id: int
+    extended: bool
+    fd: bool
+    length: int
+    multiplexer: str | None
+    source: Message = field(repr=False, compare=False)
+    signals: dict[str, DbcSignal] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def key(self) -> int:
+        """What distinguishes its frames: the id, and whether it is extended."""
+        return frame_key(self.frame_id, self.extended)
+
+    def raw_value(self, name: str, data: bytes) -> int | float:
+        """Decode one signal of one frame, whatever its shape; not scaled.
+
+        Raises
+        ------
+        FrameError
+            If cantools cannot decode the frame.
+        """
+        try:
+            values = self.source.decode(data, decode_choices=False, scaling=False)
+        except (DatabaseError, ValueError) as exc:
+            raise FrameError(f"{self.name}: {exc}") from exc
+        if not isinstance(values, Mapping) or name not in values:
+            raise FrameError(f"{self.name}: the frame has no signal {name}")
+        value = values[name]
+        if not isinstance(value, int | float):
+            raise FrameError(f"{self.name}.{name}: {value!r} is not a number")
+        return value
+
+
+def frame_key(frame_id: int, extended: bool) -> int:
+    """One number for id and kind of id."""
+    return frame_id | _EXTENDED_FLAG if extended else frame_id
+
+
+def load_dbc(path: Path) -> dict[str, DbcMessage]:
+    """Read a DBC file.
+
+    Returns
+    -------
+    dict
+        Messages by name.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, is no DBC, has overlapping signals, or two messages with one id.
+    """
+    try:
+        database = load_string(_text(path), database_format="dbc")
+    except (DatabaseError, ValueError, KeyError) as exc:
+        raise ConfigError(f"{path}: not a DBC file that can be used: {exc}") from exc
+    if not isinstance(database, Database) or not database.messages:
+        raise ConfigError(f"{path}: no message in it; a DBC has lines that begin with BO_")
+    messages = [_message(message) for message in database.messages]
+    _refuse_shared(path, messages)
+    return {message.name: message for message in messages}
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_FILE_BYTES + 1)
+    except OSError as exc:
+        raise ConfigError(f"{path}: {exc.strerror}; dbc must name a DBC file") from exc
+    if len(content) > MAX_FILE_BYTES:
+        raise ConfigError(f"{path}: larger than {MAX_FILE_BYTES} bytes, not a DBC file")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")  # what most DBC editors write
+
+
+def _refuse_shared(path: Path, messages: Iterable[DbcMessage]) -> None:
+    names: dict[int, str] = {}
+    seen: set[str] = set()
+    for message in messages:
+        if message.key in names:
+            kind = "extended" if message.extended else "standard"
+            raise ConfigError(
+                f"{path}: messages {names[message.key]} and {message.name} share the {kind} id"
+                f" {message.frame_id} ({message.frame_id:#x}); give each its own"
+            )
+        if message.name in seen:
+            raise ConfigError(f"{path}: two messages are called {message.name}; rename one")
+        names[message.key] = message.name
+        seen.add(message.name)
+
+
+def _message(source: Message) -> DbcMessage:
+    multiplexers = [s.name for s in source.signals if s.is_multiplexer]
+    message = DbcMessage(
+        name=source.name,
+        frame_id=source.frame_id,
+        extended=source.is_extended_frame,
+        fd=bool(source.is_fd) or source.length > _FD_LENGTHS[8],
+        length=next((n for n in _FD_LENGTHS if n >= source.length), source.length),
+        multiplexer=multiplexers[0] if multiplexers else None,
+        source=source,
+    )
+    for signal in source.signals:
+        message.signals[signal.name] = _signal(message, signal)
+    return message
+
+
+def _signal(message: DbcMessage, source: Signal) -> DbcSignal:
+    nested = source.multiplexer_signal not in (None, message.multiplexer)
+    if nested or (source.is_multiplexer and source.multiplexer_ids):
+        raise ConfigError(
+            f"message {message.name}: signal {source.name} is multiplexed twice over, which is not"
+            " supported; leave it out of the DBC"
+        )
+    return DbcSignal(
+        message=message,
+        name=source.name,
+        start=source.start,
+        n_bits=source.length,
+        big_endian=source.byte_order == "big_endian",
+        signed=source.is_signed,
+        is_float=source.is_float,
+        scale=float(source.scale),
+        offset=float(source.offset),
+        unit=source.unit or "",
+        multiplexer_ids=tuple(source.multiplexer_ids or ()),
+    )

@@ -1,0 +1,186 @@
+"""slcan, the text protocol of serial CAN adapters: python-can's bus with a reader that is strict.
+
+python-can reads byte by byte, takes a line that is longer or shorter than its own length says, and
+raises ValueError or worse on what is no frame at all. Here a line is exactly a frame or it is
+refused, and bytes are read in chunks.
+"""
+
+from binascii import Error as HexError
+from binascii import unhexlify
+from collections import deque
+from collections.abc import Iterable
+from select import select
+from typing import Any
+
+from can import Message
+from can.exceptions import error_check
+from can.interfaces.slcan import slcanBus
+
+from acquisition.can.error_frames import (
+    BUS_ERROR,
+    BUS_OFF,
+    CONTROLLER,
+    PROTOCOL,
+    RX_OVERFLOW,
+    RX_PASSIVE,
+    TX_PASSIVE,
+)
+from acquisition.errors import FrameError
+
+_MAX_LINE = 1 + 8 + 1 + 2 * 64
+_CHUNK_BYTES = 65536
+_FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+_STATE_LINE = 8
+_FORMS = {
+    # first letter: extended id, remote, FD
+    b"t": (False, False, False),
+    b"T": (True, False, False),
+    b"r": (False, True, False),
+    b"R": (True, True, False),
+    b"d": (False, False, True),
+    b"D": (True, False, True),
+    b"b": (False, False, True),
+    b"B": (True, False, True),
+}
+_ANSWERS = b"zZVvNF"
+"""First letters of what an adapter answers to commands."""
+
+_STATES = {b"a": None, b"w": None, b"p": RX_PASSIVE | TX_PASSIVE, b"b": 0}
+
+
+class SlcanBus(slcanBus):
+    """An slcan adapter at a serial port, a pseudo-terminal or a TCP port.
+
+    Parameters
+    ----------
+    ids
+        Frame ids that are wanted, whatever their kind; None for all.
+    """
+
+    def __init__(self, channel: str, ids: Iterable[int] | None = None, **options: Any) -> None:
+        self._ids = None if ids is None else frozenset(ids)
+        self._messages: deque[Message] = deque()
+        self._rest = b""
+        self._skipping = True  # the stream may begin in the middle of a line
+        self._n_malformed = 0
+        super().__init__(channel, **options)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
+        if not self._messages:
+            self._read_chunk(timeout)
+        return (self._messages.popleft(), True) if self._messages else (None, False)
+
+    def _read_chunk(self, timeout: float | None) -> None:
+        """Wait until there is something, then take all there is."""
+        with error_check("could not read from the serial device"):
+            ready, _, _ = select([self.fileno()], [], [], timeout)
+            data = self.serialPortOrig.read(_CHUNK_BYTES) if ready else b""
+        if data:
+            self._take(data)
+
+    def _take(self, data: bytes) -> None:
+        *lines, self._rest = (self._rest + data).replace(b"\a", b"\r").split(b"\r")
+        if self._skipping and lines:
+            self._skipping, lines = False, lines[1:]
+        for line in lines:
+            try:
+                message = _parsed(line, self._ids)
+            except FrameError:
+                self._n_malformed += 1
+                continue
+            if message is not None:
+                self._messages.append(message)
+        if len(self._rest) > _MAX_LINE and not self._skipping:
+            self._n_malformed += 1
+            self._skipping = True
+        if self._skipping:
+            self._rest = b""
+
+    def take_n_malformed(self) -> int:
+        """Lines since the last call that were neither a frame nor an answer."""
+        n_malformed, self._n_malformed = self._n_malformed, 0
+        return n_malformed
+
+    def shutdown(self) -> None:
+        """Close the adapter's channel and the port, even if the adapter is gone."""
+        port = self.serialPortOrig
+        socket = getattr(port, "_socket", None)  # pyserial forgets to close one that was reset
+        try:
+            super().shutdown()
+        finally:
+            port.close()
+            if socket is not None:
+                socket.close()
+
+
+def open_slcan(channel: str, ids: Iterable[int] | None, **options: Any) -> SlcanBus:
+    """Open an adapter; a port is not left open if its commands cannot be sent."""
+    bus = SlcanBus.__new__(SlcanBus)
+    try:
+        bus.__init__(channel, ids, **options)  # type: ignore[misc]
+    except Exception:
+        port = getattr(bus, "serialPortOrig", None)
+        if port is not None:
+            port.close()
+        raise
+    return bus
+
+
+def _parsed(line: bytes, ids: frozenset[int] | None) -> Message | None:
+    """Return the frame of a line; None if it is an answer or not wanted.
+
+    Raises
+    ------
+    FrameError
+        If it is neither.
+    """
+    kind = line[:1]
+    form = _FORMS.get(kind)
+    if form is None:
+        return _state(line)
+    extended, remote, fd = form
+    end = 9 if extended else 4
+    try:
+        frame_id = int(line[1:end], 16)
+        if ids is not None and frame_id not in ids:
+            return None
+        code = int(line[end : end + 1], 16)
+        data = unhexlify(line[end + 1 :])
+    except (ValueError, HexError) as exc:
+        raise FrameError(f"not an slcan frame: {line[:40]!r}") from exc
+    length = _FD_LENGTHS[code] if fd else code
+    if len(data) != (0 if remote else length) or length > (64 if fd else 8):
+        raise FrameError(f"an slcan frame of {len(data)} bytes that says {length}")
+    if not line[1:end].isalnum() or frame_id >= (1 << 29 if extended else 1 << 11):
+        raise FrameError(f"not a CAN id: {line[1:end]!r}")
+    return Message(
+        arbitration_id=frame_id,
+        is_extended_id=extended,
+        is_remote_frame=remote,
+        is_fd=fd,
+        bitrate_switch=kind in b"bB",
+        dlc=length,
+        data=data,
+    )
+
+
+def _state(line: bytes) -> Message | None:
+    """Lines about the controller, as newer adapters send them: "sb256256", "e1o"."""
+    kind, what = line[:1], line[1:2]
+    if not line or kind in _ANSWERS:
+        return None
+    if kind == b"s" and what in _STATES and len(line) == _STATE_LINE and line[2:].isdigit():
+        if what == b"b":
+            return _error(BUS_OFF, b"")
+        passive = _STATES[what]
+        return _error(CONTROLLER, bytes([0, passive])) if passive else None
+    if kind == b"e" and what.isdigit() and len(line) == 2 + int(what):
+        overflow = RX_OVERFLOW if b"o" in line[2:] else 0
+        return _error(PROTOCOL | BUS_ERROR | (CONTROLLER if overflow else 0), bytes([0, overflow]))
+    raise FrameError(f"not an slcan line: {line[:40]!r}")
+
+
+def _error(bits: int, data: bytes) -> Message:
+    return Message(
+        arbitration_id=bits, is_extended_id=False, is_error_frame=True, data=data.ljust(8, b"\0")
+    )

@@ -1,0 +1,123 @@
+"""`CanSource`: a measuring device on a CAN bus as a sample source."""
+
+import asyncio
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterable, Mapping
+from contextlib import aclosing, asynccontextmanager
+
+import can
+
+from acquisition.calibration import UnitCalibration
+from acquisition.can.assembly import Assembler
+from acquisition.can.bus import LINUX_ERROR_FRAMES, open_bus
+from acquisition.can.compiler import compile_plan
+from acquisition.can.gate import FrameGate
+from acquisition.can.plan import SECONDS
+from acquisition.can.reader import FrameReader
+from acquisition.can.settings import CanLinkSettings, CanSettings
+from acquisition.clock import Clock
+from acquisition.delivery import Delivery
+from acquisition.errors import LinkError
+from core.blocks import SampleBlock
+
+BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
+"""Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
+
+_LOOK_S = 0.2
+
+
+class CanSource:
+    """Samples of one unit from CAN frames; remembers where it stood when connected again.
+
+    It only listens. A CAN device keeps nothing: what passes while nobody is connected is a gap.
+
+    Parameters
+    ----------
+    opener
+        What opens the bus.
+
+    Raises
+    ------
+    ConfigError
+        If DBC, settings and calibration do not fit together.
+    """
+
+    def __init__(
+        self,
+        settings: CanSettings,
+        calibration: UnitCalibration,
+        clock: Clock,
+        opener: BusOpener = open_bus,
+    ) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._opener = opener
+        self._plan = compile_plan(settings, calibration)
+        self._delivery = Delivery(calibration, stamped=SECONDS in self._plan.quantities)
+        self._assembler = Assembler(
+            self._plan,
+            n_channels=len(calibration.channels),
+            n_slow=len(calibration.slow),
+            rate_hz=calibration.rate_hz,
+            hold_s=settings.hold_s,
+        )
+
+    @property
+    def refused_frames(self) -> Mapping[str, int]:
+        """Frames since the start that were not used, by reason."""
+        return {reason.value: n for reason, n in self._assembler.refused.items() if n}
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the bus; leaving the context closes it.
+
+        Raises
+        ------
+        LinkError
+            If the bus is not there, goes bus-off or error-passive, or brings no complete samples.
+        ConfigError
+            If the interface can never work here.
+        """
+        reader = self._reader()
+        try:
+            await reader.start()
+            async with aclosing(self._blocks(reader)) as blocks:
+                yield blocks
+        finally:
+            await reader.stop()
+
+    def _reader(self) -> FrameReader:
+        settings, plan = self._settings, self._plan
+        ids = [message.message.frame_id for message in plan.messages.values()]
+        return FrameReader(
+            lambda: self._opener(settings.link, ids),
+            str(settings.link),
+            FrameGate(plan, self._assembler.refused),
+            self._assembler.refused,
+            self._clock,
+            max_frames=settings.queue_frames,
+            when_full=settings.when_full,
+            judges_errors=settings.link.interface in LINUX_ERROR_FRAMES,
+        )
+
+    async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
+        fresh_at_s = self._clock.monotonic_s()
+        while True:
+            batch = await reader.next_batch(min(_LOOK_S, self._settings.stale_after_s))
+            raw_blocks = self._assembler.take(batch.frames, batch.arrived_ns) if batch else []
+            for raw in raw_blocks:
+                for block in self._delivery.take(raw, batch.arrived_ns if batch else None):
+                    yield block
+            if raw_blocks:
+                fresh_at_s = self._clock.monotonic_s()
+            else:
+                self._require_fresh(fresh_at_s)
+            await asyncio.sleep(0)
+
+    def _require_fresh(self, fresh_at_s: float) -> None:
+        silent_s = self._clock.monotonic_s() - fresh_at_s
+        if silent_s > self._settings.stale_after_s:
+            refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
+            raise LinkError(
+                f"{self._settings.link}: no complete sample for {silent_s:.1f} s;"
+                f" frames refused so far: {refused or 'none'}"
+            )

@@ -1,0 +1,169 @@
+"""`UncountedInstants`: sample instants of a device that counts nothing; the clock finds losses."""
+
+from acquisition.can.instants import Instant, Refusal, RefusalCounts
+from acquisition.can.plan import Part, Plan
+from core.units import NS_PER_S
+
+_MAX_UNSURE_NS = NS_PER_S
+"""Samples that arrive late for longer than this were not late: others before them are lost."""
+
+_MIN_TOLERANCE_NS = 1_000_000
+_MAX_DRIFT = 300e-6
+"""Twice what the crystals of device and host can differ, and some."""
+
+
+class ArrivalCheck:
+    """Whether as many samples have arrived as the time that passed calls for.
+
+    Samples can be late, never early: the least delay seen is none, and a sample that comes with as
+    little shows that none before it was lost.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = NS_PER_S / rate_hz
+        self._tolerance_ns = max(self._period_ns / 2, _MIN_TOLERANCE_NS)
+        self._origin_ns: int | None = None
+        self._least_ns = 0.0
+        self._previous_ns = 0
+
+    def delay_ns(self, stop_index: int, arrived_ns: int) -> float:
+        """How late samples up to an index are, against the least delay seen."""
+        if self._origin_ns is None:
+            self._origin_ns = self._previous_ns = arrived_ns
+            self._least_ns = -stop_index * self._period_ns
+        delay_ns = arrived_ns - self._origin_ns - stop_index * self._period_ns
+        self._least_ns += _MAX_DRIFT * max(0, arrived_ns - self._previous_ns)
+        self._previous_ns = arrived_ns
+        self._least_ns = min(self._least_ns, delay_ns)
+        return delay_ns - self._least_ns
+
+    def is_prompt(self, delay_ns: float) -> bool:
+        """Whether a delay is so small that nothing can have been lost."""
+        return delay_ns <= self._tolerance_ns
+
+    def n_lost(self, delay_ns: float) -> int:
+        """Samples whose loss explains a delay that does not go away."""
+        return max(1, round(delay_ns / self._period_ns))
+
+
+class UncountedInstants:
+    """Counts complete sets of frames; hands them on when the clock has confirmed the count.
+
+    The frames of a set come in a fixed order; one that is out of turn shows that its set is not
+    complete.
+
+    Parameters
+    ----------
+    refused
+        Where refused frames are counted.
+    """
+
+    def __init__(self, plan: Plan, rate_hz: float, refused: RefusalCounts) -> None:
+        self._plan = plan
+        self._refused = refused
+        self._rate_hz = rate_hz
+        self.epoch = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._check = ArrivalCheck(self._rate_hz)
+        self._frames: list[bytes] = []
+        self._last_wave = self._plan.n_waves
+        self._spoilt = False
+        self._held: list[Instant] = []
+        self._next = 0
+        self._n_incomplete = 0
+        self._least_delay_ns = 0.0
+        self._unsure_since_ns: int | None = None
+        self._pending_loss = 0
+
+    @property
+    def next_index(self) -> int:
+        """First sample that has not been completed."""
+        return self._next
+
+    def set_epoch(self, epoch: int) -> bool:
+        """Take over an epoch that the device told; return whether it began to count anew."""
+        if epoch == self.epoch:
+            return False
+        self.epoch = epoch
+        self._begin()
+        return True
+
+    def refuse_frame(self, part: Part) -> None:
+        """Note that a frame of a message came but could not be used: its set is incomplete."""
+        if part.wave is not None:
+            self._turn(part.wave)
+            self._spoil()
+
+    def put(self, wave: int, data: bytes) -> None:
+        """Take the next frame of a waveform message."""
+        self._turn(wave)
+        if self._spoilt:
+            self._refused[Refusal.INCOMPLETE] += 1
+            return
+        self._frames.append(data)
+        if len(self._frames) == self._plan.n_waves:
+            self._complete()
+
+    def confirmed(self, arrived_ns: int) -> list[Instant]:
+        """Hand on what the clock confirms, at the end of each batch of frames."""
+        if not self._held:
+            return []
+        delay_ns = self._check.delay_ns(self._next, arrived_ns)
+        if self._check.is_prompt(delay_ns):
+            self._unsure_since_ns = None
+            held, self._held = self._held, []
+            return held
+        if self._unsure_since_ns is None:
+            self._unsure_since_ns, self._least_delay_ns = arrived_ns, delay_ns
+        self._least_delay_ns = min(self._least_delay_ns, delay_ns)
+        if arrived_ns - self._unsure_since_ns > _MAX_UNSURE_NS:
+            self._lose_held()
+        return []
+
+    def _complete(self) -> None:
+        n_samples = self._plan.samples_per_frame
+        rejected = {
+            Refusal.INCOMPLETE: self._n_incomplete,
+            Refusal.UNCOUNTED_LOSS: self._pending_loss,
+        }
+        instant = Instant(
+            self.epoch,
+            self._next,
+            n_samples,
+            tuple(self._frames),
+            {reason: n for reason, n in rejected.items() if n},
+        )
+        self._held.append(instant)
+        self._frames = []
+        self._n_incomplete = self._pending_loss = 0
+        self._next += n_samples
+
+    def _turn(self, wave: int) -> None:
+        """Notice where a set begins, and a frame that is out of turn."""
+        if wave <= self._last_wave:
+            if self._frames:
+                self._spoil()
+            self._spoilt = False
+        self._last_wave = wave
+        if wave != len(self._frames):
+            self._spoil()
+
+    def _spoil(self) -> None:
+        """Give up the set that is being collected: it counts, but is not used."""
+        self._frames = []
+        if not self._spoilt:
+            self._spoilt = True
+            self._n_incomplete += self._plan.samples_per_frame
+            self._next += self._plan.samples_per_frame
+
+    def _lose_held(self) -> None:
+        """Somewhere among these samples others are missing: none of them can be used."""
+        n_lost = self._check.n_lost(self._least_delay_ns)
+        n_held = sum(instant.n_samples for instant in self._held)
+        told = sum(sum(instant.rejected.values()) for instant in self._held)
+        self._pending_loss += n_lost + n_held + told
+        self._next += n_lost
+        self._held = []
+        self._unsure_since_ns = None
