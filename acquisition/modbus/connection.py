@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import os
 import termios
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -173,7 +174,7 @@ class Connection:
         try:
             return await self._create_connection()
         except OSError as exc:
-            self._refusal = exc.strerror or str(exc)
+            self._refusal = _reason(exc)
             raise
         except termios.error as exc:  # comes from a port that exists but cannot be set up so
             kind = ConfigError if exc.args[0] == errno.EINVAL else LinkError
@@ -184,6 +185,13 @@ class Connection:
         answer = self._client.ctx.response_future
         if not connected and self._framer.awaiting and not answer.done():
             answer.set_exception(ConnectionException(_CLOSED))
+
+
+def _reason(exc: OSError) -> str:
+    """Why no connection could be made, without what event loop and pyserial wrap around it."""
+    if exc.errno is not None and exc.errno > 0:
+        return os.strerror(exc.errno)
+    return exc.strerror or str(exc)
 
 
 def _client(

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from acquisition.errors import ConfigError
+from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.profile import RingHeader
 from acquisition.modbus.ring_layout import U32, RingLayout
 from acquisition.modbus.ring_reader import RingReader
@@ -84,7 +84,7 @@ class RingFollower:
         found = list(zip(wanted, await self._read(reader, layout, wanted), strict=True))
         if not layout.checked:
             epoch, newest = await reader.progress()
-            if epoch != header.epoch:
+            if epoch != header.epoch or ahead(newest, header.newest) < 0:
                 return []
             oldest = newest - (layout.n_slots - 2)
             found = [(sequence, slot) for sequence, slot in found if ahead(sequence, oldest) >= 0]
@@ -98,6 +98,7 @@ class RingFollower:
             self._timeline = Timeline(header.layout)
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
+            await self._require_again(reader, header)
             slot = await self._newest_slot(reader, header)
             n_resets = self._timeline.n_resets + 1 if before.epoch == header.epoch else 0
             self._timeline = Timeline(header.layout, n_resets)
@@ -110,6 +111,18 @@ class RingFollower:
                 self._timeline.restart(slot)
                 self._go_back_to_start(slot, header)
         self._header = header
+
+    async def _require_again(self, reader: RingReader, header: RingHeader) -> None:
+        """Believe in another epoch only when the device says so twice.
+
+        Otherwise one stale or changed reply would make old samples new.
+        """
+        again = await self.header(reader)
+        if (again.epoch, again.layout) != (header.epoch, header.layout):
+            raise FrameError(
+                f"{reader.where}: block ring: epoch or layout change from one reading of the header"
+                " to the next"
+            )
 
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:
         """Stand before the first slot of a new epoch, if the ring still holds it.

@@ -1,16 +1,17 @@
 """The rigs of all sources; a new adapter joins the contract suite here.
 
-A rig goes into `ALL`, and into `WIRED` if it has a link that can be cut. Its module lies in `rigs`.
+A rig goes into `ALL`, and into `WIRED` if it has a link that can be cut; such a rig says in
+`absence` what its source has to say of a device that is not there. Its module lies in `rigs`.
 """
 
 from collections.abc import AsyncIterator
 
 import pytest
-from rigs.modbus import ModbusRig
+from rigs.modbus import ModbusRig, ModbusRtuRig
 from rigs.recording import RecordingRig
 from rigs.simulated import SimulatedRig
 
-WIRED = [ModbusRig]
+WIRED = [ModbusRig, ModbusRtuRig]
 ALL = [*WIRED, SimulatedRig, RecordingRig]
 
 
