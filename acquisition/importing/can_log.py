@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.importing.candump import frames_of_candump
 from acquisition.importing.frames import MAX_DATA, FrameBatch
 from acquisition.importing.job import ImportJob
 from acquisition.importing.libraries import library
@@ -27,24 +28,24 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]
     ConfigError
         If a frame cannot have been on a bus.
     """
-    io = library("can.io", "a CAN log")
     size = max(path.stat().st_size, 1)
-    with path.open("r" if job.format == "candump" else "rb") as stream:
-        reader = (io.CanutilsLogReader if job.format == "candump" else io.BLFReader)(stream)
+    with path.open("rb") as stream:
         waiting: list[Any] = []
-        for number, frame in enumerate(reader):
+        for number, frame in enumerate(_frames(stream, job)):
             _require_possible(frame, number + 1)
             if not (frame.is_error_frame or frame.is_remote_frame):
                 waiting.append(frame)
             if len(waiting) == _BATCH:
-                yield _batch(waiting, job), min(_position(stream) / size, 1.0)
+                yield _batch(waiting, job), min(stream.tell() / size, 1.0)
                 waiting = []
         if waiting:
             yield _batch(waiting, job), 1.0
 
 
-def _position(stream: Any) -> int:
-    return int(getattr(stream, "buffer", stream).tell())
+def _frames(stream: BinaryIO, job: ImportJob) -> Iterator[Any]:
+    if job.format == "candump":
+        return frames_of_candump(stream)
+    return iter(library("can.io", "a BLF log").BLFReader(stream))
 
 
 def _require_possible(frame: Any, number: int) -> None:

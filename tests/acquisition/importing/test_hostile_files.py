@@ -1,0 +1,318 @@
+"""A file that is damaged, or means harm, ends in one sentence and in bounded memory."""
+
+import json
+import pickle
+import random
+import struct
+import subprocess
+import sys
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import asammdf
+import can
+import h5py
+import nptdms
+import numpy as np
+import pytest
+
+from acquisition.errors import ConfigError
+from acquisition.importing.job import ImportJob, Place, TimeAxis
+
+Read = Callable[[Path, ImportJob], Any]
+Placed = Callable[..., ImportJob]
+
+READ = """
+import json, resource, sys
+from pathlib import Path
+from pydantic import TypeAdapter
+from acquisition.errors import ConfigError
+from acquisition.importing.job import ImportJob
+from acquisition.importing.reading import reading
+
+try:
+    with reading(Path(sys.argv[1]), TypeAdapter(ImportJob).validate_json(sys.argv[2])) as found:
+        said = str(sum(block.n_samples for block in found.blocks()))
+except ConfigError as error:
+    said = str(error)
+status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+own = int(status["VmHWM"].split()[0]) // 1024
+child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024
+print(json.dumps([own, child, said]))
+"""
+
+
+def measured(path: Path, job: ImportJob) -> tuple[int, int, str]:
+    """Peaks of the importing and of the reading process in MB, and what was said."""
+    command = [sys.executable, "-c", READ, str(path), json.dumps(asdict(job))]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
+    own_mb, child_mb, said = json.loads(result.stdout)
+    return own_mb, child_mb, said
+
+
+def refusal(read: Read, path: Path, job: ImportJob) -> str:
+    with pytest.raises(ConfigError) as error:
+        read(path, job)
+    assert str(error.value).startswith(f"{path}: ")
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 1500
+    return str(error.value)
+
+
+@pytest.fixture
+def csv_job(job: ImportJob) -> ImportJob:
+    return replace(job, slow=())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "column 'shaft x' is not there"),
+        (b"time,shaft x,shaft y\n0,1,2\n0.001,\x00,2\n", "line 3: has a NUL byte"),
+        (b"time,shaft x,shaft y\n0,1,2\n1,2\n", "line 3: 2 columns where the header has 3"),
+        (b"time,shaft x,shaft y\n0,1,2,3\n", "line 2: 4 columns where the header has 3"),
+        (b"time,shaft x,shaft y\n" + b"0" * 5_000_000, "line 2: longer than 1000000 bytes"),
+        (b"a" * 5_000_000, "line 1: longer than 1000000 bytes"),
+        (b"time,shaft x,shaft y\n0,eleven,2\n", "no number 'eleven'"),
+        (b"time,shaft x,shaft y\n0,=1+1,2\n", "no number '=1+1'"),
+        (b"time,shaft x,shaft y\nnan,1,2\n", "nan in the time column is no time"),
+        (b"time,shaft x,shaft y\n1e300,1,2\n", "in the time column is no time"),
+        (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' is there 2 times"),
+        (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: not UTF-8 text"),
+        (b'time,shaft x,shaft y\n"0,1,2\n' * 2, "line 4: "),
+        (b'time,shaft x,shaft y\n"' + b"0,1,2\n" * 50_000, "field larger than field limit"),
+        (b"x," * 400_000 + b"\n", "400001 columns; at most 4096 are read"),
+    ],
+    ids=range(15),
+)
+def test_wrong_text_is_refused_naming_the_line(
+    tmp_path: Path, read: Read, csv_job: ImportJob, content: bytes, words: str
+) -> None:
+    (tmp_path / "run").write_bytes(content)
+    assert words in refusal(read, tmp_path / "run", csv_job)
+
+
+def test_a_file_that_is_none_is_refused(tmp_path: Path, read: Read, csv_job: ImportJob) -> None:
+    assert "No such file" in refusal(read, tmp_path / "absent", csv_job)
+    assert "not a regular file" in refusal(read, tmp_path, csv_job)
+
+
+@pytest.fixture
+def hdf5_job(job: ImportJob) -> ImportJob:
+    return replace(job, format="hdf5", slow=())
+
+
+def write_hdf5(path: Path, **datasets: Any) -> None:
+    with h5py.File(path, "w") as file:
+        for name in ("time", "shaft x", "shaft y"):
+            file[name] = datasets.get(name.replace(" ", "_"), np.arange(100) / 600.0)
+
+
+def test_hdf5_links_to_elsewhere_are_not_followed(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob
+) -> None:
+    write_hdf5(tmp_path / "other")
+    write_hdf5(tmp_path / "external", shaft_x=h5py.ExternalLink("other", "/shaft x"))
+    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "external", hdf5_job)
+    write_hdf5(tmp_path / "soft", shaft_x=h5py.SoftLink("/shaft y"))
+    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "soft", hdf5_job)
+
+
+def test_hdf5_values_in_other_files_are_not_read(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob
+) -> None:
+    secret = tmp_path / "secret"
+    secret.write_bytes(bytes(800))
+    with h5py.File(tmp_path / "external", "w") as file:
+        file["time"] = file["shaft y"] = np.arange(100) / 600.0
+        file.create_dataset("shaft x", (100,), "f8", external=[(str(secret), 0, 800)])
+    says = "dataset 'shaft x' has its values in another file"
+    assert says in refusal(read, tmp_path / "external", hdf5_job)
+    write_hdf5(tmp_path / "other")
+    layout = h5py.VirtualLayout((100,), "f8")
+    layout[:] = h5py.VirtualSource(str(tmp_path / "other"), "shaft x", (100,))
+    with h5py.File(tmp_path / "virtual", "w") as file:
+        file["time"] = file["shaft y"] = np.arange(100) / 600.0
+        file.create_virtual_dataset("shaft x", layout)
+    assert says in refusal(read, tmp_path / "virtual", hdf5_job)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (np.zeros((100, 2)), "has shape (100, 2) of float64"),
+        (np.array([b"a"] * 100), "has shape (100,) of |S1"),
+        (np.zeros(100, np.complex128), "has shape (100,) of complex128"),
+        (np.zeros(0), "0 samples, column"),
+    ],
+    ids=["matrix", "text", "complex", "empty"],
+)
+def test_hdf5_values_that_are_no_numbers_in_a_row_are_refused(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob, values: np.ndarray, words: str
+) -> None:
+    write_hdf5(tmp_path / "run", shaft_y=values)
+    assert words in refusal(read, tmp_path / "run", hdf5_job)
+
+
+def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(
+    tmp_path: Path, hdf5_job: ImportJob
+) -> None:
+    with h5py.File(tmp_path / "declared", "w") as file:
+        for name in ("time", "shaft x", "shaft y"):
+            file.create_dataset(name, (2**50,), "f4", chunks=(1024,))
+    own_mb, child_mb, said = measured(tmp_path / "declared", hdf5_job)
+    assert "1125899906842624 samples per channel; 1 to 536870912 can be read" in said
+    assert max(own_mb, child_mb) < 200
+    with h5py.File(tmp_path / "packed", "w") as file:
+        for name in ("time", "shaft x", "shaft y"):
+            n_rows = 2**29 - 1
+            made = file.create_dataset(name, (n_rows,), "f4", chunks=(n_rows,), compression="gzip")
+            packed = zlib.compress(bytes(2**29), 1)
+            made.id.write_direct_chunk((0,), packed)
+    own_mb, child_mb, said = measured(tmp_path / "packed", hdf5_job)
+    assert said.startswith(f"{tmp_path}/packed: ")
+    assert own_mb < 200
+    assert child_mb < 2200
+
+
+@pytest.mark.slow
+def test_a_million_columns_are_refused_or_read_in_bounded_memory(
+    tmp_path: Path, job: ImportJob, placed: Placed
+) -> None:
+    names = [f"channel {n}" for n in range(1_000_000)]
+    segment = b"".join(
+        struct.pack("<I", len(path)) + path + struct.pack("<II", 0xFFFFFFFF, 0)
+        for path in (f"/'g'/'{name}'".encode() for name in names)
+    )
+    meta = struct.pack("<I", len(names)) + segment
+    lead = b"TDSm" + struct.pack("<IIQQ", 0x6, 4713, len(meta), len(meta))
+    (tmp_path / "run.tdms").write_bytes(lead + meta)
+    tdms_job = replace(placed(job), format="tdms", slow=())
+    own_mb, child_mb, said = measured(tmp_path / "run.tdms", tdms_job)
+    assert "is not there" in said or "needs more than 2 GiB" in said
+    assert own_mb < 200
+    assert child_mb < 2200
+
+
+def test_objects_that_were_pickled_are_never_loaded(
+    tmp_path: Path, read: Read, job: ImportJob
+) -> None:
+    class Evil:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return (Path.touch, (tmp_path / "harmed",))
+
+    (tmp_path / "run").write_bytes(pickle.dumps(Evil()))
+    for kind in ("csv", "hdf5", "tdms", "mdf4", "candump", "blf"):
+        assert refusal(read, tmp_path / "run", replace(job, format=kind))
+    array = np.array([Evil()], dtype=object)
+    np.save(tmp_path / "run.npy", array, allow_pickle=True)
+    for kind in ("csv", "hdf5", "tdms", "mdf4", "blf"):
+        assert refusal(read, tmp_path / "run.npy", replace(job, format=kind))
+    assert not (tmp_path / "harmed").exists()
+
+
+def test_an_archive_is_not_unpacked(tmp_path: Path, read: Read, job: ImportJob) -> None:
+    with zipfile.ZipFile(tmp_path / "run.mf4", "w") as archive:
+        archive.writestr("../../escaped.mf4", b"MDF     4.10    " + bytes(100))
+    says = refusal(read, tmp_path / "run.mf4", replace(job, format="mdf4"))
+    assert "not an MDF file of version 4" in says
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mf4"]
+
+
+def write_tdms(path: Path) -> None:
+    with nptdms.TdmsWriter(path) as file:
+        file.write_segment(
+            [nptdms.ChannelObject("g", n, np.arange(100) / 600.0) for n in ("time", "shaft x")]
+        )
+
+
+def write_mdf4(path: Path) -> None:
+    with asammdf.MDF() as mdf:
+        since_s = np.arange(100) / 600.0
+        mdf.append([asammdf.Signal(since_s, since_s, name="shaft x")])
+        mdf.save(path)
+
+
+def write_blf(path: Path) -> None:
+    with can.BLFWriter(path) as log:
+        for n in range(100):
+            log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes(8)))
+
+
+def write_plain_hdf5(path: Path) -> None:
+    write_hdf5(path)
+
+
+WRITERS = {"tdms": write_tdms, "mdf4": write_mdf4, "blf": write_blf, "hdf5": write_plain_hdf5}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_any_damage_is_read_or_refused_but_never_more(
+    tmp_path: Path, read: Read, job: ImportJob, kind: str
+) -> None:
+    """Cut off anywhere, and bytes changed at random: the reading process may do what it likes."""
+    path = tmp_path / "run.mf4"
+    WRITERS[kind](path)
+    content = path.read_bytes()
+    chance = random.Random(7)  # noqa: S311  not a secret
+    fitting = replace(job, format=kind, channels=job.channels[:1], slow=())
+    if kind in ("mdf4", "blf"):
+        fitting = replace(fitting, time=TimeAxis("file", 0))
+    outcomes = [outcome(read, path, fitting, content)]
+    for n in range(8):
+        damaged = bytearray(content)
+        if n % 3 == 0:
+            damaged = damaged[: chance.randrange(len(damaged))]
+        else:
+            for _ in range(chance.randint(1, 30)):
+                damaged[chance.randrange(len(damaged))] = chance.randrange(256)
+        outcomes.append(outcome(read, path, fitting, bytes(damaged)))
+    assert outcomes[0] == "read"
+    assert all(
+        said == "read" or (said.startswith(str(path)) and "\n" not in said) for said in outcomes
+    )
+    assert outcomes.count("read") < len(outcomes)
+
+
+def outcome(read: Read, path: Path, job: ImportJob, content: bytes) -> str:
+    path.write_bytes(content)
+    try:
+        if job.format == "blf":
+            from acquisition.importing.reading import reading
+
+            with reading(path, job) as found:
+                list(found.frames())
+        else:
+            read(path, job)
+    except ConfigError as error:
+        return str(error)
+    return "read"
+
+
+def test_an_index_file_beside_a_tdms_file_is_not_believed(
+    tmp_path: Path, read: Read, job: ImportJob
+) -> None:
+    write_tdms(tmp_path / "run.tdms")
+    (tmp_path / "run.tdms_index").write_bytes(b"TDSh" + bytes(100))
+    fitting = replace(job, format="tdms", channels=job.channels[:1], slow=())
+    assert read(tmp_path / "run.tdms", fitting).samples.shape == (1, 100)
+
+
+def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
+    (tmp_path / "run").write_bytes(b"TDSm" + b"\xff" * 100)
+    says = refusal(read, tmp_path / "run", replace(job, format="tdms", slow=()))
+    assert ": not readable as tdms: " in says or "is not there" in says
+
+
+def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: ImportJob) -> None:
+    with nptdms.TdmsWriter(tmp_path / "run") as file:
+        for group in ("a", "b"):
+            file.write_segment([nptdms.ChannelObject(group, "shaft x", np.zeros(5))])
+    one = replace(job.channels[0], place=Place("shaft x"))
+    start = TimeAxis("start", 0, start_ns=0)
+    both = replace(job, format="tdms", channels=(one,), slow=(), time=start)
+    assert "'shaft x' is there 2 times: name its group" in refusal(read, tmp_path / "run", both)
