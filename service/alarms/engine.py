@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import Alarm, AlarmKind, AlarmState
+from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Action
 from core.alarms.unit_alarms import UnitAlarms
@@ -29,6 +29,8 @@ class AlarmCount:
     ----------
     n_active
         Active and not hidden.
+    n_danger
+        Of these, at the level of danger.
     n_unacknowledged
         Active or returned, not hidden, and nobody has seen their newest occurrence.
     n_hidden
@@ -38,6 +40,7 @@ class AlarmCount:
     """
 
     n_active: int
+    n_danger: int
     n_unacknowledged: int
     n_hidden: int
     n_unjudged: int
@@ -52,12 +55,18 @@ class AlarmEngine:
         Alarms of each unit.
     put
         Takes what is to be stored.
+    listener
+        Told of every block with the news that it has brought.
     """
 
     def __init__(
-        self, units: Mapping[str, UnitAlarms], put: Callable[[Findings], None], clock: Clock
+        self,
+        units: Mapping[str, UnitAlarms],
+        put: Callable[[Findings], None],
+        clock: Clock,
+        listener: Callable[[SampleBlock, Sequence[AlarmNews]], None] | None = None,
     ) -> None:
-        self._units, self._put, self._clock = units, put, clock
+        self._units, self._put, self._clock, self._listener = units, put, clock, listener
 
     def restore(self, alarms: Iterable[Alarm]) -> None:
         """Go on where the service stopped, before anything else arrives."""
@@ -70,6 +79,8 @@ class AlarmEngine:
         """Take in a block and what it has taught; the news is to be stored with it."""
         news = self._units[block.unit].take(block, assessments, self._clock.now_ns())
         _log(news)
+        if self._listener is not None:
+            self._listener(block, news)
         return news
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
@@ -123,6 +134,7 @@ class AlarmEngine:
         shown = [alarm for alarm in alarms if alarm.state not in hidden]
         return AlarmCount(
             n_active=sum(alarm.level is not None for alarm in shown),
+            n_danger=sum(alarm.level is AlarmLevel.DANGER for alarm in shown),
             n_unacknowledged=sum(not alarm.is_acknowledged for alarm in shown),
             n_hidden=len(alarms) - len(shown),
             n_unjudged=sum(a.level is None and not self.is_judged(a) for a in shown),

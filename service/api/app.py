@@ -4,6 +4,7 @@ from importlib.metadata import version
 
 from fastapi import Depends, FastAPI
 
+from service.api.alarm_routes import alarm_router, operation_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
 from service.api.health_routes import health_router
@@ -44,6 +45,8 @@ def create_app(context: Context) -> FastAPI:
         gap_router(context),
         bearing_router(context),
         reference_router(context),
+        alarm_router(context),
+        operation_router(context),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     app.include_router(dashboard_router())

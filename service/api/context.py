@@ -7,9 +7,11 @@ from typing import Annotated
 from fastapi import Path
 
 from acquisition.clock import Clock
+from service.alarms.engine import AlarmEngine
 from service.api.problems import ProblemError
 from service.live import LiveView
 from service.origin import Origin
+from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.settings.bearings import BearingSettings
 from service.settings.units import UnitSettings
@@ -39,7 +41,10 @@ class Context:
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
+    alarms: AlarmEngine
+    recorder: Recorder
     origin: Origin = Origin.LIVE
+    max_shelf_s: float = 86_400.0
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 
 from core.quantities import CATALOGUE
+from service.api.alarm_views import alarm_count_model
 from service.api.context import Context, UnitId
 from service.api.plant_models import (
     OverviewModel,
@@ -29,6 +30,7 @@ def plant_router(context: Context) -> APIRouter:
             time=rfc3339(context.clock.now_ns()),
             refresh_s=context.refresh_s,
             store=StoreModel(error=context.live.store_error, n_unstored=context.live.n_unstored),
+            alarms=alarm_count_model(context.alarms),
             units=[_unit_overview(context, unit) for unit in context.units],
         )
 

@@ -60,6 +60,11 @@ def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: _documented(WORDS[status]) for status in statuses}
 
 
+def described_problems(words: Mapping[int, str]) -> dict[int | str, dict[str, Any]]:
+    """OpenAPI entries for problems with words of their own."""
+    return {status: _documented(said) for status, said in words.items()}
+
+
 def any_other_problem() -> dict[int | str, dict[str, Any]]:
     """OpenAPI entry for what may happen to every operation."""
     return {"default": _documented("Any other problem")}

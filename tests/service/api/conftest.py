@@ -1,5 +1,6 @@
 """The API over a real store and a real monitor, fed by the simulated plant, asked in process."""
 
+import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +12,14 @@ import pytest
 from acquisition.calibration import calibrate
 from core.assessment import Assessment
 from core.monitor import UnitMonitor
+from service.alarms.engine import AlarmEngine
+from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.live import LinkState, LiveView
+from service.origin import Origin
+from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
@@ -71,6 +76,8 @@ class Service:
     references: ReferencesInForce
     client: httpx2.AsyncClient
     document: dict[str, Any]
+    alarms: AlarmEngine
+    recorder: Recorder
 
     async def get(self, path: str, **parameters: object) -> httpx2.Response:
         return await self.client.get(path, params=parameters)
@@ -119,6 +126,10 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
     analysis = analysis_of(plant.analysis)
     monitors = {unit.id: UnitMonitor(machine_of(unit), analysis) for unit in plant.unit}
     references = ReferencesInForce(monitors, store, clock)
+    recorder = Recorder(store, live, clock)
+    origin = Origin.LIVE
+    alarms = await alarm_engine(plant, monitors, origin, store, recorder.put, clock)
+    recording = asyncio.create_task(recorder.run())
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -127,11 +138,16 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
         clock=clock,
         refresh_s=11.95,
         references=references,
+        alarms=alarms,
+        recorder=recorder,
+        max_shelf_s=7200.0,
     )
     app = create_app(context)
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
-        yield Service(live, store, clock, references, client, app.openapi())
+        yield Service(live, store, clock, references, client, app.openapi(), alarms, recorder)
+    recording.cancel()
+    await asyncio.wait([recording])
 
 
 @pytest.fixture

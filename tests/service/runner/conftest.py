@@ -8,11 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.alarms.limits import Limits
+from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.monitor import UnitMonitor
 from core.quality import GOOD
 from core.settings import AnalysisSettings
+from service.alarms.engine import AlarmEngine
 from service.live import LiveView
 from service.recorder import Recorder
 from service.runner import Runner, WatchedUnit
@@ -108,6 +112,13 @@ def block_number(number: int, unit: str = "U1", rate_hz: float = RATE_HZ) -> Sam
     )
 
 
+RULES = UnitRules(
+    channel=rule_of(2.0, 4.0),
+    bearings={"UJB": BearingRules(LimitRule(Limits(60.0, 90.0, 5.0), rule_of(0.0, 0.0)))},
+)
+"""A block lasts 1.28 s, a refresh takes 8.96 s; the shaft of :func:`block_number` moves 50 µm."""
+
+
 class Plant:
     """Everything that a running service has, over some scripted units."""
 
@@ -117,6 +128,13 @@ class Plant:
         self.store = SqliteStore(path)
         self.live = LiveView(["U1", "U2"], self.clock, 30.0)
         self.recorder = Recorder(self.store, self.live, self.clock, capacity)
+        self.start_alarms()
+
+    def start_alarms(self) -> None:
+        """Begin as after a restart, with what the store knows."""
+        alarms = {name: UnitAlarms(unit_named(name), RULES) for name in ("U1", "U2")}
+        self.alarms = AlarmEngine(alarms, self.recorder.put, self.clock)
+        self.alarms.restore(self.store.alarms())
 
     def runner(self, **units: ScriptedPlant) -> Runner:
         settings = AnalysisSettings(segment_samples=SEGMENT, n_segments=4, min_segments=2)
@@ -124,7 +142,7 @@ class Plant:
             name: WatchedUnit(source, UnitMonitor(unit_named(name), settings))
             for name, source in units.items()
         }
-        return Runner(watched, self.live, self.recorder, self.clock)
+        return Runner(watched, self.live, self.recorder, self.clock, self.alarms)
 
 
 @pytest.fixture

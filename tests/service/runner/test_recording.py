@@ -89,7 +89,13 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     break_store(plant)
     source = scripted([block(number) for number in range(36)], ends=False)
     references = ReferencesInForce({}, plant.store, plant.clock)
-    app = create_app(Context("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references))
+    app = create_app(
+        Context(
+            *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
+            alarms=plant.alarms,
+            recorder=plant.recorder,
+        )
+    )
     running = asyncio.create_task(plant.runner(U1=source).run())
     client = httpx2.AsyncClient(transport=httpx2.ASGITransport(app), base_url="http://padwatch")
 

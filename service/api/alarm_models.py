@@ -1,0 +1,313 @@
+"""What the API answers about alarms, and what it is told by people."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, ConfigDict, Field, StringConstraints
+
+from service.api.models import ApiModel, Time
+
+AlarmLevelName = Literal["alert", "danger"]
+
+AlarmStateName = Literal[
+    "normal",
+    "unacknowledged",
+    "acknowledged",
+    "returned_unacknowledged",
+    "shelved",
+    "suppressed",
+    "out_of_service",
+]
+
+AlarmKindName = Literal[
+    "channel_not_ok",
+    "order1_shaft_x",
+    "order1_shaft_y",
+    "oil_temperature",
+    "clock_offset",
+    "clock_drift",
+    "time_stamps",
+    "link_lost",
+]
+
+AlarmChangeName = Literal[
+    "raised",
+    "escalated",
+    "eased",
+    "returned",
+    "latched",
+    "reset",
+    "acknowledged",
+    "shelved",
+    "unshelved",
+    "suppressed",
+    "unsuppressed",
+    "taken_out_of_service",
+    "returned_to_service",
+    "condition_unknown",
+    "condition_known",
+]
+
+ConditionName = Literal["active", "within_limits", "unknown"]
+
+OriginName = Literal["live", "replay"]
+
+AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
+
+
+class HoldModel(ApiModel):
+    """That somebody has taken an alarm off the list."""
+
+    actor: str
+    """Who."""
+
+    reason: str
+    """Why."""
+
+    since: Time
+    """Since when."""
+
+    until: Time | None
+    """Until when, if it ends by itself."""
+
+
+class AlarmModel(ApiModel):
+    """One alarm now."""
+
+    id: AlarmIdText
+    """Stable identifier: unit, subject and kind."""
+
+    unit: str
+    """Unit."""
+
+    subject: str
+    """Channel or bearing it is about; "device" or "link" if it is about the whole unit."""
+
+    kind: AlarmKindName
+    """What is wrong."""
+
+    state: AlarmStateName
+    """Where it stands in its life cycle (ISA-18.2)."""
+
+    level: AlarmLevelName | None
+    """Its priority while it is active; null if it is not."""
+
+    is_active: bool
+    """Whether it is active, hidden or not."""
+
+    is_acknowledged: bool
+    """Whether somebody has seen its newest occurrence."""
+
+    is_latched: bool
+    """Whether only its latch keeps it active: its condition has gone, and it waits for a reset."""
+
+    occurrence: int
+    """How often it was raised or rose in level; what is acknowledged."""
+
+    raised: Time | None
+    """When the newest occurrence began."""
+
+    condition: ConditionName
+    """What it watches, now: "unknown" where there are no good data. That is never a return to
+    normal: an active alarm stays active."""
+
+    condition_reason: str
+    """Why; "ok" if all is well."""
+
+    value: Annotated[float | None, Field(examples=[163.2])]
+    """What was compared with the limit; while the condition is unknown, the last that was known."""
+
+    limit: Annotated[float | None, Field(examples=[150.0])]
+    """The limit, where there is one."""
+
+    value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
+    """Unit of value and limit."""
+
+    suppressed_by: str | None
+    """Why it counts for nothing by design; null if it counts."""
+
+    shelf: HoldModel | None
+    """Who has shelved it."""
+
+    outage: HoldModel | None
+    """Who has taken it out of service."""
+
+
+class AlarmCountModel(ApiModel):
+    """How many alarms there are."""
+
+    n_active: int
+    """Active and not hidden."""
+
+    n_danger: int
+    """Of these, at the level of danger."""
+
+    n_unacknowledged: int
+    """Not hidden, and nobody has seen their newest occurrence."""
+
+    n_hidden: int
+    """Shelved, suppressed or out of service."""
+
+    n_unjudged: int
+    """Not active, and what they watch is not known now."""
+
+
+class AlarmListModel(ApiModel):
+    """All alarms that are not normal, and those that cannot be judged."""
+
+    time: Time
+    """Now."""
+
+    origin: OriginName
+    """Whether this is live or a replay."""
+
+    count: AlarmCountModel
+    """How many there are."""
+
+    alarms: list[AlarmModel]
+    """Not normal; unacknowledged first, danger before alert, the newest first."""
+
+    unjudged: list[AlarmModel]
+    """Normal as far as was known last, but what they watch is not known now."""
+
+
+class AlarmEventModel(ApiModel):
+    """One line of an alarm's history."""
+
+    id: int
+    """Number in the store; later events have higher ones."""
+
+    alarm: AlarmIdText
+    """The alarm."""
+
+    unit: str
+    """Unit."""
+
+    subject: str
+    """Channel or bearing it is about."""
+
+    kind: AlarmKindName
+    """What is wrong."""
+
+    number: int
+    """Of this alarm's events, from 1 without a hole."""
+
+    change: AlarmChangeName
+    """What happened."""
+
+    level: AlarmLevelName | None
+    """Of the alarm after it; of one that has returned, that it had."""
+
+    state_before: AlarmStateName
+    """State before it."""
+
+    state_after: AlarmStateName
+    """State after it."""
+
+    time: Time
+    """When: by the samples where they decided, by the host where a person or a link did."""
+
+    occurrence: int
+    """Which occurrence of the alarm it belongs to."""
+
+    value: float | None
+    """What was compared with the limit."""
+
+    limit: float | None
+    """The limit, where there is one."""
+
+    value_unit: str | None
+    """Unit of value and limit."""
+
+    actor: str
+    """Who did it; empty if nobody did."""
+
+    reason: str
+    """Why."""
+
+
+class AlarmEventsModel(ApiModel):
+    """Some of the history of all alarms."""
+
+    origin: OriginName
+    """Whether this is live or a replay."""
+
+    events: list[AlarmEventModel]
+    """Newest first."""
+
+    next_before: int | None
+    """What to give as ``before`` for those that are older; null if there are none."""
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be printable characters on one line")
+    return text
+
+
+Actor = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=80),
+    AfterValidator(_printable),
+    Field(examples=["A. Name"]),
+]
+
+Words = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=500),
+    AfterValidator(_printable),
+    Field(examples=["probe is being changed"]),
+]
+
+Comment = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, max_length=500),
+    AfterValidator(_printable),
+    Field(examples=["seen, shift engineer told"]),
+]
+
+
+class _Request(ApiModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+
+
+class ActorModel(_Request):
+    """Who does something to an alarm. There is no login yet: the name is believed."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+
+class AcknowledgeModel(_Request):
+    """That somebody has seen an occurrence of an alarm."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    occurrence: Annotated[int, Field(ge=1, le=2**62, examples=[3])]
+    """Which occurrence was seen: one that has come since is not acknowledged."""
+
+    comment: Comment = ""
+    """What to remember, at most 500 printable characters."""
+
+
+class ShelveModel(_Request):
+    """That somebody takes an alarm off the list for a while."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    reason: Words
+    """Why, 1 to 500 printable characters."""
+
+    duration_s: Annotated[float, Field(ge=1.0, le=31_536_000.0, examples=[3600.0])]
+    """For how long, s; at most what the plant file allows."""
+
+
+class OutageModel(_Request):
+    """That somebody takes an alarm off the list until further notice."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    reason: Words
+    """Why, 1 to 500 printable characters."""

@@ -1,0 +1,197 @@
+"""Alarms: the list, their history, and what people do to them."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Path, Query
+
+from core.alarms.alarm import AlarmKind
+from core.alarms.operation import (
+    Acknowledge,
+    Action,
+    ActionRefusedError,
+    Reset,
+    ReturnToService,
+    Shelve,
+    TakeOutOfService,
+    Unshelve,
+)
+from core.units import ns_from_s
+from service.api.alarm_models import (
+    AcknowledgeModel,
+    ActorModel,
+    AlarmEventsModel,
+    AlarmKindName,
+    AlarmListModel,
+    AlarmModel,
+    OutageModel,
+    ShelveModel,
+)
+from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model
+from service.api.bearing_routes import Moment
+from service.api.context import Context
+from service.api.problems import ProblemError, described_problems
+from service.api.same_host import require_same_host
+from service.api.times import ns_from_datetime, rfc3339
+from service.store.port import AlarmQuery
+
+MAX_EVENTS = 1000
+
+STORED_WITHIN_S = 10.0
+"""How long an operator waits for the disk at most."""
+
+AlarmId = Annotated[
+    str,
+    Path(
+        description="Identifier of an alarm: unit, subject and kind.",
+        max_length=128,
+        examples=["U1:ujb_shaft_x:channel_not_ok"],
+    ),
+]
+
+EVENT_PROBLEMS = described_problems({422: "A wrong parameter", 503: "The store cannot be read"})
+
+ACTION_PROBLEMS = described_problems(
+    {
+        403: "Asked for from another host or site",
+        404: "Unknown alarm",
+        409: "Does not fit the alarm as it is now",
+        422: "A wrong parameter",
+        503: "Done, but not on the disk yet",
+    }
+)
+
+
+def alarm_router(context: Context) -> APIRouter:
+    """Routes that show alarms."""
+    router = APIRouter(prefix="/api/v1/alarms", tags=["alarms"])
+
+    @router.get("", summary="All alarms that are not normal")
+    async def alarms() -> AlarmListModel:
+        """The alarm list, and what cannot be judged now; a bare list of what is wrong and seen."""
+        return alarm_list_model(context.alarms, context.origin, context.clock.now_ns())
+
+    @router.get("/events", summary="History of all alarms", responses=EVENT_PROBLEMS)
+    async def events(query: Annotated[AlarmQuery, Depends(event_query)]) -> AlarmEventsModel:
+        """Every transition of every alarm, newest first, page by page."""
+        one_more = AlarmQuery(**{**vars(query), "limit": query.limit + 1})
+        found = await asyncio.to_thread(context.store.alarm_events, one_more)
+        page = list(found[: query.limit])
+        return alarm_events_model(page, context.origin, there_is_more=len(found) > query.limit)
+
+    return router
+
+
+def operation_router(context: Context) -> APIRouter:
+    """Routes that people act by; each answers with the alarm as it is then, on the disk."""
+    router = APIRouter(
+        prefix="/api/v1/alarms/{alarm}",
+        tags=["alarms"],
+        dependencies=[Depends(require_same_host)],
+    )
+
+    @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
+    async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
+        """Say that an occurrence has been seen; saying so twice changes nothing."""
+        return await _done(context, alarm, Acknowledge(**dict(asked)))
+
+    @router.post("/shelve", summary="Shelve", responses=ACTION_PROBLEMS)
+    async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
+        """Take an alarm off the list for a while; if it is active then, it is announced anew."""
+        if asked.duration_s > context.max_shelf_s:
+            detail = f"duration_s {asked.duration_s:g} is above {context.max_shelf_s:g}"
+            raise ProblemError(422, "Wrong parameter", detail, "duration_s")
+        until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
+        return await _done(context, alarm, Shelve(asked.actor, asked.reason, until_ns))
+
+    @router.post("/unshelve", summary="Unshelve", responses=ACTION_PROBLEMS)
+    async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
+        """Bring a shelved alarm back before its time."""
+        return await _done(context, alarm, Unshelve(asked.actor))
+
+    @router.post("/out-of-service", summary="Take out of service", responses=ACTION_PROBLEMS)
+    async def take_out(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
+        """Take an alarm off the list until it is returned to service, as for maintenance."""
+        return await _done(context, alarm, TakeOutOfService(asked.actor, asked.reason))
+
+    @router.post("/return-to-service", summary="Return to service", responses=ACTION_PROBLEMS)
+    async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
+        """End that; if the alarm is active, it is announced anew."""
+        return await _done(context, alarm, ReturnToService(asked.actor))
+
+    @router.post("/reset", summary="Reset a latched alarm", responses=ACTION_PROBLEMS)
+    async def reset(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
+        """Release the latch of an alarm that was acknowledged and whose condition has gone."""
+        return await _done(context, alarm, Reset(asked.actor))
+
+    return router
+
+
+def event_query(
+    unit: Annotated[
+        str | None, Query(max_length=32, description="Of this unit only.", examples=["U1"])
+    ] = None,
+    alarm: Annotated[
+        str | None,
+        Query(
+            max_length=128,
+            description="Of this alarm only.",
+            examples=["U1:ujb_shaft_x:channel_not_ok"],
+        ),
+    ] = None,
+    kind: Annotated[
+        AlarmKindName | None,
+        Query(description="Of this kind only.", examples=["channel_not_ok"]),
+    ] = None,
+    start: Annotated[
+        Moment | None,
+        Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
+    ] = None,
+    end: Annotated[
+        Moment | None,
+        Query(description="Time up to which, likewise.", examples=["2026-11-21T09:00:00Z"]),
+    ] = None,
+    before: Annotated[
+        int | None,
+        Query(ge=1, le=2**62, description="Only events older than this id.", examples=[117]),
+    ] = None,
+    limit: Annotated[
+        int, Query(ge=1, le=MAX_EVENTS, description="Most events in the answer.")
+    ] = 100,
+) -> AlarmQuery:
+    """Check which events are wanted."""
+    everything = AlarmQuery()
+    start_ns = ns_from_datetime(start, "start") if start else everything.start_ns
+    end_ns = ns_from_datetime(end, "end") if end else everything.end_ns
+    if start_ns >= end_ns:
+        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
+        raise ProblemError(422, "Wrong parameter", detail, "start")
+    return AlarmQuery(
+        before=everything.before if before is None else before,
+        limit=limit,
+        alarm=alarm,
+        unit=unit,
+        kind=None if kind is None else AlarmKind(kind),
+        start_ns=max(start_ns, 0),
+        end_ns=min(max(end_ns, 0), everything.end_ns),
+    )
+
+
+async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
+    """Do it, and answer when it is on the disk."""
+    try:
+        alarm = context.alarms.operate(id_, action)
+    except LookupError as error:
+        raise ProblemError(404, "Unknown alarm", f"there is no alarm {id_!r}") from error
+    except ActionRefusedError as error:
+        raise ProblemError(409, "Does not fit", f"alarm {id_}: {error}") from error
+    try:
+        async with asyncio.timeout(STORED_WITHIN_S):
+            await context.recorder.stored()
+    except TimeoutError as error:
+        detail = (
+            f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
+            " a restart now would undo it. It is tried again until it is stored"
+        )
+        raise ProblemError(503, "Not on the disk yet", detail) from error
+    return alarm_model(context.alarms, alarm)

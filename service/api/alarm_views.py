@@ -1,0 +1,136 @@
+"""Alarms in the words of the API."""
+
+from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState, Condition, Hold
+from service.alarms.engine import AlarmEngine
+from service.api.alarm_models import (
+    AlarmCountModel,
+    AlarmEventModel,
+    AlarmEventsModel,
+    AlarmLevelName,
+    AlarmListModel,
+    AlarmModel,
+    ConditionName,
+    HoldModel,
+)
+from service.api.times import rfc3339
+from service.origin import Origin
+from service.store.port import StoredEvent
+
+VALUE_UNITS = {
+    AlarmKind.SHAFT_X: "µm 0-pk",
+    AlarmKind.SHAFT_Y: "µm 0-pk",
+    AlarmKind.OIL_TEMPERATURE: "°C",
+    AlarmKind.CLOCK_OFFSET: "s",
+    AlarmKind.CLOCK_DRIFT: "ppm",
+}
+
+LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
+    AlarmLevel.ALERT: "alert",
+    AlarmLevel.DANGER: "danger",
+}
+
+
+def alarm_list_model(engine: AlarmEngine, origin: Origin, now_ns: int) -> AlarmListModel:
+    """The list of alarms as it stands."""
+    alarms = engine.alarms
+    listed = [alarm for alarm in alarms if alarm.state is not AlarmState.NORMAL]
+    unjudged = [a for a in alarms if a.state is AlarmState.NORMAL and not engine.is_judged(a)]
+    return AlarmListModel(
+        time=rfc3339(now_ns),
+        origin=origin.value,
+        count=alarm_count_model(engine),
+        alarms=[alarm_model(engine, alarm) for alarm in sorted(listed, key=_urgency)],
+        unjudged=[alarm_model(engine, alarm) for alarm in unjudged],
+    )
+
+
+def alarm_count_model(engine: AlarmEngine) -> AlarmCountModel:
+    """How many alarms there are."""
+    return AlarmCountModel(**vars(engine.count()))
+
+
+def alarm_model(engine: AlarmEngine, alarm: Alarm) -> AlarmModel:
+    """One alarm as it is shown."""
+    identity, condition = alarm.identity, alarm.condition
+    is_judged = engine.is_judged(alarm)
+    unseen = "not_connected" if condition.is_known else str(condition.reason)
+    return AlarmModel(
+        id=identity.id,
+        unit=identity.unit,
+        subject=identity.subject,
+        kind=identity.kind.value,
+        state=alarm.state.value,
+        level=_level(alarm.level),
+        is_active=alarm.level is not None,
+        is_acknowledged=alarm.is_acknowledged,
+        is_latched=alarm.is_latched,
+        occurrence=alarm.occurrence,
+        raised=None if alarm.raised_ns is None else rfc3339(alarm.raised_ns),
+        condition=_condition(condition) if is_judged else "unknown",
+        condition_reason=str(condition.reason) if is_judged else unseen,
+        value=condition.value,
+        limit=condition.limit,
+        value_unit=VALUE_UNITS.get(identity.kind),
+        suppressed_by=alarm.suppressed_by,
+        shelf=_hold(alarm.shelf),
+        outage=_hold(alarm.outage),
+    )
+
+
+def alarm_events_model(
+    events: list[StoredEvent], origin: Origin, *, there_is_more: bool
+) -> AlarmEventsModel:
+    """A page of the history."""
+    return AlarmEventsModel(
+        origin=origin.value,
+        events=[_event(stored) for stored in events],
+        next_before=events[-1].id if there_is_more else None,
+    )
+
+
+def _event(stored: StoredEvent) -> AlarmEventModel:
+    event, identity = stored.event, stored.event.identity
+    return AlarmEventModel(
+        id=stored.id,
+        alarm=identity.id,
+        unit=identity.unit,
+        subject=identity.subject,
+        kind=identity.kind.value,
+        number=event.number,
+        change=event.change.value,
+        level=_level(event.level),
+        state_before=event.state_before.value,
+        state_after=event.state_after.value,
+        time=rfc3339(event.time_ns),
+        occurrence=event.occurrence,
+        value=event.value,
+        limit=event.limit,
+        value_unit=VALUE_UNITS.get(identity.kind),
+        actor=event.actor,
+        reason=str(event.reason),
+    )
+
+
+def _condition(condition: Condition) -> ConditionName:
+    return "within_limits" if condition.level is None else "active"
+
+
+def _level(level: AlarmLevel | None) -> AlarmLevelName | None:
+    return None if level is None else LEVEL_NAMES[level]
+
+
+def _hold(hold: Hold | None) -> HoldModel | None:
+    if hold is None:
+        return None
+    return HoldModel(
+        actor=hold.actor,
+        reason=hold.reason,
+        since=rfc3339(hold.since_ns),
+        until=None if hold.until_ns is None else rfc3339(hold.until_ns),
+    )
+
+
+def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
+    """What needs somebody first comes first; what is hidden, last."""
+    shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
+    return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
