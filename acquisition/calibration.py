@@ -83,7 +83,7 @@ def calibrate(raw: RawBlock, calibration: UnitCalibration) -> SampleBlock:
         rate_hz=raw.rate_hz,
         samples=_engineering_units(raw, calibration),
         channel_quality=_channel_qualities(raw, calibration.channels),
-        slow={c.id: _slow_reading(v, c) for c, v in zip(calibration.slow, raw.slow, strict=True)},
+        slow={c.id: slow_reading(v, c) for c, v in zip(calibration.slow, raw.slow, strict=True)},
         rejected=raw.rejected,
     )
 
@@ -135,7 +135,8 @@ def _quality_of_units(
     return GOOD if max(-lowest, highest) < full_scale else bad(Reason.CLIPPED)
 
 
-def _slow_reading(value: float, channel: SlowCalibration) -> Reading:
+def slow_reading(value: float, channel: SlowCalibration) -> Reading:
+    """A slow value as far as it may be believed."""
     if not np.isfinite(value):
         return missing(Reason.NOT_MEASURED)
     if not channel.minimum <= value <= channel.maximum:

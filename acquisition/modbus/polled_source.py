@@ -71,6 +71,11 @@ class PolledSettings(LinkSettings):
             if getattr(self, key) < least:
                 found = getattr(self, key)
                 raise ConfigError(f"modbus: {key} is {found}, the map asks for {least} or more")
+        if self.max_registers < registers.max_registers:
+            raise ConfigError(
+                f"modbus: max_registers is {self.max_registers}, the map reads up to"
+                f" {registers.max_registers} at once"
+            )
 
 
 class PolledSource:

@@ -1,0 +1,187 @@
+"""`FifoSource`: a device whose samples are read from queues, by function 0x18."""
+
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from acquisition.calibration import UnitCalibration
+from acquisition.clock import Clock
+from acquisition.delivery import Delivery
+from acquisition.errors import ConfigError, LinkError
+from acquisition.host_stamps import HostStamps
+from acquisition.modbus.counted_samples import CountedSamples
+from acquisition.modbus.fifo_assembly import ChannelAssembly, PlacedSamples, place_records
+from acquisition.modbus.freshness import Freshness
+from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.uncounted_samples import UncountedSamples
+from acquisition.modbus.wrong_replies import wrong_replies_drop_the_link
+from acquisition.raw import RawBlock
+from acquisition.registers.fifo_layout import FifoKind, FifoLayout, FifoPiece
+from core.blocks import SampleBlock
+from core.units import NS_PER_S
+
+
+@dataclass(frozen=True, kw_only=True)
+class FifoSettings(LinkSettings):
+    """Queues behind a Modbus device.
+
+    Parameters
+    ----------
+    poll_period_s
+        Wait after a reading that has emptied the queue, above 0; the queue must hold much more.
+    stale_after_s
+        A device without a new sample, or a queue that never runs empty, for longer than this is
+        not connected.
+    loss_tolerance_s
+        For a device that does not count: a loss shorter than this cannot be told from jitter.
+    """
+
+    poll_period_s: float = 0.005
+    stale_after_s: float = 3.0
+    loss_tolerance_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("poll_period_s", "stale_after_s", "loss_tolerance_s"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise ConfigError(f"modbus: {name} is {getattr(self, name)}, must be above 0")
+
+
+class FifoSource:
+    """Samples of one unit from queues; a reading is never repeated, for it may remove.
+
+    It measures no slow values: all that the calibration names are not measured.
+    """
+
+    def __init__(
+        self,
+        settings: FifoSettings,
+        layout: FifoLayout,
+        calibration: UnitCalibration,
+        clock: Clock,
+    ) -> None:
+        if layout.n_channels != len(calibration.channels):
+            raise ConfigError(
+                f"modbus: a FIFO of {layout.n_channels} channels for {len(calibration.channels)}"
+            )
+        self._settings, self._layout = settings, layout
+        self._calibration, self._clock = calibration, clock
+        self._delivery = Delivery(calibration, stamped=False)
+        self._stamps = HostStamps(calibration.rate_hz)
+        self._freshness = Freshness("the newest sample", settings.stale_after_s)
+        self._newest = (0, 0)
+        self._connections = 0
+        epoch = clock.now_ns() // NS_PER_S
+        self._uncounted = UncountedSamples(
+            calibration.rate_hz, tolerance_s=settings.loss_tolerance_s, epoch=epoch
+        )
+        self._counted = CountedSamples(calibration.rate_hz, removes=layout.removes, epoch=epoch)
+        self._channels = ChannelAssembly(layout.n_channels, self._counted)
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the link; leaving the context closes it.
+
+        Raises
+        ------
+        LinkError
+            If the device does not answer, answers nonsense, its data stand still, or it is faster
+            than the link.
+        ConfigError
+            If it has no such queue.
+        """
+        link = ModbusLink(self._settings)
+        try:
+            with wrong_replies_drop_the_link():
+                await link.open()
+                await self._begin(link)
+            self._freshness.opened(self._clock.monotonic_s())
+            blocks = self._blocks(link)
+            try:
+                yield blocks
+            finally:
+                await blocks.aclose()
+        finally:
+            link.close()
+
+    async def _begin(self, link: ModbusLink) -> None:
+        """Throw away what can no longer be told from new samples."""
+        self._channels.forget()
+        uncounted = not self._layout.has_counter
+        if uncounted and self._connections:
+            self._uncounted.begin()
+        self._connections += 1
+        if not self._layout.removes:
+            return
+        if uncounted or self._counted.is_ambiguous(self._clock.monotonic_s()):
+            deadline_s = self._clock.monotonic_s() + self._settings.stale_after_s
+            while not self._is_drained(await self._read(link)):
+                self._require_in_time(deadline_s)
+
+    async def _blocks(self, link: ModbusLink) -> AsyncGenerator[SampleBlock, None]:
+        waiting: list[PlacedSamples] = []
+        deadline_s = self._clock.monotonic_s() + self._settings.stale_after_s
+        while True:
+            with wrong_replies_drop_the_link():
+                pieces = await self._read(link)
+                now_s, arrived_ns = self._clock.monotonic_s(), self._clock.now_ns()
+                waiting += self._place(pieces, now_s)
+            if not self._is_drained(pieces):
+                self._require_in_time(deadline_s)
+                continue
+            deadline_s = now_s + self._settings.stale_after_s
+            if not self._layout.has_counter and self._uncounted.has_lost(now_s):
+                waiting.clear()  # nobody knows where among these the loss is
+                self._uncounted.begin()
+            for raw in self._raw_blocks(waiting, arrived_ns):
+                for block in self._delivery.take(raw, arrived_ns):
+                    yield block
+            waiting.clear()
+            self._freshness.note(repr(self._newest).encode(), now_s)
+            await self._clock.sleep(self._settings.poll_period_s)
+
+    async def _read(self, link: ModbusLink) -> list[FifoPiece]:
+        return [
+            self._layout.decode(await link.read_fifo(address)) for address in self._layout.addresses
+        ]
+
+    def _place(self, pieces: list[FifoPiece], now_s: float) -> list[PlacedSamples]:
+        if self._layout.kind is FifoKind.PER_CHANNEL:
+            return self._channels.place(pieces, now_s)
+        samples = self._counted if self._layout.has_counter else self._uncounted
+        return place_records(pieces[0], samples, now_s)
+
+    def _is_drained(self, pieces: list[FifoPiece]) -> bool:
+        """Whether the queues have given all they had."""
+        full = any(piece.n_samples >= self._layout.most_samples for piece in pieces)
+        return not self._layout.removes or not full
+
+    def _require_in_time(self, deadline_s: float) -> None:
+        if self._clock.monotonic_s() > deadline_s:
+            raise LinkError(
+                f"{self._settings.transport}: the queue has not run empty for"
+                f" {self._settings.stale_after_s:g} s: the link is too slow for"
+                f" {self._calibration.rate_hz:g} samples per second"
+            )
+
+    def _raw_blocks(self, placed: list[PlacedSamples], arrived_ns: int) -> list[RawBlock]:
+        newest = {samples.epoch: samples.stop_index for samples in placed}
+        blocks = []
+        for samples in placed:
+            if self._newest != (samples.epoch, newest[samples.epoch]):
+                self._newest = (samples.epoch, newest[samples.epoch])
+                self._stamps.add(*self._newest, arrived_ns)
+            blocks.append(self._raw_block(samples))
+        return blocks
+
+    def _raw_block(self, samples: PlacedSamples) -> RawBlock:
+        return RawBlock(
+            epoch=samples.epoch,
+            first_index=samples.first_index,
+            start_ns=self._stamps.start_ns(samples.first_index),
+            rate_hz=self._calibration.rate_hz,
+            counts=samples.counts,
+            ok=(True,) * self._layout.n_channels,
+            slow=(float("nan"),) * len(self._calibration.slow),
+        )
