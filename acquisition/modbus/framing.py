@@ -21,6 +21,7 @@ from acquisition.modbus.replies import (
     ReplyShape,
     least_bytes,
     reply_to,
+    require_read,
 )
 
 _MBAP = struct.Struct(">HHHB")
@@ -89,6 +90,7 @@ class ReadOnlyFramer(FramerBase):
         ConfigError
             If the request is anything but a read.
         """
+        require_read(message.function_code)
         self._asked = _Asked(message, reply_to(message.function_code, message.encode()))
         self.n_received = 0
         return super().buildFrame(message)

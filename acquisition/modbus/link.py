@@ -11,6 +11,7 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, ReadInput
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.connection import Connection
 from acquisition.modbus.identification import Identification
+from acquisition.modbus.identity import require_identity
 from acquisition.modbus.replies import (
     READ_COILS,
     READ_DISCRETE_INPUTS,
@@ -46,14 +47,18 @@ class ModbusLink:
         return str(self._settings.transport)
 
     async def open(self) -> None:
-        """Connect; on a serial line, wait until it is silent.
+        """Connect, on a serial line wait until it is silent, and see whether the device is right.
 
         Raises
         ------
         LinkError, ConfigError
-            As `Connection.open`.
+            As `Connection.open`; a ConfigError too if the device is not the expected one.
+        FrameError
+            If it answers nonsense when it is asked who it is.
         """
         await self._connection.open()
+        if self._settings.identity is not None:
+            await require_identity(self, self._settings.identity)
 
     def close(self) -> None:
         """Close the connection; again is harmless."""

@@ -126,7 +126,19 @@ def reply_to(function: int, request: bytes) -> ReplyShape:
         return CountedReply(2 * _ADDRESS_AND_COUNT.unpack(request)[1])
     if function in (READ_COILS, READ_DISCRETE_INPUTS):
         return CountedReply(-(-_ADDRESS_AND_COUNT.unpack(request)[1] // 8))
-    raise ConfigError(f"function code {function} is never sent, only {READ_FUNCTIONS} to read")
+    raise _never_sent(function)
+
+
+def require_read(function: int) -> None:
+    """Refuse a function code that does anything but read.
+
+    Raises
+    ------
+    ConfigError
+        Always, unless it is one of `READ_FUNCTIONS`.
+    """
+    if function not in READ_FUNCTIONS:
+        raise _never_sent(function)
 
 
 def least_bytes(function: int, shape: ReplyShape, pdu: bytes) -> int:
@@ -158,6 +170,10 @@ def identification_objects(pdu: bytes) -> tuple[dict[int, bytes], int | None]:
         objects[number] = pdu[at + 2 : at + 2 + n_bytes]
         at += 2 + n_bytes
     return objects, next_object if more_follows else None
+
+
+def _never_sent(function: int) -> ConfigError:
+    return ConfigError(f"function code {function} is never sent, only {READ_FUNCTIONS} to read")
 
 
 def _reads_identification(request: bytes) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 from acquisition.errors import ConfigError
+from acquisition.modbus.identity import Identity
 
 Parity: TypeAlias = Literal["none", "even", "odd"]
 
@@ -99,12 +100,15 @@ class LinkSettings:
         slowest reply: it is also the silence that is awaited when the line is opened.
     max_registers
         Most registers in one read, 1 to 125.
+    identity
+        What the device must answer before anything else is read from it.
     """
 
     transport: Transport
     device_id: int = 1
     timeout_s: float = 1.0
     max_registers: int = MAX_REGISTERS_PER_READ
+    identity: Identity | None = None
 
     def __post_init__(self) -> None:
         serial = isinstance(self.transport, SerialTransport)

@@ -1,74 +1,18 @@
-"""A device that lies: a raw Modbus TCP server that spoils its replies on demand."""
+"""Small rings, honest and hostile, and the sources and links that read them."""
 
-import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 
 import pytest
+from rigs.hostile_modbus import HostileLine, HostileServer
 
 from acquisition.clock import SystemClock
-from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.modbus.transport import LinkSettings, TcpTransport
+from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 from core.blocks import SampleBlock
-
-HONEST_REQUEST_BYTES = 12
-
-
-class HostileServer:
-    """Answers reads from a memory; after `n_honest` more replies the lie takes over.
-
-    A lie gets request, right reply and the stream, and sends what it likes.
-    """
-
-    def __init__(self, memory: RegisterMemory) -> None:
-        self.port = 0
-        self.lie: Callable | None = None
-        self.n_honest = 0
-        self.requests: list[bytes] = []
-        self._memory = memory
-        self._tasks: set[asyncio.Task[None]] = set()
-
-    async def __aenter__(self) -> "HostileServer":
-        self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        self.port = self._server.sockets[0].getsockname()[1]
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self._server.close()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self._server.wait_closed()
-
-    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        self._tasks.add(task)
-        try:
-            await self._answer(reader, writer)
-        except (asyncio.IncompleteReadError, ConnectionError, asyncio.CancelledError):
-            pass
-        finally:
-            self._tasks.discard(task)
-            writer.close()
-
-    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        while True:
-            request = await reader.readexactly(HONEST_REQUEST_BYTES)
-            self.requests.append(request)
-            address, count = (int.from_bytes(request[i : i + 2], "big") for i in (8, 10))
-            data = self._memory.read(address, count)
-            body = request[6:8] + bytes([len(data)]) + data
-            reply = request[:4] + len(body).to_bytes(2, "big") + body
-            self.n_honest -= 1
-            if self.lie is None or self.n_honest >= 0:
-                writer.write(reply)
-            else:
-                await self.lie(request, reply, writer)
-            await writer.drain()
 
 
 async def blocks_until(stream, stop_index: int) -> list[SampleBlock]:
@@ -109,6 +53,23 @@ async def server(device) -> AsyncIterator[ModbusRingServer]:
 async def hostile(device) -> AsyncIterator[HostileServer]:
     async with HostileServer(device.memory) as server:
         yield server
+
+
+@pytest.fixture
+async def hostile_line(device, tmp_path) -> AsyncIterator[HostileLine]:
+    async with HostileLine(device.memory, tmp_path / "line") as line:
+        yield line
+
+
+@pytest.fixture
+def link_on() -> Callable[..., ModbusLink]:
+    """Builds links to a serial line; other settings as keywords."""
+
+    def build(path: object, **settings) -> ModbusLink:
+        transport = SerialTransport(device=str(path), baudrate=230_400, parity="none")
+        return ModbusLink(LinkSettings(transport=transport, **settings))
+
+    return build
 
 
 @pytest.fixture
