@@ -1,4 +1,4 @@
-"""Settings, calibration and DBC compiled into a plan; every misfit is found here, before any frame."""
+"""Settings, calibration and DBC compiled into a plan; a misfit is found before any frame."""
 
 from collections.abc import Mapping
 

@@ -1,0 +1,228 @@
+"""`CanShape`: the messages of the simulated CAN DAQ, from which both its DBC and its frames follow.
+
+A block of samples begins with messages that say what holds for it: index, epoch, health, time and
+slow values, each with a counter that ties it to the block's first sample. Then come the samples.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.errors import ConfigError
+
+_FD_LENGTHS = (8, 12, 16, 20, 24, 32, 48, 64)
+_FD_SAMPLES = 5
+_FD_WAVE_HEAD, _FD_HEAD, _CLASSIC_HEAD = 4, 24, 2
+_MAX_CHANNELS = 32
+_MAX_SLOW = 50
+
+
+class Kind(Enum):
+    """Types of signals: letter and size of numpy."""
+
+    U8 = "u1"
+    U16 = "u2"
+    U32 = "u4"
+    I16 = "i2"
+    F32 = "f4"
+
+    @property
+    def n_bytes(self) -> int:
+        """Size on the wire."""
+        return int(self.value[1])
+
+
+@dataclass(frozen=True)
+class Field:
+    """A signal of a message; `offset` counts bytes."""
+
+    name: str
+    offset: int
+    kind: Kind
+    unit: str = ""
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class MessageShape:
+    """A message of the simulated DAQ.
+
+    Parameters
+    ----------
+    first_channel
+        Of those it carries samples of; None if it carries none.
+    """
+
+    name: str
+    frame_id: int
+    extended: bool
+    fd: bool
+    length: int
+    fields: tuple[Field, ...]
+    first_channel: int | None = None
+
+    @property
+    def dtype(self) -> np.dtype[np.void]:
+        """The message as a numpy record; classic ones are Intel, FD ones Motorola."""
+        order = ">" if self.fd else "<"
+        return np.dtype(
+            {
+                "names": [field.name for field in self.fields],
+                "formats": [order + field.kind.value for field in self.fields],
+                "offsets": [field.offset for field in self.fields],
+                "itemsize": self.length,
+            }
+        )
+
+    def records(self, n_frames: int) -> npt.NDArray[np.void]:
+        """Empty frames to be filled in."""
+        return np.zeros(n_frames, dtype=self.dtype)
+
+
+@dataclass(frozen=True)
+class DaqSignal:
+    """A channel as the DBC describes it.
+
+    Parameters
+    ----------
+    unit, factor
+        Of its counts; a DAQ that sends float32 gives engineering units, factor 1.
+    """
+
+    id: str
+    unit: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CanShape:
+    """What the simulated DAQ sends.
+
+    Parameters
+    ----------
+    floats
+        Whether samples are float32 engineering units rather than int16 counts.
+    base_id
+        Id of the first message; the others follow.
+
+    Raises
+    ------
+    ConfigError
+        If the ids or channels do not fit.
+    """
+
+    channels: tuple[DaqSignal, ...]
+    slow: tuple[DaqSignal, ...] = ()
+    fd: bool = False
+    floats: bool = False
+    base_id: int = 0x100
+    extended: bool = False
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.channels) <= _MAX_CHANNELS or len(self.slow) > _MAX_SLOW:
+            raise ConfigError(
+                f"simulated CAN DAQ: {len(self.channels)} channels and {len(self.slow)} slow ones;"
+                f" allowed are 1 to {_MAX_CHANNELS} and up to {_MAX_SLOW}"
+            )
+        highest = (1 << 29) - 1 if self.extended else (1 << 11) - 1
+        if not 0 <= self.base_id <= highest - len(self.messages) + 1:
+            raise ConfigError(
+                f"simulated CAN DAQ: base_id is {self.base_id}, its {len(self.messages)} messages"
+                f" end at {highest}"
+            )
+
+    @property
+    def samples_per_frame(self) -> int:
+        """Of each channel."""
+        return _FD_SAMPLES if self.fd else 1
+
+    @property
+    def messages(self) -> tuple[MessageShape, ...]:
+        """All messages in the order in which a block is sent."""
+        shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
+        return tuple(
+            MessageShape(
+                name=name,
+                frame_id=self.base_id + n,
+                extended=self.extended,
+                fd=self.fd,
+                length=_wire_length(fields, self.fd),
+                fields=tuple(fields),
+                first_channel=first,
+            )
+            for n, (name, fields, first) in enumerate(shapes)
+        )
+
+    @property
+    def waves(self) -> tuple[MessageShape, ...]:
+        """Those messages that carry samples."""
+        return tuple(m for m in self.messages if m.first_channel is not None)
+
+    def _classic_heads(self) -> "list[_Shape]":
+        heads: list[_Shape] = [
+            ("HEAD", [Field("index", 0, Kind.U32), Field("epoch", 4, Kind.U32)], None),
+            ("HEALTH", [_COUNTER, Field("n_samples", 2, Kind.U16), Field("ok", 4, Kind.U32)], None),
+            ("TIME_S", [_COUNTER, Field("seconds", 2, Kind.U32)], None),
+            ("TIME_US", [_COUNTER, Field("microseconds", 2, Kind.U32)], None),
+        ]
+        for number, slow in enumerate(self.slow):
+            field = Field(dbc_name(slow.id), _CLASSIC_HEAD, Kind.F32, slow.unit)
+            heads.append((f"SLOW_{number}", [_COUNTER, field], None))
+        return heads
+
+    def _fd_heads(self) -> "list[_Shape]":
+        names = ("index", "epoch", "ok", "seconds", "microseconds")
+        head = [Field(name, 4 * n, Kind.U32) for n, name in enumerate(names)]
+        head.append(Field("n_samples", 20, Kind.U16))
+        n_first = (64 - _FD_HEAD) // 4
+        head += _floats(self.slow[:n_first], _FD_HEAD)
+        heads: list[_Shape] = [("HEAD", head, None)]
+        rest = self.slow[n_first:]
+        for number in range(0, len(rest), 15):
+            fields = [Field("index", 0, Kind.U32), *_floats(rest[number : number + 15], 4)]
+            heads.append((f"SLOW_{number // 15}", fields, None))
+        return heads
+
+    def _waves(self) -> "list[_Shape]":
+        kind = Kind.F32 if self.floats else Kind.I16
+        head_bytes = _FD_WAVE_HEAD if self.fd else _CLASSIC_HEAD
+        n_values = ((64 if self.fd else 8) - head_bytes) // kind.n_bytes
+        step = n_values // self.samples_per_frame
+        waves: list[_Shape] = []
+        for first in range(0, len(self.channels), step):
+            fields = [_COUNTER, Field("valid", 2, Kind.U8)] if self.fd else [_COUNTER]
+            offset = head_bytes
+            for channel in self.channels[first : first + step]:
+                for name in self.sample_names(channel.id):
+                    fields.append(Field(name, offset, kind, channel.unit, channel.factor))
+                    offset += kind.n_bytes
+            waves.append((f"WAVE_{first // step}", fields, first))
+        return waves
+
+    def sample_names(self, channel_id: str) -> tuple[str, ...]:
+        """Names of a channel's signals, one for each sample in a frame."""
+        name = dbc_name(channel_id)
+        if self.samples_per_frame == 1:
+            return (name,)
+        return tuple(f"{name}_{n}" for n in range(self.samples_per_frame))
+
+
+_Shape = tuple[str, list[Field], int | None]
+_COUNTER = Field("counter", 0, Kind.U16)
+
+
+def dbc_name(channel_id: str) -> str:
+    """A channel's id as DBC allows names: letters, digits and underscores, no digit first."""
+    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in channel_id)
+    return f"_{name}" if name[0].isdigit() else name
+
+
+def _floats(slow: tuple[DaqSignal, ...], offset: int) -> list[Field]:
+    return [Field(dbc_name(s.id), offset + 4 * n, Kind.F32, s.unit) for n, s in enumerate(slow)]
+
+
+def _wire_length(fields: list[Field], fd: bool) -> int:
+    end = max(field.offset + field.kind.n_bytes for field in fields)
+    return next(n for n in _FD_LENGTHS if n >= end) if fd else end
