@@ -8,8 +8,8 @@ from acquisition.raw import RawBlock
 from core.units import NS_PER_S
 
 _STAMP_NS = 1000
-"""Resolution of a stamp: what profile v1 can carry, so that a recording that is replayed over any
-wire comes back with the very stamps it had."""
+"""Resolution of a stamp. It and the single precision of slow values are what every profile can
+carry, so that a recording that is replayed over any wire has the very numbers it had."""
 
 
 class BlockGrid:
@@ -69,6 +69,7 @@ def _part(raw: RawBlock, start: int, stop: int) -> RawBlock:
         first_index=raw.first_index + start,
         start_ns=start_ns // _STAMP_NS * _STAMP_NS,
         counts=raw.counts[:, start:stop],
+        slow=tuple(np.float32(raw.slow).tolist()),
         rejected=() if start else raw.rejected,
     )
 

@@ -19,6 +19,7 @@ class LinkState(StrEnum):
     CONNECTING = "connecting"
     CONNECTED = "connected"
     NOT_CONNECTED = "not_connected"
+    ENDED = "ended"
 
 
 @dataclass(frozen=True)

@@ -3,22 +3,24 @@
 import asyncio
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import uvicorn
 
 from acquisition.clock import Clock
+from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of
 from service.live import LiveView
+from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
-from service.runner import Runner
+from service.runner import Runner, WatchedUnit
 from service.settings.plant import PlantFile
 from service.store.port import Store
-from service.wiring.sources import watched_units
 from service.wiring.stores import open_store
 
 STALE_HOPS = 2.5
@@ -58,10 +60,33 @@ def listen(host: str, port: int) -> socket.socket:
         raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
+@dataclass(frozen=True)
+class Performance:
+    """What a service runs: a plant live, or recordings of it.
+
+    Parameters
+    ----------
+    units
+        Source and monitor of every unit of the plant.
+    origin
+        What its database holds, and what all its answers say.
+    ends
+        Whether the service stops by itself when all sources have come to their end.
+    """
+
+    plant: PlantFile
+    units: Mapping[str, WatchedUnit]
+    origin: Origin = Origin.LIVE
+    ends: bool = False
+
+
 async def run_service(
-    plant: PlantFile, listener: socket.socket, clock: Clock, announce: Callable[[str], None]
+    performance: Performance,
+    listener: socket.socket,
+    clock: Clock,
+    announce: Callable[[str], None],
 ) -> None:
-    """Run until SIGINT or SIGTERM.
+    """Run until SIGINT or SIGTERM, or until a performance that ends is over.
 
     Parameters
     ----------
@@ -75,26 +100,27 @@ async def run_service(
     StoreError
         If the database cannot be used.
     """
-    store = open_store(plant)
+    store = open_store(performance.plant, performance.origin)
     try:
-        await _run(plant, listener, clock, store, announce)
+        await _run(performance, listener, clock, store, announce)
     finally:
         store.close()
 
 
 async def _run(
-    plant: PlantFile,
+    performance: Performance,
     listener: socket.socket,
     clock: Clock,
     store: Store,
     announce: Callable[[str], None],
 ) -> None:
+    plant, units = performance.plant, performance.units
     refresh_s = _refresh_s(plant)
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s)
     recorder = Recorder(store, live, clock)
-    units = watched_units(plant, clock)
-    runner = Runner(units, live, recorder, clock)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
+    alarms = await alarm_engine(plant, monitors, performance.origin, store, recorder.put, clock)
+    runner = Runner(units, live, recorder, clock, alarms)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
     context = Context(
@@ -105,6 +131,10 @@ async def _run(
         clock=clock,
         refresh_s=refresh_s,
         references=references,
+        alarms=alarms,
+        recorder=recorder,
+        origin=performance.origin,
+        max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
     )
     config = uvicorn.Config(
         create_app(context),
@@ -119,11 +149,14 @@ async def _run(
         async with asyncio.TaskGroup() as tasks:
             running = tasks.create_task(runner.run(), name="run")
             looking = tasks.create_task(references.run(), name="references")
+            watching = tasks.create_task(alarms.run(), name="alarms")
             serving = tasks.create_task(server.serve([listener]), name="serve")
             announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
+            if performance.ends:
+                running.add_done_callback(lambda _: stopped.set())
             await stopped.wait()
             server.should_exit = True
-            for task in (running, looking, announcing):
+            for task in (running, looking, watching, announcing):
                 task.cancel()
             await asyncio.wait([serving])
     finally:

@@ -11,7 +11,8 @@ from acquisition.clock import Clock
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.source import SampleSource
 from core.blocks import SampleBlock
-from core.monitor import UnitMonitor
+from core.monitor_port import Monitor
+from service.alarms.engine import AlarmEngine
 from service.bus import Bus
 from service.connect_gate import ConnectGate
 from service.live import LinkState, LiveView
@@ -41,7 +42,7 @@ class WatchedUnit:
     """
 
     source: SampleSource
-    monitor: UnitMonitor
+    monitor: Monitor
     retry_s: float = 0.5
 
 
@@ -54,8 +55,10 @@ class Runner:
         live: LiveView,
         recorder: Recorder,
         clock: Clock,
+        alarms: AlarmEngine,
     ) -> None:
         self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
+        self._alarms = alarms
         self._bus = Bus(BUS_CAPACITY)
         self._gate = ConnectGate(CONNECTS_PER_S, clock)
 
@@ -81,7 +84,8 @@ class Runner:
                 self._note_failure(unit, error)
                 await self._clock.sleep(_retry_s(error, watched.retry_s))
             else:
-                self._live.set_link(unit, LinkState.NOT_CONNECTED, "the source has ended")
+                self._live.set_link(unit, LinkState.ENDED, "the recording has ended")
+                self._alarms.link(unit, False, "the recording has ended")
                 return
 
     async def _read(self, unit: str, source: SampleSource) -> None:
@@ -89,11 +93,13 @@ class Runner:
             async for block in blocks:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
+                    self._alarms.link(unit, True)
                 await self._bus.publish(block)
 
     def _note_failure(self, unit: str, error: AcquisitionError) -> None:
         if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
             log.warning("not connected", unit=unit, reason=str(error))
+        self._alarms.link(unit, False, str(error))
 
     async def _analyse(self) -> None:
         async for block in self._bus.blocks():
@@ -107,8 +113,9 @@ class Runner:
         for assessment in assessments:
             self._live.set_assessment(assessment)
         self._live.set_received(block, monitor.account)
-        if assessments or gaps:
-            self._recorder.put(Findings(assessments, gaps))
+        news = self._alarms.take(block, assessments)
+        if assessments or gaps or news:
+            self._recorder.put(Findings(assessments, gaps, news))
 
 
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:

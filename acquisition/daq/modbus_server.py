@@ -53,6 +53,8 @@ class ModbusServer(ABC):
     clock
         Paces the device, which catches up after any delay; without one the device stands until
         its ``produce`` is called.
+    patient
+        Whether the clock starts with the first request rather than when the server is entered.
 
     Attributes
     ----------
@@ -60,8 +62,12 @@ class ModbusServer(ABC):
         How often each function code has arrived.
     """
 
-    def __init__(self, device: ModbusDevice, clock: Clock | None = None) -> None:
+    def __init__(
+        self, device: ModbusDevice, clock: Clock | None = None, *, patient: bool = False
+    ) -> None:
         self.function_codes: Counter[int] = Counter()
+        self._asked = asyncio.Event()
+        self._patient = patient
         self._served = device
         self._clock = clock
         self._origin_s: float | None = None
@@ -151,6 +157,7 @@ class ModbusServer(ABC):
             If it hangs up instead.
         """
         self.function_codes[request[0]] += 1
+        self._asked.set()
         if self._reply_faults:
             return self._reply_faults.popleft()(request, self._right_reply)
         return self._right_reply(request)
@@ -174,6 +181,8 @@ class ModbusServer(ABC):
 
     async def _pace(self, clock: Clock) -> None:
         step_s = self._served.step_s
+        if self._patient:
+            await self._asked.wait()
         if self._origin_s is None:
             self._origin_s = clock.monotonic_s()
         while not self._served.ended:

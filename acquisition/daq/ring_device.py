@@ -64,6 +64,9 @@ class RingDevice:
         Whether the feed has nothing more.
     on_demand
         Whether the device produces when its reader has read everything and looks for more.
+    patient
+        Whether it waits for its reader before it overwrites a slot that was not read, or begins
+        anew.
     identification
         Answer to function 43/14, by object number; none without it.
 
@@ -89,10 +92,11 @@ class RingDevice:
         self.frozen = False
         self.ended = False
         self.on_demand = False
+        self.patient = False
         self.identification: Mapping[int, bytes] = {}
         self._repetition = Repetition()
         self._n_frozen = 0
-        self._newest_was_read = False
+        self._n_unread = 0
         self._n_looks = 0
         self.first_sequence = self._settings.first_sequence
         self._n_restarts = 0
@@ -116,11 +120,13 @@ class RingDevice:
             if self._n_frozen:
                 self._n_frozen -= 1
                 continue
-            self._position += 1
             ahead = self._slots.peek()
             if ahead is None:
                 self.ended = True
                 return
+            if self.patient and self._n_unread > self._most_unread(ahead):
+                return
+            self._position += 1
             if ahead.epoch != self._feed_epoch or self._slots.number(ahead) <= self._position:
                 self._take(fault)
 
@@ -173,8 +179,7 @@ class RingDevice:
         if self._settings.base_address in asked:
             self._look()
         data = self.memory.read(address, count)
-        last = self.layout.slot_address(self._newest) + self.layout.slot_registers - 1
-        self._newest_was_read |= last in asked
+        self._note_read(asked)
         return data
 
     def read_bits(self, function: int, address: int, count: int) -> None:
@@ -202,11 +207,26 @@ class RingDevice:
 
     def _look(self) -> None:
         """Note that a reader looks at the header, whether there is something new."""
-        if not self._newest_was_read:
+        if self._n_unread:
             return
         if self.on_demand and not self.ended:
             self.produce_unpaced(max(1, (self.layout.n_slots - 2) // 2))
         self._n_looks += self.ended
+
+    def _most_unread(self, ahead: RawBlock) -> int:
+        """Slots that may be unread when this one comes: none when its ring begins anew."""
+        if ahead.epoch != self._feed_epoch:
+            return 0
+        n_slots = self._slots.number(ahead) - self._number
+        return max(0, self.layout.n_slots - 2 - n_slots)
+
+    def _note_read(self, asked: range) -> None:
+        """Note the newest slot whose last register is among those asked for."""
+        ring = self.layout
+        place = (asked.stop - ring.ring_address - ring.slot_registers) // ring.slot_stride
+        last = ring.ring_address + place * ring.slot_stride + ring.slot_registers - 1
+        if place >= 0 and last in asked:
+            self._n_unread = min(self._n_unread, (self._newest - place) % ring.n_slots)
 
     def _take(self, fault: SlotFault | None) -> None:
         raw = self._slots.take()
@@ -221,6 +241,7 @@ class RingDevice:
 
     def _power_up(self, first: RawBlock, first_index: int | None) -> None:
         self.memory.clear()
+        self._n_unread = 0
         self._feed_epoch = first.epoch
         self.epoch = (first.epoch + self._n_restarts) % U32
         self._newest = self.first_sequence
@@ -230,7 +251,8 @@ class RingDevice:
     def _write(self, raw: RawBlock, n_slots: int, spoilers: list[SlotFault]) -> None:
         """Write a slot that is so many places after the one before."""
         self._number = self._position = self._slots.number(raw)
-        self._newest_was_read, self._n_looks = False, 0
+        self._n_unread += n_slots
+        self._n_looks = 0
         right = self._slot(raw)
         slot: Slot | None = right
         for spoil in spoilers:

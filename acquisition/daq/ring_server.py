@@ -15,6 +15,8 @@ class ModbusRingServer(ModbusTcpServer):
     ----------
     on_demand
         Without a clock: whether the device produces just what its reader can follow.
+    patient
+        With a clock: whether the device waits for its reader, at first and before a restart.
     """
 
     def __init__(
@@ -25,10 +27,11 @@ class ModbusRingServer(ModbusTcpServer):
         port: int = 0,
         *,
         on_demand: bool = False,
+        patient: bool = False,
     ) -> None:
-        super().__init__(device, clock, host, port)
+        super().__init__(device, clock, host, port, patient=patient)
         self.device = device
-        device.on_demand = on_demand
+        device.on_demand, device.patient = on_demand, patient
 
 
 class RtuRingServer(ModbusRtuServer):
@@ -40,6 +43,8 @@ class RtuRingServer(ModbusRtuServer):
         Where the line is to be found, whatever number the system gives it.
     on_demand
         Without a clock: whether the device produces just what its reader can follow.
+    patient
+        With a clock: whether the device waits for its reader, at first and before a restart.
     """
 
     def __init__(
@@ -49,7 +54,8 @@ class RtuRingServer(ModbusRtuServer):
         link: Path | None = None,
         *,
         on_demand: bool = False,
+        patient: bool = False,
     ) -> None:
-        super().__init__(device, clock, link)
+        super().__init__(device, clock, link, patient=patient)
         self.device = device
-        device.on_demand = on_demand
+        device.on_demand, device.patient = on_demand, patient

@@ -38,9 +38,14 @@ class ModbusRtuServer(ModbusServer):
     """
 
     def __init__(
-        self, device: ModbusDevice, clock: Clock | None = None, link: Path | None = None
+        self,
+        device: ModbusDevice,
+        clock: Clock | None = None,
+        link: Path | None = None,
+        *,
+        patient: bool = False,
     ) -> None:
-        super().__init__(device, clock)
+        super().__init__(device, clock, patient=patient)
         self._link = link
         self._line: tuple[int, int] | None = None
         self._name = ""

@@ -3,6 +3,7 @@
 import asyncio
 import struct
 from collections.abc import Mapping
+from typing import cast
 
 from acquisition.clock import Clock
 from acquisition.daq.modbus_server import ModbusDevice, ModbusServer
@@ -33,8 +34,10 @@ class ModbusTcpServer(ModbusServer):
         clock: Clock | None = None,
         host: str = "127.0.0.1",
         port: int = 0,
+        *,
+        patient: bool = False,
     ) -> None:
-        super().__init__(device, clock)
+        super().__init__(device, clock, patient=patient)
         self.port = port
         self._host = host
         self._server: asyncio.Server | None = None
@@ -82,9 +85,9 @@ class _Connection(asyncio.Protocol):
         self._transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        if isinstance(transport, asyncio.Transport):
-            self._transport = transport
-            self._connections.add(self)
+        # uvloop's transports are asyncio.Transports by their methods, but not by their class
+        self._transport = cast(asyncio.Transport, transport)
+        self._connections.add(self)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         self._connections.discard(self)

@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+from service.api.alarm_models import AlarmCountModel
 from service.api.models import ApiModel, LatestModel, Time
 
 
@@ -28,8 +29,8 @@ class DeviceClockModel(ApiModel):
 class SourceModel(ApiModel):
     """How the samples of a unit arrive, and where every one of them went."""
 
-    state: Literal["connecting", "connected", "not_connected"]
-    """Whether samples arrive."""
+    state: Literal["connecting", "connected", "not_connected", "ended"]
+    """Whether samples arrive; only a recording ends."""
 
     reason: str | None
     """Why not."""
@@ -141,6 +142,9 @@ class OverviewModel(ApiModel):
 
     store: StoreModel
     """Whether results reach the disk."""
+
+    alarms: AlarmCountModel
+    """How many alarms there are."""
 
     units: list[UnitOverviewModel]
     """All units."""

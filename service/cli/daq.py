@@ -1,64 +1,71 @@
-"""`padwatch daq`: simulated units behind a real Modbus TCP DAQ."""
+"""`padwatch daq`: simulated or recorded units behind a real DAQ."""
 
-import asyncio
-import json
-import signal
-import sys
-from contextlib import AsyncExitStack
+from pathlib import Path
 from typing import Annotated
 
 import typer
 import uvloop
 
-from acquisition.clock import SystemClock
+from acquisition.clock import FastClock, SystemClock
 from acquisition.errors import AcquisitionError
+from acquisition.raw import RawFeed
 from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.daq_program import run_daq
 from service.settings.plant import PlantFile
-from service.wiring.daqs import simulated_daq
+from service.wires import Wire, over_wire
+from service.wiring.daqs import daq_of
+from service.wiring.recordings import recorded_feed, recordings_by_unit
+from service.wiring.simulations import simulated_feed
+
+SpeedOption = Annotated[
+    float,
+    typer.Option(min=0.0, max=1000.0, help="Seconds of the recording in a second; 0: unpaced."),
+]
 
 
 def daq(
     plant_file: PlantPath,
-    until_input_ends: Annotated[
-        bool, typer.Option(help="Also end when standard input is closed, as it is by a parent.")
+    recording: Annotated[
+        list[Path] | None,
+        typer.Option(help="Play this recording of a unit instead of simulations; repeatable."),
+    ] = None,
+    through: Annotated[
+        Wire | None,
+        typer.Option(help="Serve over this wire on loopback instead.", show_default=False),
+    ] = None,
+    speed: SpeedOption = 1.0,
+    control: Annotated[
+        bool,
+        typer.Option(help="Read commands UNIT FAULT [COUNT] from standard input; its end ends it."),
     ] = False,
 ) -> None:
-    """Serve every unit that has a simulation where its Modbus source looks for it.
+    """Serve units over the protocol of their sources, where these look for them.
 
-    Prints one JSON line with the port of each unit, then runs until Ctrl-C or SIGTERM.
+    Prints one JSON line that says where each unit is found, then runs until Ctrl-C or SIGTERM.
+    Unpaced, a device produces as fast as its reader reads.
     """
     plant = read_plant_file(plant_file)
+    if through is not None:
+        plant = over_wire(plant, through)
+    clock = FastClock(SystemClock(), speed) if speed else None
     try:
-        uvloop.run(_serve(plant, until_input_ends))
+        feeds = _feeds(plant, recording or [])
+        servers = {
+            unit.id: daq_of(unit, feeds[unit.id], clock, recorded=bool(recording))
+            for unit in plant.unit
+            if unit.id in feeds
+        }
+        uvloop.run(run_daq(servers, typer.echo, controlled=control))
     except (AcquisitionError, LookupError) as error:
         fail(f"padwatch daq: {error.args[0]}")
 
 
-async def _serve(plant: PlantFile, until_input_ends: bool) -> None:
+def _feeds(plant: PlantFile, recordings: list[Path]) -> dict[str, RawFeed]:
+    if recordings:
+        played = recordings_by_unit(recordings, plant)
+        return {u.id: recorded_feed(played[u.id], u) for u in plant.unit if u.id in played}
     clock = SystemClock()
-    stopped = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stopped.set)
-    servers = {unit.id: simulated_daq(unit, clock) for unit in plant.unit if unit.simulation}
-    if not servers:
+    feeds = {unit.id: simulated_feed(unit, clock) for unit in plant.unit if unit.simulation}
+    if not feeds:
         raise LookupError("no unit of this plant file has a [unit.simulation] table")
-    async with AsyncExitStack() as stack:
-        for server in servers.values():
-            await stack.enter_async_context(server)
-        typer.echo(json.dumps({unit: server.port for unit, server in servers.items()}))
-        async with asyncio.TaskGroup() as tasks:
-            running = [tasks.create_task(server.run()) for server in servers.values()]
-            if until_input_ends:
-                running.append(tasks.create_task(_end_with_input(stopped)))
-            await stopped.wait()
-            for task in running:
-                task.cancel()
-
-
-async def _end_with_input(stopped: asyncio.Event) -> None:
-    reader = asyncio.StreamReader()
-    loop = asyncio.get_running_loop()
-    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
-    await reader.read()
-    stopped.set()
+    return feeds

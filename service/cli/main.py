@@ -12,6 +12,7 @@ from service.cli.demo import demo
 from service.cli.logs import set_up_logging
 from service.cli.reanalyse import reanalyse
 from service.cli.record import record
+from service.cli.replay import replay
 from service.cli.run import run
 from service.cli.validate import validate
 
@@ -22,6 +23,7 @@ app.command()(run)
 app.command()(demo)
 app.command()(daq)
 app.command()(record)
+app.command()(replay)
 app.command()(reanalyse)
 app.command()(validate)
 app.add_typer(config.app, name="config")

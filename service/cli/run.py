@@ -9,9 +9,10 @@ import uvloop
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.program import PortInUseError, listen, run_service
+from service.program import Performance, PortInUseError, listen, run_service
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
+from service.wiring.sources import live_units
 
 log = structlog.get_logger()
 
@@ -31,10 +32,13 @@ def run_plant(plant: PlantFile, port: int) -> None:
     """Run the service on a port; ends the command with one line if it cannot."""
     try:
         with listen(plant.service.host, port) as listener:
-            uvloop.run(run_service(plant, listener, SystemClock(), _announce))
+            clock = SystemClock()
+            performance = Performance(plant, live_units(plant, clock))
+            uvloop.run(run_service(performance, listener, clock, announce))
     except (PortInUseError, StoreError, AcquisitionError) as error:
         fail(f"padwatch: {error}")
 
 
-def _announce(url: str) -> None:
+def announce(url: str) -> None:
+    """Tell where the dashboard is."""
     typer.echo(f"padwatch: {url}")

@@ -1,20 +1,30 @@
 """Recordings of a unit: written, opened, and as sources."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import Clock
-from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.errors import ConfigError
+from acquisition.raw import RawFeed
+from acquisition.recording.feed import RecordedFeed
+from acquisition.recording.manifest import (
+    RecordedChannel,
+    RecordedSlowChannel,
+    RecordedUnit,
+    read_manifest,
+)
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.selection import Selection, select
 from acquisition.recording.source import RecordingSource
 from acquisition.recording.writer import RecordingWriter
 from acquisition.source import SampleSource
 from service.conversion import calibration_of, machine_of
-from service.settings import units as settings
+from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
 
 
-def recording_writer(unit: settings.UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
+def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
     """A recording of a unit, about to be written.
 
     Raises
@@ -52,7 +62,27 @@ def recording_of(folder: Path) -> Recording:
     return open_recording(folder)
 
 
-def selection_of(recording: Recording, unit: settings.UnitSettings) -> Selection:
+def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
+    """Recordings by the unit they are of.
+
+    Raises
+    ------
+    ConfigError
+        If one has no readable manifest, is of no unit of the plant, or of the same as another.
+    """
+    known = [unit.id for unit in plant.unit]
+    found: dict[str, Path] = {}
+    for folder in folders:
+        unit = read_manifest(folder).unit
+        if unit not in known:
+            raise ConfigError(f"{folder}: is of unit {unit}, the plant has {', '.join(known)}")
+        if unit in found:
+            raise ConfigError(f"{folder}: is of unit {unit}, like {found[unit]}; play one of them")
+        found[unit] = folder
+    return found
+
+
+def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
     """What a unit needs of a recording.
 
     Raises
@@ -65,7 +95,7 @@ def selection_of(recording: Recording, unit: settings.UnitSettings) -> Selection
 
 
 def recording_source(
-    recording: Recording, selection: Selection, unit: settings.UnitSettings | None, clock: Clock
+    recording: Recording, selection: Selection, unit: UnitSettings | None, clock: Clock
 ) -> SampleSource:
     """A recording as an unpaced source.
 
@@ -77,3 +107,35 @@ def recording_source(
     if unit is not None:
         selection = replace(selection, calibration=calibration_of(unit))
     return RecordingSource(recording, clock, selection)
+
+
+def replay_source(
+    folder: Path, unit: UnitSettings, clock: Clock, speed: float | None
+) -> SampleSource:
+    """A recording in the place of a unit's own source, read with the unit's own calibration.
+
+    Parameters
+    ----------
+    speed
+        Seconds of the recording in a second, or None for as fast as it is taken.
+
+    Raises
+    ------
+    ConfigError
+        If it is damaged or does not fit the unit.
+    """
+    recording = open_recording(folder)
+    selection = replace(selection_of(recording, unit), calibration=calibration_of(unit))
+    return RecordingSource(recording, clock, selection, speed)
+
+
+def recorded_feed(folder: Path, unit: UnitSettings) -> RawFeed:
+    """A recording behind a simulated DAQ.
+
+    Raises
+    ------
+    ConfigError
+        If it is damaged or does not fit the unit.
+    """
+    recording = open_recording(folder)
+    return RecordedFeed(recording, selection_of(recording, unit))

@@ -1,6 +1,6 @@
 """Where the samples of each unit come from."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 
 from acquisition.clock import Clock
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
@@ -15,14 +15,32 @@ from service.settings.units import UnitSettings
 from service.wiring.modbus import fields_of, transport_of
 from service.wiring.simulations import simulated_feed
 
+DEFAULT_RETRY_S = 0.5
+"""Of sources that are not polled."""
 
-def watched_units(plant: PlantFile, clock: Clock) -> Mapping[str, WatchedUnit]:
+
+def watched_units(
+    plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
+) -> dict[str, WatchedUnit]:
     """Source and monitor of every unit of a plant."""
     analysis = analysis_of(plant.analysis)
     return {
-        unit.id: WatchedUnit(source_of(unit, clock), UnitMonitor(machine_of(unit), analysis))
+        unit.id: WatchedUnit(
+            source(unit), UnitMonitor(machine_of(unit), analysis), poll_period_s(unit)
+        )
         for unit in plant.unit
     }
+
+
+def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
+    """All units with the sources that the plant file names."""
+    return watched_units(plant, lambda unit: source_of(unit, clock))
+
+
+def poll_period_s(unit: UnitSettings) -> float:
+    """How often a unit's source is looked at; a lost link is tried again as often."""
+    period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
+    return period_s
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:

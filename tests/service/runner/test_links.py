@@ -103,15 +103,13 @@ async def test_one_unit_without_link_does_not_hold_up_another(
     assert plant.live.status("U2").state is LinkState.CONNECTED
 
 
-async def test_a_recording_that_ends_leaves_its_unit_not_connected(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_a_recording_that_ends_says_so(plant: Any, scripted: Make, block: Make) -> None:
     source = scripted([block(0)])
 
     await asyncio.wait_for(plant.runner(U1=source).run(), 30)
 
     status = plant.live.status("U1")
-    assert (status.state, status.reason) == (LinkState.NOT_CONNECTED, "the source has ended")
+    assert (status.state, status.reason) == (LinkState.ENDED, "the recording has ended")
     assert status.account.n_stored == 128
 
 

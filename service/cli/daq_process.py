@@ -1,0 +1,76 @@
+"""The simulated DAQ as a process of its own, beside the command that needs it."""
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import IO
+
+from service.cli.plant_file import fail
+from service.settings.plant import PlantFile
+
+STOP_S = 3.0
+
+Endpoints = dict[str, dict[str, str | int]]
+
+
+@dataclass(frozen=True)
+class RunningDaq:
+    """A simulated DAQ that serves.
+
+    Parameters
+    ----------
+    endpoints
+        Where each unit is found: keys and values of its source's settings.
+    over
+        For each unit, set when its recording has been played to the end.
+    """
+
+    endpoints: Endpoints
+    over: dict[str, threading.Event]
+
+    def attached(self, plant: PlantFile) -> PlantFile:
+        """The plant with its sources pointed to this DAQ."""
+        units = []
+        for unit in plant.unit:
+            source = unit.source.model_copy(update=self.endpoints.get(unit.id, {}))
+            units.append(unit.model_copy(update={"source": source}))
+        return plant.model_copy(update={"unit": tuple(units)})
+
+
+@contextmanager
+def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
+    """Run ``padwatch daq`` with arguments; it ends with this process, however that ends."""
+    process = subprocess.Popen(  # noqa: S603  our own program
+        [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,  # Ctrl-C is for this process, which stops the DAQ last
+    )
+    try:
+        line = process.stdout.readline() if process.stdout else b""
+        if not line or process.stdout is None:
+            fail("padwatch: the simulated DAQ did not start; its own message stands above")
+        endpoints: Endpoints = json.loads(line)
+        daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
+        news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)
+        news.start()
+        yield daq
+    finally:
+        process.terminate()
+        try:
+            process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _listen(stdout: IO[bytes], daq: RunningDaq) -> None:
+    """Note what the DAQ tells, until it ends."""
+    for line in stdout:
+        ended = json.loads(line).get("ended")
+        if ended in daq.over:
+            daq.over[ended].set()

@@ -1,0 +1,96 @@
+"""`padwatch replay`: recordings through the whole service, straight or over a real wire."""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvloop
+
+from acquisition.clock import SystemClock
+from acquisition.errors import AcquisitionError
+from service.cli.daq import SpeedOption
+from service.cli.daq_process import daq_process
+from service.cli.plant_file import fail, read_plant_file
+from service.cli.run import announce
+from service.origin import Origin
+from service.program import Performance, PortInUseError, listen, run_service
+from service.replay import PlayedOut, replay_folder, replayed_plant
+from service.settings.plant import PlantFile
+from service.store.port import StoreError
+from service.wires import Wire, over_wire
+from service.wiring.recordings import recordings_by_unit, replay_source
+from service.wiring.sources import source_of, watched_units
+from service.wiring.stores import database_path
+
+
+def replay(
+    recordings: Annotated[list[Path], typer.Argument(help="Folders of the recordings.")],
+    plant: Annotated[Path, typer.Option(help="The plant file (TOML).", show_default=False)],
+    through: Annotated[
+        Wire | None,
+        typer.Option(help="Play through a simulated DAQ over this wire.", show_default=False),
+    ] = None,
+    speed: SpeedOption = 1.0,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the results [<data folder>/replays/…]", show_default=False),
+    ] = None,
+    serve: Annotated[
+        bool, typer.Option(help="Go on serving the results until Ctrl-C when all is played.")
+    ] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="HTTP port; 0: any free one.")] = 0,
+    json_output: Annotated[
+        bool, typer.Option("--json", help="Print where the results are as JSON.")
+    ] = False,
+) -> None:
+    """Play recordings through acquisition, analysis, store and dashboard, as if they happened now.
+
+    All of it says that it is a replay, and its results have a database of their own.
+    """
+    file = read_plant_file(plant)
+    try:
+        units = recordings_by_unit(recordings, file)
+        folder = out or replay_folder(file, units.values(), SystemClock().now_ns())
+        played = replayed_plant(file, units, folder)
+        with _performance(played, plant, units, through, speed) as performance:
+            _run(replace(performance, ends=not serve), port)
+    except (PortInUseError, StoreError, AcquisitionError, LookupError) as error:
+        fail(f"padwatch replay: {error.args[0]}")
+    database = database_path(played)
+    typer.echo(json.dumps({"database": str(database)}) if json_output else f"results: {database}")
+
+
+@contextmanager
+def _performance(
+    plant: PlantFile,
+    plant_path: Path,
+    units: Mapping[str, Path],
+    through: Wire | None,
+    speed: float,
+) -> Iterator[Performance]:
+    clock = SystemClock()
+    if through is None:
+        yield Performance(
+            plant,
+            watched_units(plant, lambda u: replay_source(units[u.id], u, clock, speed or None)),
+            Origin.REPLAY,
+        )
+        return
+    arguments = [str(plant_path), "--through", through.value, "--speed", str(speed)]
+    for folder in units.values():
+        arguments += ["--recording", str(folder)]
+    with daq_process(arguments) as daq:
+        attached = daq.attached(over_wire(plant, through))
+        watched = watched_units(
+            attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id])
+        )
+        yield Performance(attached, watched, Origin.REPLAY)
+
+
+def _run(performance: Performance, port: int) -> None:
+    with listen(performance.plant.service.host, port) as listener:
+        uvloop.run(run_service(performance, listener, SystemClock(), announce))

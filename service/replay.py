@@ -1,0 +1,80 @@
+"""Recordings in the place of a plant's own sources: which units, where results go, when it ends."""
+
+import threading
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+from acquisition.errors import LinkError
+from acquisition.source import SampleSource
+from core.blocks import SampleBlock
+from core.units import NS_PER_S
+from service.settings.plant import PlantFile
+
+REPLAYS = "replays"
+"""Folder below the plant's data folder, apart from its live database."""
+
+
+def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
+    """The part of a plant that is replayed, with a data folder of its own."""
+    service = plant.service.model_copy(update={"data_folder": str(folder)})
+    chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
+    return plant.model_copy(update={"unit": chosen, "service": service})
+
+
+def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:
+    """A folder for the results of one replay, named after what is played and when."""
+    moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).strftime("%Y%m%dT%H%M%SZ")
+    name = "+".join(path.resolve().name for path in recordings)[:80]
+    return Path(plant.service.data_folder) / REPLAYS / f"{name}-{moment}"
+
+
+class PlayedOut:
+    """A source behind a simulated DAQ that plays a recording: it ends when the recording has.
+
+    The DAQ goes on answering after its recording has ended, as a device would whose converter has
+    stopped. Its reader takes that for a lost link, which is what ends the stream here.
+
+    Parameters
+    ----------
+    over
+        Set when the DAQ has said that the recording is over.
+    """
+
+    def __init__(self, source: SampleSource, over: threading.Event) -> None:
+        self._source, self._over = source, over
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the link; see :class:`acquisition.source.SampleSource`.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As the source does, until the recording is over.
+        """
+        async with AsyncExitStack() as stack:
+            try:
+                blocks = await stack.enter_async_context(self._source.connect())
+            except LinkError:
+                if not self._over.is_set():
+                    raise
+                blocks = _nothing()
+            yield await stack.enter_async_context(aclosing(self._until_over(blocks)))
+
+    async def _until_over(
+        self, blocks: AsyncIterator[SampleBlock]
+    ) -> AsyncGenerator[SampleBlock, None]:
+        try:
+            async for block in blocks:
+                yield block
+        except LinkError:
+            if not self._over.is_set():
+                raise
+
+
+async def _nothing() -> AsyncIterator[SampleBlock]:
+    """A stream that has ended."""
+    return
+    yield

@@ -1,0 +1,29 @@
+"""The wires over which a unit's samples can be played on loopback, whatever its own source is."""
+
+from enum import StrEnum
+
+from service.settings.plant import PlantFile
+from service.settings.sources import ModbusRingSettings, SourceSettings
+
+_LOOPBACK = "127.0.0.1"
+
+
+class Wire(StrEnum):
+    """A protocol and what carries it."""
+
+    MODBUS_TCP = "modbus_tcp"
+    MODBUS_RTU = "modbus_rtu"
+
+
+def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
+    """The plant with all units behind DAQs on this wire, where no DAQ has said yet where it is."""
+    units = tuple(unit.model_copy(update={"source": _source(wire)}) for unit in plant.unit)
+    return plant.model_copy(update={"unit": units})
+
+
+def _source(wire: Wire) -> SourceSettings:
+    """Polls follow each other quickly: how long a replay takes is a matter of its speed."""
+    where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
+    return ModbusRingSettings(
+        kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=1.0
+    )

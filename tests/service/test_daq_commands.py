@@ -1,0 +1,47 @@
+"""What a running simulated DAQ answers to a line of its user."""
+
+import pytest
+
+from service.daq_program import obeyed
+
+
+class Device:
+    """A server that notes what it was told to do wrong."""
+
+    def __init__(self) -> None:
+        self.endpoint = {"port": 1}
+        self.faults: list[tuple[str, int]] = []
+
+    def inject(self, fault: str, count: int = 1) -> None:
+        if fault not in ("drop", "tear"):
+            raise LookupError(f"unknown fault {fault}; there are drop, tear")
+        self.faults.append((fault, count))
+
+
+@pytest.fixture
+def devices() -> dict[str, Device]:
+    return {"U1": Device(), "U2": Device()}
+
+
+def test_a_fault_is_injected_where_and_as_often_as_told(devices) -> None:
+    assert obeyed(devices, "U2 drop 3\n") == {"done": "U2 drop 3"}
+    assert obeyed(devices, "U2 tear") == {"done": "U2 tear"}
+    assert devices["U2"].faults == [("drop", 3), ("tear", 1)]
+    assert devices["U1"].faults == []
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("", "'' is not UNIT FAULT [COUNT]"),
+        ("U1", "'U1' is not UNIT FAULT [COUNT]"),
+        ("U1 drop three", "'U1 drop three' is not UNIT FAULT [COUNT]"),
+        ("U1 drop -1", "'U1 drop -1' is not UNIT FAULT [COUNT]"),
+        ("U1 drop 1 2", "'U1 drop 1 2' is not UNIT FAULT [COUNT]"),
+        ("U3 drop", "no unit U3 here; there are U1, U2"),
+        ("U1 melt", "unknown fault melt; there are drop, tear"),
+    ],
+)
+def test_a_line_that_is_no_command_changes_nothing_and_says_why(devices, line, words) -> None:
+    assert obeyed(devices, line) == {"refused": words}
+    assert devices["U1"].faults == []

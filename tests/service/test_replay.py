@@ -1,0 +1,60 @@
+"""Where replays are kept, and how one that is played through a DAQ comes to its end."""
+
+import threading
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from acquisition.errors import LinkError
+from service.replay import PlayedOut, replay_folder, replayed_plant
+from service.settings.loading import load_plant_file
+
+NEW_YEAR_NS = 1_767_225_600 * 1_000_000_000
+
+
+class Standing:
+    """A source whose device stands still after some blocks, as a DAQ that has played all."""
+
+    def __init__(self, blocks, refuses: bool = False) -> None:
+        self._blocks, self._refuses = blocks, refuses
+
+    @asynccontextmanager
+    async def connect(self):
+        if self._refuses:
+            raise LinkError("the device answers but its data stand still")
+        yield self._stream()
+
+    async def _stream(self):
+        for block in self._blocks:
+            yield block
+        raise LinkError("the device answers but its data stand still")
+
+
+async def taken(source) -> list[str]:
+    async with source.connect() as blocks:
+        return [block async for block in blocks]
+
+
+async def test_a_device_that_stands_still_after_its_recording_ends_the_stream() -> None:
+    over = threading.Event()
+    over.set()
+    assert await taken(PlayedOut(Standing(["a", "b"]), over)) == ["a", "b"]
+    assert await taken(PlayedOut(Standing([], refuses=True), over)) == []
+
+
+@pytest.mark.parametrize("refuses", [False, True], ids=["while reading", "when connecting"])
+async def test_before_its_end_a_lost_link_stays_a_lost_link(refuses: bool) -> None:
+    source = PlayedOut(Standing(["a"], refuses), threading.Event())
+    with pytest.raises(LinkError, match="stand still"):
+        await taken(source)
+
+
+def test_results_of_a_replay_lie_apart_under_what_was_played_and_when(deploy: Path) -> None:
+    plant = load_plant_file(deploy / "demo.toml")
+    folder = replay_folder(plant, [Path("runs/march"), Path("runs/april")], NEW_YEAR_NS)
+    assert folder == Path("var/demo/replays/march+april-20260101T000000Z")
+    played = replayed_plant(plant, ["U2"], folder)
+    assert [unit.id for unit in played.unit] == ["U2"]
+    assert played.service.data_folder == str(folder)
+    assert plant.service.data_folder == "var/demo"

@@ -1,0 +1,127 @@
+"""Recorded runs through the whole service: straight, and through a DAQ over each real wire."""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+RECORDINGS = Path(__file__).parents[1] / "recordings"
+RUNS = {"U1": "part_load", "U2": "full_load"}
+YEAR = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z", "max_points": 10000}
+WIRES = ["modbus_tcp", "modbus_rtu", "can", "can_fd"]
+
+pytestmark = pytest.mark.slow
+
+
+def known(unit: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((RECORDINGS / f"{RUNS[unit]}.known.json").read_text())
+    return found
+
+
+async def played(start: Callable, *options: str, runs: tuple[str, ...] = tuple(RUNS)) -> Any:
+    """A service that has played the runs to their end."""
+    folders = [str(RECORDINGS / RUNS[unit]) for unit in runs]
+    plant = ("--plant", str(RECORDINGS / "plant.toml"))
+    program = await start("replay", *folders, *plant, "--serve", *options)
+    await program.wait_for_url()
+
+    def all_ended(units: list[dict[str, Any]]) -> bool:
+        return all(unit["source"]["state"] == "ended" for unit in units)
+
+    await program.until("/api/v1/units", all_ended)
+    return program
+
+
+async def trends(program: Any, unit: str) -> dict[str, Any]:
+    """All quantities of a unit's bearing, once all results are on the disk."""
+    names = list(known(unit)["series"])
+    path = f"/api/v1/units/{unit}/bearings/UJB/trends"
+    n_known = len(known(unit)["time_ns"])
+    query = "&".join(f"{k}={v}" for k, v in YEAR.items())
+    query += "".join(f"&quantity={name}" for name in names)
+    found: dict[str, Any] = await program.until(
+        f"{path}?{query}", lambda answer: len(answer["time"]) >= n_known
+    )
+    return found
+
+
+def bits(answer: dict[str, Any]) -> str:
+    """A digest that is equal only for the same numbers to the last bit."""
+    return hashlib.sha256(json.dumps(answer, sort_keys=True).encode()).hexdigest()
+
+
+async def test_a_replayed_run_gives_the_known_trends_over_http(start: Callable) -> None:
+    program = await played(start, "--speed", "0")
+    for unit in RUNS:
+        answer, expected = await trends(program, unit), known(unit)
+        assert answer["time"] == [ns / 1e9 for ns in expected["time_ns"]]
+        for name, values in expected["series"].items():
+            series = answer["series"][name]
+            assert series["worst_level"] == expected["level"][name], name
+            for found, value in zip(series["mean"], values, strict=True):
+                # another machine's vector instructions may round the last bits otherwise
+                same = found is value or math.isclose(found, value, rel_tol=1e-9, abs_tol=1e-12)
+                assert same, (name, found, value)
+
+
+async def test_the_known_stiffness_is_the_films(start: Callable) -> None:
+    """The known results are judged by what was simulated, not only by themselves."""
+    film_n_per_m = 0.69e9
+    program = await played(start, "--speed", "0")
+    answer = await trends(program, "U1")
+    for name in ("dynamic_k_xx_n_per_m", "dynamic_k_yy_n_per_m"):
+        usable = [value for value in answer["series"][name]["mean"] if value is not None]
+        assert usable[-1] == pytest.approx(film_n_per_m, rel=0.1)
+
+
+@pytest.mark.parametrize("wire", WIRES)
+async def test_every_wire_gives_the_same_results_to_the_last_bit(
+    start: Callable, wire: str
+) -> None:
+    straight = await played(start, "--speed", "0")
+    over_wire = await played(start, "--speed", "0", "--through", wire)
+    for unit in RUNS:
+        assert bits(await trends(over_wire, unit)) == bits(await trends(straight, unit))
+        path = f"/api/v1/units/{unit}/gaps?" + "&".join(f"{k}={YEAR[k]}" for k in ("start", "end"))
+        assert await over_wire.get(path) == await straight.get(path)
+
+
+@pytest.mark.parametrize("speed", ["1", "50"])
+async def test_a_run_gives_the_same_results_at_any_speed(start: Callable, speed: str) -> None:
+    unpaced = await played(start, "--speed", "0", runs=("U2",))
+    paced = await played(start, "--speed", speed, runs=("U2",))
+    assert bits(await trends(paced, "U2")) == bits(await trends(unpaced, "U2"))
+
+
+async def test_a_replay_says_so_and_stays_apart_from_the_live_plant(
+    start: Callable, tmp_path: Path
+) -> None:
+    program = await played(start, "--speed", "0", "--out", str(tmp_path / "again"))
+    overview = await program.get("/api/v1/overview")
+    assert overview["plant"]["origin"] == "replay"
+    await program.end()
+
+    text = (RECORDINGS / "plant.toml").read_text()
+    live = tmp_path / "live.toml"
+    live.write_text(text.replace("[analysis]", '[service]\ndata_folder = "again"\n\n[analysis]'))
+    refused = await start("run", str(live), "--port", "0")
+    assert await refused.process.wait() == 1
+    await refused.end()
+    assert "holds replay results and is not opened for live ones" in refused.errors
+
+
+async def test_a_replay_that_only_shall_be_stored_ends_by_itself(
+    start: Callable, tmp_path: Path
+) -> None:
+    program = await start(
+        *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),
+        *("--speed", "0", "--out", "results", "--json"),
+    )
+    output = (await program.process.stdout.read()).decode().splitlines()
+    assert await program.process.wait() == 0
+    assert json.loads(output[-1]) == {"database": "results/padwatch.sqlite3"}
+    assert (tmp_path / "results" / "padwatch.sqlite3").exists()
