@@ -7,11 +7,12 @@ A rig goes into `ALL`, and into `WIRED` if it has a link that can be cut; such a
 from collections.abc import AsyncIterator
 
 import pytest
+from rigs.can import CanFdRig, CanRig
 from rigs.modbus import ModbusRig, ModbusRtuRig
 from rigs.recording import RecordingRig
 from rigs.simulated import SimulatedRig
 
-WIRED = [ModbusRig, ModbusRtuRig]
+WIRED = [CanRig, CanFdRig, ModbusRig, ModbusRtuRig]
 ALL = [*WIRED, SimulatedRig, RecordingRig]
 
 
