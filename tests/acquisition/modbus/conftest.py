@@ -65,8 +65,8 @@ async def hostile_line(device, tmp_path) -> AsyncIterator[HostileLine]:
 def link_on() -> Callable[..., ModbusLink]:
     """Builds links to a serial line; other settings as keywords."""
 
-    def build(path: object, **settings) -> ModbusLink:
-        transport = SerialTransport(device=str(path), baudrate=230_400, parity="none")
+    def build(path: object, parity: str = "none", **settings) -> ModbusLink:
+        transport = SerialTransport(device=str(path), baudrate=230_400, parity=parity)
         return ModbusLink(LinkSettings(transport=transport, **settings))
 
     return build

@@ -2,19 +2,23 @@
 
 import inspect
 import socket
+import termios
 
 import pymodbus.exceptions
 import pytest
-from pymodbus.client import AsyncModbusTcpClient
+import serial.serialutil
+from pymodbus.client.base import ModbusBaseClient
 
 from acquisition.errors import AcquisitionError, ConfigError, LinkError
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 
 FOREIGN = [
     kind
-    for _, kind in inspect.getmembers(pymodbus.exceptions, inspect.isclass)
+    for module in (pymodbus.exceptions, serial.serialutil)
+    for _, kind in inspect.getmembers(module, inspect.isclass)
     if issubclass(kind, Exception)
 ] + [
+    termios.error,
     OSError,
     TimeoutError,
     ConnectionResetError,
@@ -25,26 +29,54 @@ FOREIGN = [
 ]
 
 
+def field_error(kind: type[Exception]) -> Exception:
+    """An instance of a class, with a text wherever it takes one."""
+    if kind is serial.PortNotOpenError:
+        return kind()
+    return kind("as seen in the field")
+
+
+TEXT = "as seen in the field|Attempting to use a port that is not open"
+
+
 @pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
 async def test_what_pymodbus_raises_on_a_read_is_renamed(kind, server, monkeypatch, link_to):
     async def fails(*_: object) -> None:
-        raise kind("as seen in the field")
+        raise field_error(kind)
 
     link = link_to(server.port)
     await link.open()
-    monkeypatch.setattr(AsyncModbusTcpClient, "execute", fails)
-    with pytest.raises(AcquisitionError, match="as seen in the field"):
+    monkeypatch.setattr(ModbusBaseClient, "execute", fails)
+    with pytest.raises(AcquisitionError, match=TEXT):
         await link.read(0, 1)
 
 
 @pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
 async def test_what_pymodbus_raises_on_connecting_is_renamed(kind, monkeypatch, link_to):
     async def fails(*_: object) -> None:
-        raise kind("as seen in the field")
+        raise field_error(kind)
 
-    monkeypatch.setattr(AsyncModbusTcpClient, "connect", fails)
-    with pytest.raises(AcquisitionError, match="as seen in the field"):
+    monkeypatch.setattr(ModbusBaseClient, "connect", fails)
+    with pytest.raises(AcquisitionError, match=TEXT):
         await link_to(1).open()
+
+
+@pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
+async def test_what_a_serial_port_raises_is_renamed(kind, hostile_line, monkeypatch, link_on):
+    def fails(*_: object) -> None:
+        raise field_error(kind)
+
+    link = link_on(hostile_line.path, timeout_s=0.05)
+    with monkeypatch.context() as patched:
+        patched.setattr(serial.Serial, "open", fails)
+        with pytest.raises(AcquisitionError):
+            await link.open()
+    await link.open()
+    if issubclass(kind, serial.SerialException):
+        monkeypatch.setattr(serial.Serial, "read", fails)
+        with pytest.raises(LinkError, match="closed the connection"):
+            await link.read(0, 1)
+    link.close()
 
 
 async def test_a_name_that_does_not_resolve_is_a_link_error_with_the_reason(link_to):

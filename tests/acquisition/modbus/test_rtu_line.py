@@ -1,0 +1,112 @@
+"""A serial line: one wire for everybody, on which a late reply could be anybody's."""
+
+import asyncio
+
+import pytest
+
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import RtuRingServer
+from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.transport import SerialTransport
+
+
+async def test_a_reply_that_comes_too_late_is_never_taken_for_the_next_one(hostile_line, link_on):
+    link = link_on(hostile_line.path, timeout_s=0.1)
+    held_back = []
+
+    async def keep(request, reply, line):  # noqa: ARG001
+        held_back.append(reply)
+
+    await link.open()
+    right = await link.read(1, 1)
+    hostile_line.lie = keep
+    with pytest.raises(LinkError, match=r"no answer within 0\.1 s"):
+        await link.read(0, 1)
+    with pytest.raises(LinkError, match="closed"):
+        await link.read(1, 1)
+    assert len(hostile_line.requests) == 2
+    hostile_line.lie = None
+    opening = asyncio.create_task(link.open())
+    while not link._connection._client.connected:
+        await asyncio.sleep(0)
+    hostile_line.write(held_back[0])  # the same function, unit and length: only time can tell
+    await opening
+    assert await link.read(1, 1) == right
+    link.close()
+
+
+async def test_a_line_is_only_used_when_it_is_silent(hostile_line, link_on):
+    link = link_on(hostile_line.path, timeout_s=0.05)
+
+    async def babble() -> None:
+        while True:
+            hostile_line.write(b"\x55")
+            await asyncio.sleep(0.01)
+
+    babbling = asyncio.create_task(babble())
+    with pytest.raises(LinkError, match=r"not silent for 0\.05 s within 0\.25 s: .* bytes"):
+        await link.open()
+    babbling.cancel()
+    assert not hostile_line.requests
+    await link.open()
+    link.close()
+
+
+async def test_a_line_that_is_taken_away_is_noticed_before_the_time_out(hostile_line, link_on):
+    async def unplug(request, reply, line):  # noqa: ARG001
+        line.close()
+
+    link = link_on(hostile_line.path, timeout_s=0.2)
+    await link.open()
+    hostile_line.lie = unplug
+    with pytest.raises(LinkError, match="closed the connection"):
+        await link.read(0, 1)
+
+
+async def test_a_port_that_is_not_there_is_a_link_error_that_names_it(link_on):
+    with pytest.raises(LinkError, match="/dev/nowhere: No such file or directory"):
+        await link_on("/dev/nowhere").open()
+
+
+async def test_a_file_that_is_no_port_is_a_link_error(link_on, tmp_path):
+    path = tmp_path / "plain"
+    path.write_bytes(b"")
+    with pytest.raises(LinkError, match=r"plain: .*configure port"):
+        await link_on(path).open()
+
+
+async def test_two_programs_cannot_read_one_line(hostile_line, link_on):
+    first, second = (link_on(hostile_line.path, timeout_s=0.05) for _ in range(2))
+    await first.open()
+    with pytest.raises(LinkError, match="line: Resource temporarily unavailable"):
+        await second.open()
+    first.close()
+
+
+async def test_settings_that_a_port_refuses_are_a_config_error(hostile_line, link_on):
+    link = link_on(hostile_line.path, parity="even")  # a pseudo-terminal has no parity
+    with pytest.raises(ConfigError, match="line: the port refuses its settings"):
+        await link.open()
+
+
+def test_a_character_is_as_long_as_its_bits():
+    line = SerialTransport(device="/dev/ttyUSB0", baudrate=9600, parity="even", stop_bits=1)
+    assert line.character_s == pytest.approx(11 / 9600)
+    assert line.frame_gap_s == pytest.approx(3.5 * 11 / 9600)
+    fast = SerialTransport(device="/dev/ttyUSB0", baudrate=115_200, parity="none")
+    assert fast.frame_gap_s == 0.00175
+
+
+async def test_a_cut_line_comes_back_at_the_same_path(counting_feed, link_on, tmp_path):
+    device = RingDevice(counting_feed())
+    async with RtuRingServer(device, link=tmp_path / "daq") as server:
+        assert server.endpoint == {"device": str(tmp_path / "daq"), "parity": "none"}
+        link = link_on(tmp_path / "daq", timeout_s=0.05)
+        await link.open()
+        server.inject("cut")
+        with pytest.raises(LinkError):
+            await link.read(0, 16)
+        await link.open()
+        assert len(await link.read(0, 16)) == 32
+        link.close()
+    assert not (tmp_path / "daq").is_symlink()
