@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.condition.film_conditions import FilmConditions
 
 Cell: TypeAlias = tuple[int, ...]
 """Bin numbers of eccentricity ratio, oil temperature and, where it counts, attitude angle."""
@@ -51,12 +51,7 @@ class CellGrid:
         """Whether the attitude angle counts."""
         return self.attitude_width_deg is not None
 
-    def cells(
-        self,
-        eccentricity_ratio: FloatArray,
-        oil_temperature_c: FloatArray,
-        attitude_deg: FloatArray,
-    ) -> CellArray:
+    def cells(self, conditions: FilmConditions) -> CellArray:
         """Cell of each reading; only where `is_known`.
 
         Returns
@@ -64,22 +59,18 @@ class CellGrid:
         (n_axes, n)
         """
         axes = [
-            eccentricity_ratio / self.eccentricity_width,
-            oil_temperature_c / self.temperature_width_c,
+            conditions.eccentricity_ratio / self.eccentricity_width,
+            conditions.oil_temperature_c / self.temperature_width_c,
         ]
         if self.attitude_width_deg is not None:
-            axes.append(np.mod(attitude_deg, 360.0) / self.attitude_width_deg)
+            axes.append(np.mod(conditions.attitude_deg, 360.0) / self.attitude_width_deg)
         return np.floor(np.nan_to_num(np.stack(axes))).astype(np.int64)
 
-    def is_known(
-        self,
-        eccentricity_ratio: FloatArray,
-        oil_temperature_c: FloatArray,
-        attitude_deg: FloatArray,
-    ) -> npt.NDArray[np.bool_]:
+    def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """(n,) whether a reading has everything that its cell depends on."""
-        known = np.isfinite(eccentricity_ratio) & np.isfinite(oil_temperature_c)
-        return known & np.isfinite(attitude_deg) if self.has_attitude else known
+        known = np.isfinite(conditions.eccentricity_ratio)
+        known &= np.isfinite(conditions.oil_temperature_c)
+        return known & np.isfinite(conditions.attitude_deg) if self.has_attitude else known
 
     def centre(self, cell: Cell) -> tuple[float, ...]:
         """Eccentricity ratio, oil temperature and attitude angle in the middle of a cell."""

@@ -1,11 +1,11 @@
-import numpy as np
 import pytest
 
 from core.condition.cells import CellGrid
+from core.condition.film_conditions import FilmConditions
 
 
 def one(grid: CellGrid, e: float, t: float, attitude_deg: float = 0.0) -> tuple[int, ...]:
-    cells = grid.cells(np.array([e]), np.array([t]), np.array([attitude_deg]))
+    cells = grid.cells(FilmConditions.one(e, t, attitude_deg))
     return tuple(int(i) for i in cells[:, 0])
 
 
@@ -20,10 +20,10 @@ def test_frost_and_negative_attitudes_have_cells_too() -> None:
 
 
 def test_a_reading_without_temperature_has_no_cell() -> None:
-    nan, some = np.array([np.nan]), np.array([0.3])
-    assert not CellGrid().is_known(some, nan, some)[0]
-    assert CellGrid().is_known(some, some, nan)[0]
-    assert not CellGrid(attitude_width_deg=30.0).is_known(some, some, nan)[0]
+    nan, some = float("nan"), 0.3
+    assert not CellGrid().is_known(FilmConditions.one(some, nan, some))[0]
+    assert CellGrid().is_known(FilmConditions.one(some, some, nan))[0]
+    assert not CellGrid(attitude_width_deg=30.0).is_known(FilmConditions.one(some, some, nan))[0]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""What healthy films are like under each condition, learned from readings and kept as a value."""

@@ -1,0 +1,154 @@
+"""`BearingBaseline`: a learned baseline as a value, with who made it, when and why."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.baseline.cell_table import CellTable
+from core.baseline.surface import Surface
+from core.condition.cells import CellGrid
+from core.condition.film_conditions import FilmConditions
+
+
+class Watched(StrEnum):
+    """What has a baseline: stiffness, and the two 1× amplitudes that tell what changed it."""
+
+    STIFFNESS = "stiffness"
+    SHAFT = "shaft"
+    BEARING = "bearing"
+
+
+@dataclass(frozen=True)
+class TimeScatter:
+    """Scatter of the mean deviation over a time scale, with all that makes readings alike."""
+
+    time_scale_h: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Of what a baseline is, and where it comes from.
+
+    Parameters
+    ----------
+    estimator
+        Which estimator's stiffness was learned.
+    version
+        Counts the baselines of a bearing, from 1.
+    created_ns
+        When it was learned, host time.
+    event
+        What happened to the machine that made it necessary.
+    """
+
+    unit: str
+    bearing: str
+    estimator: str
+    version: int
+    author: str
+    created_ns: int
+    event: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """Readings compared with their baseline; where `place` is -1 there is nothing to compare.
+
+    Parameters
+    ----------
+    place : (n,)
+        Cell in the table.
+    deviation : (n,)
+        ln of what was measured over what was learned.
+    weight : (n,)
+        1 for a typical reading, less for one that scatters more.
+    surface_std : (n,)
+    """
+
+    place: npt.NDArray[np.int64]
+    deviation: FloatArray
+    weight: FloatArray
+    surface_std: FloatArray
+
+
+@dataclass(frozen=True)
+class QuantityBaseline:
+    """What was learned of one quantity in one direction.
+
+    Parameters
+    ----------
+    direction
+        "x" or "y".
+    scatter
+        Of single readings about the surface, over all cells.
+    u_random
+        Random uncertainty that readings typically had; it is part of their scatter.
+    reading_h
+        Running hours that a reading stands for.
+    time_scatter
+        Shortest time scale first.
+    rejected_share
+        Share of the learning groups that fitted so badly that they counted as nothing.
+    """
+
+    quantity: Watched
+    direction: str
+    grid: CellGrid
+    surface: Surface
+    table: CellTable
+    scatter: float
+    u_random: float
+    reading_h: float
+    time_scatter: tuple[TimeScatter, ...]
+    rejected_share: float
+
+    def compare(
+        self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray
+    ) -> Deviations:
+        """Compare readings with what was learned under their conditions.
+
+        Parameters
+        ----------
+        value, u_random : (n,)
+            ln of the quantity and its random standard uncertainty.
+        """
+        place = self.table.find(self.grid.cells(conditions))
+        place = np.where(self.grid.is_known(conditions) & np.isfinite(value), place, -1)
+        n = place.size
+        found = Deviations(place, np.full(n, np.nan), np.zeros(n), np.zeros(n))
+        rows = np.flatnonzero(place >= 0)
+        if rows.size:
+            cell = place[rows]
+            excess = np.maximum(u_random[rows] ** 2 - self.u_random**2, 0.0)
+            variance = self.table.scatter[cell] ** 2 + excess
+            found.deviation[rows] = value[rows] - self.surface.at(conditions.rows(rows))
+            found.weight[rows] = np.minimum(1.0, self.scatter**2 / variance)
+            found.surface_std[rows] = self.table.surface_std[cell]
+        return found
+
+
+@dataclass(frozen=True)
+class BearingBaseline:
+    """All that was learned of one bearing, frozen.
+
+    Parameters
+    ----------
+    learned_from_ns, learned_until_ns
+        First and last reading of the learning period.
+    quantities
+        At most one for each quantity and direction; one that is not there had too few readings.
+    """
+
+    origin: Origin
+    learned_from_ns: int
+    learned_until_ns: int
+    quantities: tuple[QuantityBaseline, ...]
+
+    def of(self, quantity: Watched, direction: str) -> QuantityBaseline | None:
+        """What was learned of a quantity in a direction, if anything."""
+        found = [q for q in self.quantities if (q.quantity, q.direction) == (quantity, direction)]
+        return found[0] if found else None

@@ -1,0 +1,97 @@
+"""What a baseline knows of every cell that it has seen."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.condition.cells import Cell, CellArray
+
+
+class Support(IntEnum):
+    """Whether readings in a cell can be judged."""
+
+    NONE = 0
+    BORROWED = 1
+    OWN = 2
+
+
+@dataclass(frozen=True)
+class CellStatistics:
+    """One cell.
+
+    Parameters
+    ----------
+    location
+        Median of the readings, in ln.
+    scatter
+        Robust standard deviation of readings about the surface; drawn towards that of all cells
+        where there are few days.
+    surface_std
+        Standard uncertainty of the surface in the cell.
+    """
+
+    cell: Cell
+    n_readings: int
+    n_days: int
+    location: float
+    scatter: float
+    surface_std: float
+    support: Support
+
+
+@dataclass(frozen=True)
+class CellTable:
+    """All cells with readings."""
+
+    cells: tuple[CellStatistics, ...]
+
+    def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
+        """(n,) place of each cell in the table; -1 if it has not been seen, or has no support."""
+        if not self.cells:
+            return np.full(cells.shape[1], -1)
+        low, places = self._places
+        index = cells - low[:, np.newaxis]
+        size = np.array(places.shape)[:, np.newaxis]
+        is_inside = np.all((index >= 0) & (index < size), axis=0)
+        found = places[tuple(np.where(is_inside, index, 0))]
+        return np.where(is_inside, found, -1)
+
+    @cached_property
+    def scatter(self) -> FloatArray:
+        """(n_cells,)."""
+        return np.array([cell.scatter for cell in self.cells], np.float64)
+
+    @cached_property
+    def surface_std(self) -> FloatArray:
+        """(n_cells,)."""
+        return np.array([cell.surface_std for cell in self.cells], np.float64)
+
+    @cached_property
+    def _places(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Lowest bins, and place by bins counted from there."""
+        bins = np.array([cell.cell for cell in self.cells])
+        low = bins.min(axis=0)
+        places = np.full(tuple(bins.max(axis=0) - low + 1), -1)
+        for place, cell in enumerate(self.cells):
+            if cell.support is not Support.NONE:
+                places[tuple(bins[place] - low)] = place
+        return low, places
+
+
+def lies_between(cell: Cell, own: frozenset[Cell], reach: int = 2) -> bool:
+    """Whether a cell has others, of their own support, on both sides along some axis."""
+    for axis in range(len(cell)):
+        sides = [
+            any(
+                (*cell[:axis], cell[axis] + sign * step, *cell[axis + 1 :]) in own
+                for step in range(1, reach + 1)
+            )
+            for sign in (-1, 1)
+        ]
+        if all(sides):
+            return True
+    return False

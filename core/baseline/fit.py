@@ -1,0 +1,157 @@
+"""A robust smooth surface through groups of readings, with its uncertainty.
+
+The coefficients have a prior: their second differences along each axis are normal with
+`bend_std` (P-splines as a Gaussian prior: Eilers and Marx 1996; Wood, Generalized Additive Models,
+5.4). The posterior covariance is the uncertainty of the surface; it grows where there are few
+readings, and there the surface follows its neighbours. Groups far off count as nothing (Tukey's
+bisquare after Huber's start), so that a fault in less than a third of the learning period, or
+single wrong days, do not bend it. Residuals of one day, and of neighbouring days, are alike: by as
+much as they are, less is known, and that is measured.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve
+
+from core.arrays import FloatArray
+from core.baseline.groups import Groups
+from core.baseline.robust import bisquare, robust_std
+from core.baseline.surface import KnotAxis, Surface, SurfaceShape
+
+HUBER_LIMIT = 1.345
+HUBER_ROUNDS, BISQUARE_ROUNDS = 6, 8
+
+SLOPE_STD = 2.0
+"""Prior standard deviation of the change of ln k from knot to knot: so wide that it only decides
+where all readings lie on a line."""
+
+ATTITUDE_STD = 1.0
+LEAST_STD = 1e-4
+"""Groups are not believed to be better than this, in ln."""
+
+FEW_READINGS = 2.0
+"""A group of as many readings counts half."""
+
+SPANS_DAYS = (1, 10)
+"""Over which residuals may be alike."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A surface, how well it is known, and what it was fitted to.
+
+    Parameters
+    ----------
+    covariance
+        (n_coefficients, n_coefficients)
+    robust_weight : (n_groups,)
+        1 for a group that fits, 0 for one that counts as nothing.
+    group_std
+        Scatter of groups about the surface.
+    clustering
+        Groups that know as much as one, because they are alike.
+    """
+
+    surface: Surface
+    covariance: FloatArray
+    robust_weight: FloatArray
+    group_std: float
+    clustering: float
+
+    def std(self, design: FloatArray) -> FloatArray:
+        """(n,) standard uncertainty of the surface at rows of a design matrix."""
+        variance = np.einsum("ij,jk,ik->i", design, self.covariance, design)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
+    """Fit a surface, and find out how much groups scatter and are alike."""
+    design, trust = shape.design(groups.conditions), _trust(groups)
+    prior = prior_precision(shape, bend_std)
+    offset = float(np.median(groups.value))
+    y = groups.value - offset
+    robust, std = np.ones(y.size), max(robust_std(y), LEAST_STD)
+    for round_ in range(HUBER_ROUNDS + BISQUARE_ROUNDS):
+        coefficients, _ = _solve(design, y, trust * robust / std**2, prior)
+        standardised = (y - design @ coefficients) * np.sqrt(trust)
+        std = max(robust_std(standardised), LEAST_STD)
+        if round_ < HUBER_ROUNDS - 1:
+            robust = np.minimum(1.0, HUBER_LIMIT * std / np.maximum(np.abs(standardised), 1e-12))
+        else:
+            robust = bisquare(standardised / std)
+    clustering = _clustering(groups.day, (y - design @ coefficients) / std, trust * robust)
+    precision = trust * robust / (std**2 * clustering)
+    coefficients, covariance = _solve(design, y, precision, prior)
+    surface = Surface(shape, offset, tuple(coefficients.tolist()))
+    return Fit(surface, covariance, robust, std, clustering)
+
+
+def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
+    """The surface without some of the groups, all else as found with them."""
+    shape = fit.surface.shape
+    precision = is_used * _trust(groups) * fit.robust_weight / (fit.group_std**2 * fit.clustering)
+    coefficients, _ = _solve(
+        shape.design(groups.conditions),
+        groups.value - fit.surface.offset,
+        precision,
+        prior_precision(shape, bend_std),
+    )
+    return Surface(shape, fit.surface.offset, tuple(coefficients.tolist()))
+
+
+def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
+    """(n_coefficients, n_coefficients) inverse covariance of the prior."""
+    n_e, n_t = shape.eccentricity.n_splines, shape.temperature.n_splines
+    along_e, along_t = _differences(n_e, bend_std), _differences(n_t, bend_std)
+    tensor = np.kron(along_e, np.eye(n_t)) + np.kron(np.eye(n_e), along_t)
+    precision = np.eye(shape.n_coefficients) / ATTITUDE_STD**2
+    precision[: n_e * n_t, : n_e * n_t] = tensor + 1e-9 * np.eye(n_e * n_t)
+    return precision
+
+
+def _differences(n: int, bend_std: float) -> FloatArray:
+    slopes, bends = np.diff(np.eye(n), axis=0), np.diff(np.eye(n), 2, axis=0)
+    return np.asarray(slopes.T @ slopes / SLOPE_STD**2 + bends.T @ bends / bend_std**2)
+
+
+def _trust(groups: Groups) -> FloatArray:
+    return groups.n_readings / (groups.n_readings + FEW_READINGS)
+
+
+def _solve(
+    design: FloatArray, y: FloatArray, precision: FloatArray, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    weighted = design * precision[:, np.newaxis]
+    factor = cho_factor(design.T @ weighted + prior, lower=True)
+    covariance = cho_solve(factor, np.eye(prior.shape[0]))
+    return cho_solve(factor, weighted.T @ y), covariance
+
+
+def _clustering(day: npt.NDArray[np.int64], standardised: FloatArray, weight: FloatArray) -> float:
+    """How much the means over days, or over ten, scatter beyond what independent groups would."""
+    found = [1.0]
+    for span in SPANS_DAYS:
+        _, part = np.unique(day // span, return_inverse=True)
+        total = np.bincount(part, weight * standardised)
+        expected = np.bincount(part, weight**2)
+        mean = total / np.sqrt(np.maximum(expected, 1e-12))
+        found.append(robust_std(mean) ** 2 * (1.0 + 2.0 / mean.size))
+    return max(found)
+
+
+def surface_shape(
+    groups: Groups, knot_e: float, knot_t_c: float, has_attitude: bool
+) -> SurfaceShape:
+    """Knots that cover all groups."""
+    return SurfaceShape(
+        _axis(groups.conditions.eccentricity_ratio, knot_e),
+        _axis(groups.conditions.oil_temperature_c, knot_t_c),
+        has_attitude,
+    )
+
+
+def _axis(x: FloatArray, width: float) -> KnotAxis:
+    first, last = np.floor(np.min(x) / width), np.floor(np.max(x) / width)
+    return KnotAxis(float(first * width), width, int(last - first) + 1)

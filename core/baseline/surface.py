@@ -1,0 +1,127 @@
+"""A smooth surface over eccentricity and oil temperature: cubic B-splines on uniform knots."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.condition.film_conditions import FilmConditions
+
+ATTITUDE_TERMS = 4
+"""Shaft position along x and y, and twice its angle: what a bearing that is not round does."""
+
+
+@dataclass(frozen=True)
+class KnotAxis:
+    """Uniform knots: `n_intervals` of one width, from `start` on."""
+
+    start: float
+    width: float
+    n_intervals: int
+
+    @property
+    def n_splines(self) -> int:
+        """Cubic B-splines that are not zero somewhere on the axis."""
+        return self.n_intervals + 3
+
+    def splines(self, x: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """First spline that is not zero at each x, and the values of the four that are not.
+
+        Beyond the ends the outermost cubic goes on.
+
+        Returns
+        -------
+        (n,), (4, n)
+        """
+        along = (x - self.start) / self.width
+        first = np.clip(np.floor(along), 0, self.n_intervals - 1).astype(np.int64)
+        u = along - first
+        # uniform cubic B-spline (de Boor, A Practical Guide to Splines, IX)
+        values = np.stack(
+            [
+                (1.0 - u) ** 3,
+                3.0 * u**3 - 6.0 * u**2 + 4.0,
+                -3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0,
+                u**3,
+            ]
+        )
+        return first, values / 6.0
+
+
+@dataclass(frozen=True)
+class SurfaceShape:
+    """Where the knots of a surface are, and whether the attitude angle counts."""
+
+    eccentricity: KnotAxis
+    temperature: KnotAxis
+    has_attitude: bool = False
+
+    @property
+    def n_coefficients(self) -> int:
+        """Tensor products of splines, and terms of the attitude."""
+        tensor = self.eccentricity.n_splines * self.temperature.n_splines
+        return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
+
+    def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """Which of the tensor products are not zero, and their values.
+
+        Returns
+        -------
+        (16, n), (16, n)
+        """
+        first_e, value_e = self.eccentricity.splines(conditions.eccentricity_ratio)
+        first_t, value_t = self.temperature.splines(conditions.oil_temperature_c)
+        step = np.arange(4)[:, np.newaxis]
+        rows = (first_e + step) * self.temperature.n_splines
+        index = rows[:, np.newaxis] + (first_t + step)[np.newaxis]
+        value = value_e[:, np.newaxis] * value_t[np.newaxis]
+        shape = (16, len(conditions))
+        return index.reshape(shape), value.reshape(shape)
+
+    def design(self, conditions: FilmConditions) -> FloatArray:
+        """(n, n_coefficients) value of every term at every point."""
+        index, value = self.terms(conditions)
+        matrix = np.zeros((len(conditions), self.n_coefficients))
+        np.put_along_axis(matrix, index.T, value.T, axis=1)
+        if self.has_attitude:
+            matrix[:, -ATTITUDE_TERMS:] = attitude_terms(conditions).T
+        return matrix
+
+
+def attitude_terms(conditions: FilmConditions) -> FloatArray:
+    """Terms of the shaft's position: (4, n)."""
+    angle = np.radians(conditions.attitude_deg)
+    once, twice = conditions.eccentricity_ratio, conditions.eccentricity_ratio**2
+    return np.stack(
+        [
+            once * np.cos(angle),
+            once * np.sin(angle),
+            twice * np.cos(2.0 * angle),
+            twice * np.sin(2.0 * angle),
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface with its coefficients."""
+
+    shape: SurfaceShape
+    offset: float
+    coefficients: tuple[float, ...]
+
+    @cached_property
+    def _coefficients(self) -> FloatArray:
+        return np.array(self.coefficients)
+
+    def at(self, conditions: FilmConditions) -> FloatArray:
+        """(n,) height at each point."""
+        index, value = self.shape.terms(conditions)
+        height = np.zeros(len(conditions))
+        for row in range(index.shape[0]):  # in one order for one reading and for many
+            height += self._coefficients[index[row]] * value[row]
+        if self.shape.has_attitude:
+            height += self._coefficients[-ATTITUDE_TERMS:] @ attitude_terms(conditions)
+        return np.asarray(self.offset + height)
