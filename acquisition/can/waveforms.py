@@ -85,8 +85,10 @@ class WaveformDecoder:
         units = np.empty(shape, dtype=np.float32)
         for row, channel in zip(units, self._channels, strict=True):
             for n, name in enumerate(channel.signals):
-                raw = columns[channel.part][name].astype(np.float64)
-                row[n :: len(channel.signals)] = raw * channel.gain + channel.offset
+                raw = columns[channel.part][name]
+                if (channel.gain, channel.offset) != (1.0, 0.0):  # else to the last bit
+                    raw = raw.astype(np.float64) * channel.gain + channel.offset
+                row[n :: len(channel.signals)] = raw
         return units
 
 

@@ -1,0 +1,134 @@
+"""A simulated CAN DAQ and padwatch's source for it, in any shape."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.can.settings import CanLinkSettings
+from acquisition.can.source import CanSource
+from acquisition.clock import SystemClock
+from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_shape import CanShape, DaqSignal
+from acquisition.raw import FeedEndedError, RawBlock
+from core.blocks import SampleBlock
+
+NS_PER_S = 1_000_000_000
+START_NS = 1_767_225_600 * NS_PER_S
+
+
+class EventfulFeed:
+    """A plant's past: random samples, gaps, restarts, sick channels, slow values that change.
+
+    A request gives fewer samples before a gap or a restart, as a recording does.
+    """
+
+    def __init__(
+        self, n_channels: int = 4, n_blocks: int = 60, seed: int = 1, floats: bool = False
+    ) -> None:
+        self._random = np.random.default_rng(seed)
+        self._shape = (n_channels, floats)
+        self._n_left = n_blocks
+        self._epoch, self._index, self._stretch = 5, 0, 333
+
+    def advance(self, n_samples: int) -> RawBlock:
+        if self._n_left == 0:
+            raise FeedEndedError
+        self._n_left -= 1
+        if self._stretch == 0:
+            self._go_on_elsewhere()
+        n_samples = min(n_samples, self._stretch)
+        first, self._index = self._index, self._index + n_samples
+        self._stretch -= n_samples
+        jitter_us = int(self._random.integers(-3, 4))
+        start_us = START_NS // 1000 + round(first * 1e6 / 600.0) + jitter_us + 10**7 * self._epoch
+        return RawBlock(
+            epoch=self._epoch,
+            first_index=first,
+            start_ns=1000 * start_us,
+            rate_hz=600.0,
+            counts=self._samples(n_samples),
+            ok=tuple(bool(ok) for ok in self._random.random(self._shape[0]) < 0.9),
+            slow=(float(np.float32(self._random.normal(45.0))), float("nan")),
+        )
+
+    def _go_on_elsewhere(self) -> None:
+        self._stretch = int(self._random.integers(1, 700))
+        if self._random.random() < 0.25:
+            self._epoch, self._index = self._epoch + 1, int(self._random.integers(0, 3))
+        else:
+            self._index += int(
+                self._random.choice([1, 7, 49, 50, 51, 600, 65536, 100_000, 2_000_000])
+            )
+
+    def _samples(self, n_samples: int) -> np.ndarray:
+        n_channels, floats = self._shape
+        counts = self._random.integers(-32768, 32768, (n_channels, n_samples)).astype(np.int16)
+        if not floats:
+            return counts
+        units = counts.astype(np.float32) / np.float32(7.0)
+        units[:, self._random.random(n_samples) < 0.001] = np.nan
+        units[0, 0] = -0.0
+        return units
+
+
+@pytest.fixture
+def eventful_feed() -> Callable[..., EventfulFeed]:
+    """Builds feeds with gaps and restarts; keywords as in `EventfulFeed`."""
+    return EventfulFeed
+
+
+@pytest.fixture
+def shape_of() -> Callable[..., CanShape]:
+    """Builds shapes of a DAQ for a calibration in counts; other keywords as in `CanShape`."""
+
+    def build(n_channels: int = 4, n_slow: int = 2, **others) -> CanShape:
+        unit = "um" if others.get("floats") else "V"
+        return CanShape(
+            channels=tuple(DaqSignal(f"channel{n}", unit) for n in range(n_channels)),
+            slow=tuple(DaqSignal(f"slow{n}", "degC") for n in range(n_slow)),
+            **others,
+        )
+
+    return build
+
+
+@pytest.fixture
+def source_of(tmp_path, counts_calibration) -> Callable[..., CanSource]:
+    """Builds sources that read a DAQ of a shape at an endpoint; other settings as keywords."""
+
+    def build(
+        shape: CanShape, endpoint, clock=None, options=None, opener=None, **settings
+    ) -> CanSource:
+        dbc = Path(tmp_path) / "daq.dbc"
+        dbc.write_text(daq_dbc(shape), encoding="utf-8")
+        link = CanLinkSettings(**endpoint, fd=shape.fd, options=options or {})
+        n_channels, n_slow = len(shape.channels), len(shape.slow)
+        calibration = counts_calibration(n_channels=n_channels, n_slow=n_slow)
+        units = ("um",) * n_channels
+        return CanSource(
+            daq_settings(shape, link, dbc, units, **settings),
+            calibration,
+            clock or SystemClock(),
+            *([opener] if opener else []),
+        )
+
+    return build
+
+
+async def blocks_of(source: CanSource, epoch: int, stop_index: int) -> list[SampleBlock]:
+    """Everything a source delivers up to a sample."""
+    blocks = []
+    async with source.connect() as stream:
+        async for block in stream:
+            blocks.append(block)
+            if block.epoch == epoch and block.stop_index >= stop_index:
+                return blocks
+    raise AssertionError("the stream has ended")
+
+
+@pytest.fixture
+def read_up_to() -> Callable:
+    """`blocks_of`: everything a source delivers up to a sample of an epoch."""
+    return blocks_of

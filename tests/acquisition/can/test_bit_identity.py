@@ -1,0 +1,100 @@
+"""The same samples through any wire make the same blocks, to the last bit."""
+
+import hashlib
+import itertools
+
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.daq.can_bus import CanBusServer
+from acquisition.daq.can_device import CanDevice
+from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.delivery import Delivery
+from acquisition.raw import FeedEndedError
+
+NO_WAIT = {"sleep_after_open": 0.0}
+
+
+def fingerprint(blocks) -> list[str]:
+    """A hash of everything in a block but how the host's clock stands."""
+    return [
+        hashlib.sha256(
+            repr(
+                (
+                    b.unit, b.epoch, b.first_index, b.start_ns, b.rate_hz, b.samples.tobytes(),
+                    b.samples.dtype, b.samples.shape, b.channel_quality, sorted(b.slow.items()),
+                    b.rejected, b.stamp_fault,
+                )
+            ).encode()
+        ).hexdigest()
+        for b in blocks
+    ]  # fmt: skip
+
+
+def straight(feed, calibration) -> list:
+    delivery = Delivery(calibration)
+    blocks = []
+    try:
+        while True:
+            blocks += delivery.take(feed.advance(50))
+    except FeedEndedError:
+        return blocks
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("floats", [False, True], ids=["counts", "floats"])
+@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
+    fd, floats, seed, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
+):
+    direct = straight(eventful_feed(floats=floats, seed=seed), counts_calibration(n_channels=4))
+    shape = shape_of(fd=fd, floats=floats)
+    device = CanDevice(eventful_feed(floats=floats, seed=seed), shape)
+    async with SlcanTcpServer(device, unpaced=True) as server:
+        source = source_of(shape, server.endpoint, when_full="wait")
+        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+        await server.run()
+    assert fingerprint(wired) == fingerprint(direct)
+    assert len({b.epoch for b in direct}) > 1
+    assert any(a.stop_index < b.first_index for a, b in itertools.pairwise(direct))
+    assert source.refused_frames == {}
+
+
+@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+async def test_a_pseudo_terminal_carries_the_same(
+    fd, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
+):
+    direct = straight(eventful_feed(), counts_calibration(n_channels=4))
+    shape = shape_of(fd=fd, extended=True, base_id=0x18FF0100)
+    async with SlcanPtyServer(CanDevice(eventful_feed(), shape), unpaced=True) as server:
+        source = source_of(shape, server.endpoint, options=NO_WAIT, when_full="wait")
+        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+    assert fingerprint(wired) == fingerprint(direct)
+
+
+async def test_a_virtual_bus_carries_the_same(
+    eventful_feed, shape_of, source_of, counts_calibration
+):
+    direct = straight(eventful_feed(), counts_calibration(n_channels=4))
+    shape = shape_of(fd=True)
+    device = CanDevice(eventful_feed(), shape)
+    async with CanBusServer(device, channel="bit identity") as server:
+        source = source_of(shape, server.endpoint)
+        async with source.connect() as stream:
+            server.produce(100)
+            wired = [await anext(stream) for _ in direct]
+    assert fingerprint(wired) == fingerprint(direct)
+
+
+async def test_a_paced_daq_serves_the_same_at_any_speed(
+    eventful_feed, shape_of, source_of, counts_calibration, read_up_to, stepped_clock
+):
+    direct = straight(eventful_feed(), counts_calibration(n_channels=4))
+    shape = shape_of()
+    device = CanDevice(eventful_feed(), shape)
+    async with SlcanTcpServer(device, stepped_clock) as server:
+        source = source_of(shape, server.endpoint, clock=SystemClock(), when_full="wait")
+        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+        await server.run()
+    assert fingerprint(wired) == fingerprint(direct)
+    assert stepped_clock.monotonic_s() > direct[-1].stop_index / 600.0

@@ -1,0 +1,176 @@
+"""C1, C2, C10: offered = stored + gap + rejected, whatever is lost on the bus."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from acquisition.can.assembly import Assembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.gate import FrameGate
+from acquisition.can.settings import CanLinkSettings
+from acquisition.daq.can_bus import _message
+from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_frames import FrameEncoder, shortened
+from core.blocks import Rejection
+
+BLOCK = 50
+START_NS = 1_767_225_600_000_000_000
+
+
+def accounted(blocks) -> Counter[str]:
+    """What a reader of these blocks has to conclude: stored, gap and rejected samples."""
+    found: Counter[str] = Counter()
+    stop = blocks[0].first_index
+    for block in blocks:
+        rejected = Counter({r.reason: r.n_samples for r in block.rejected})
+        found += rejected
+        found["gap"] += block.first_index - stop - rejected.total()
+        found["stored"] += block.n_samples
+        stop = block.stop_index
+        assert found["gap"] >= 0
+    return found
+
+
+class LossyBus:
+    """Takes frames of a counting plant away, and books what a perfect reader has to find."""
+
+    def __init__(self, shape, feed, seed: int) -> None:
+        self._encoder = FrameEncoder(shape)
+        self._feed = feed
+        self._random = np.random.default_rng(seed)
+        self._n_waves = len(shape.waves)
+        self._n_per_frame = shape.samples_per_frame
+        self.expected: Counter[str] = Counter()
+        self.n_losses = 0
+
+    def block(self, loss: float):
+        """Frames of the next block; each instant is spoilt with this probability."""
+        frames = self._encoder.frames(self._feed.advance(BLOCK))
+        n_heads = len(frames) - self._n_waves * (BLOCK // self._n_per_frame)
+        sent = frames[:n_heads]
+        for start in range(n_heads, len(frames), self._n_waves):
+            instant = frames[start : start + self._n_waves]
+            if self._random.random() >= loss:
+                self.expected["stored"] += self._n_per_frame
+                sent += instant
+                continue
+            self.n_losses += 1
+            sent += self._spoilt(instant)
+        return sent
+
+    def _spoilt(self, instant):
+        kind = self._random.choice(["gap", "incomplete_frames", "wrong_length"])
+        if kind == "incomplete_frames" and self._n_waves > 1:
+            kept = self._random.permutation(self._n_waves)[
+                : self._random.integers(1, self._n_waves)
+            ]
+            self.expected["incomplete_frames"] += self._n_per_frame
+            return [instant[n] for n in sorted(kept)]
+        if kind == "wrong_length":
+            self.expected["wrong_length"] += self._n_per_frame
+            return [shortened(frame) for frame in instant]
+        self.expected["gap"] += self._n_per_frame
+        return []
+
+
+@pytest.fixture
+def assembler_of(tmp_path, counts_calibration):
+    def build(shape, **settings):
+        dbc = tmp_path / "daq.dbc"
+        dbc.write_text(daq_dbc(shape), encoding="utf-8")
+        n_channels, n_slow = len(shape.channels), len(shape.slow)
+        link = CanLinkSettings(interface="virtual", channel="none", fd=shape.fd)
+        plan = compile_plan(
+            daq_settings(shape, link, dbc, ("um",) * n_channels, **settings),
+            counts_calibration(n_channels=n_channels, n_slow=n_slow),
+        )
+        assembler = Assembler(plan, n_channels, n_slow, 600.0, 5.0)
+        gate = FrameGate(plan, assembler.refused)
+
+        def take(frames, arrived_ns):
+            admitted = [gate.admit(_message(frame)) for frame in frames]
+            return assembler.take([f for f in admitted if f is not None], arrived_ns)
+
+        assembler.take_wire = take
+        return assembler
+
+    return build
+
+
+@pytest.mark.parametrize("n_channels", [2, 4, 12])
+@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+def test_thousands_of_losses_are_counted_exactly(
+    fd, n_channels, shape_of, assembler_of, counting_feed
+):
+    shape = shape_of(n_channels=n_channels, fd=fd)
+    feed = counting_feed(n_channels=n_channels)
+    bus = LossyBus(shape, feed, seed=20261121 + n_channels)
+    assembler = assembler_of(shape)
+    random = np.random.default_rng(1)
+    blocks, batch, arrived_ns = [], bus.block(0.0), START_NS
+    while bus.n_losses < 3000:
+        batch += bus.block(float(random.choice([0.0, 0.05, 0.5])))
+        arrived_ns += 83_333_333
+        cut = int(random.integers(0, len(batch)))
+        blocks += assembler.take_wire(batch[:cut], arrived_ns)
+        batch = batch[cut:]
+    blocks += assembler.take_wire(batch + bus.block(0.0), arrived_ns + 83_333_333)
+    for block in blocks:
+        index = np.arange(block.first_index, block.stop_index)
+        np.testing.assert_array_equal(block.counts[0], index % 2**15)
+        assert block.ok == (True,) * n_channels
+        assert block.slow[0] == 45.0
+    found = accounted(blocks)
+    assert found == bus.expected
+    assert blocks[0].first_index + found.total() == feed.n_samples
+    assert len({block.epoch for block in blocks}) == 1
+
+
+async def test_a_lost_header_never_lets_old_slow_values_pass_for_new(
+    shape_of, assembler_of, counting_feed
+):
+    """Every message of every header is lost once; what it said is then unknown, not old."""
+    shape = shape_of()
+    n_heads = len(shape.messages) - len(shape.waves)
+    names = [message.name for message in shape.messages][:n_heads]
+    for lost, name in enumerate(names):
+        feed = counting_feed(n_channels=4, slow=(1.0, 1.0))
+        encoder, assembler = FrameEncoder(shape), assembler_of(shape)
+        blocks = assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS)
+        feed.slow = (2.0, 2.0)
+        frames = encoder.frames(feed.advance(BLOCK))
+        blocks += assembler.take_wire(frames[:lost] + frames[lost + 1 :], START_NS + 83_333_333)
+        feed.slow = (3.0, 3.0)
+        blocks += assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS + 166_666_667)
+        first, *middle, last = blocks
+        assert first.slow == (1.0, 1.0)
+        assert last.slow == (3.0, 3.0)
+        for block in middle:
+            assert all(value == 2.0 or np.isnan(value) for value in block.slow), name
+            assert all(block.ok) or name == "HEALTH"
+        if name in ("HEAD", "HEALTH"):
+            assert middle == []
+            assert last.rejected == (Rejection("no_header", BLOCK),)
+        if name.startswith("SLOW"):
+            assert [np.isnan(v) for v in middle[0].slow] == [name == "SLOW_0", name == "SLOW_1"]
+        if name.startswith("TIME"):
+            assert middle[0].start_ns - first.start_ns == 83_333_333
+
+
+async def test_memory_stays_bounded_when_one_node_falls_silent(
+    shape_of, assembler_of, counting_feed
+):
+    shape = shape_of()
+    feed = counting_feed(n_channels=4)
+    encoder, assembler = FrameEncoder(shape), assembler_of(shape)
+    silent = shape.waves[1].frame_id
+    blocks = assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS)
+    for n in range(1, 101):
+        frames = [f for f in encoder.frames(feed.advance(BLOCK)) if f.frame_id != silent]
+        blocks += assembler.take_wire(frames, START_NS + n * 83_333_333)
+    assert len(assembler._counted._pending) <= 65
+    blocks += assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS + 9 * 10**9)
+    assert len(blocks) == 2
+    assert blocks[1].rejected == (Rejection("incomplete_frames", 100 * BLOCK),)
+    assert blocks[1].first_index == 101 * BLOCK
