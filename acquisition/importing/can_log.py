@@ -7,10 +7,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.extras import library
 from acquisition.importing.candump import frames_of_candump
 from acquisition.importing.frames import MAX_DATA, FrameBatch
 from acquisition.importing.job import ImportJob
-from acquisition.importing.libraries import library
 
 _BATCH = 8192
 _LENGTHS = {*range(9), 12, 16, 20, 24, 32, 48, 64}
@@ -73,6 +73,7 @@ def _batch(frames: list[Any], job: ImportJob) -> FrameBatch:
         times_ns=us * 1000 - offset_s * 1_000_000_000,
         ids=np.array([frame.arbitration_id for frame in frames], np.uint32),
         extended=np.array([frame.is_extended_id for frame in frames], np.bool_),
+        fd=np.array([frame.is_fd for frame in frames], np.bool_),
         lengths=np.array([len(frame.data) for frame in frames], np.uint8),
         data=data,
     )

@@ -1,11 +1,13 @@
 """`FrameBatch`: CAN frames of a log, in columns; and what makes raw blocks of them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from acquisition.importing.candump import LoggedFrame
 from acquisition.raw import RawBlock
 
 MAX_DATA = 64
@@ -23,6 +25,8 @@ class FrameBatch:
         (n,) uint32 without flags.
     extended
         (n,) bool: whether the id has 29 bits.
+    fd
+        (n,) bool: whether it is a CAN FD frame.
     lengths
         (n,) uint8: bytes of data.
     data
@@ -32,30 +36,44 @@ class FrameBatch:
     times_ns: npt.NDArray[np.int64]
     ids: npt.NDArray[np.uint32]
     extended: npt.NDArray[np.bool_]
+    fd: npt.NDArray[np.bool_]
     lengths: npt.NDArray[np.uint8]
     data: npt.NDArray[np.uint8]
 
     @property
     def columns(self) -> tuple[npt.NDArray[np.generic], ...]:
         """All arrays, in the order of the fields."""
-        return (self.times_ns, self.ids, self.extended, self.lengths, self.data)
+        return (self.times_ns, self.ids, self.extended, self.fd, self.lengths, self.data)
 
     @staticmethod
     def bytes_per_frame() -> int:
         """In memory."""
-        return 8 + 4 + 1 + 1 + MAX_DATA
+        return 8 + 4 + 1 + 1 + 1 + MAX_DATA
 
     @classmethod
     def from_bytes(cls, content: bytes, n_frames: int) -> "FrameBatch":
         """Arrays out of the bytes of all columns, one after the other."""
-        at = np.cumsum([0, 8 * n_frames, 4 * n_frames, n_frames, n_frames])
+        at = np.cumsum([0, 8 * n_frames, 4 * n_frames, n_frames, n_frames, n_frames])
         return cls(
             np.frombuffer(content, np.int64, n_frames, int(at[0])),
             np.frombuffer(content, np.uint32, n_frames, int(at[1])),
             np.frombuffer(content, np.uint8, n_frames, int(at[2])) != 0,
-            np.frombuffer(content, np.uint8, n_frames, int(at[3])),
-            np.frombuffer(content, np.uint8, n_frames * MAX_DATA, int(at[4])).reshape(-1, MAX_DATA),
+            np.frombuffer(content, np.uint8, n_frames, int(at[3])) != 0,
+            np.frombuffer(content, np.uint8, n_frames, int(at[4])),
+            np.frombuffer(content, np.uint8, n_frames * MAX_DATA, int(at[5])).reshape(-1, MAX_DATA),
         )
+
+    def messages(self) -> Iterator[LoggedFrame]:
+        """The frames one by one, with the names that python-can has for their parts."""
+        data = self.data.tobytes()
+        rows = zip(
+            *(part.tolist() for part in (self.times_ns, self.ids, self.extended, self.fd)),
+            self.lengths.tolist(),
+            strict=True,
+        )
+        for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
+            content = data[n * MAX_DATA : n * MAX_DATA + length]
+            yield LoggedFrame(time_ns / 1e9, id_, extended, fd, False, False, content)
 
 
 class FrameDecoder(Protocol):

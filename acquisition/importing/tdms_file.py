@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
+from acquisition.extras import library
 from acquisition.importing.job import ImportJob, Place
-from acquisition.importing.libraries import library
 from acquisition.importing.series import SeriesTable, require_one
 from acquisition.importing.times import TimeArray, from_start
 

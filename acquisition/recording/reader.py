@@ -35,6 +35,19 @@ from core.blocks import Rejection
 
 
 @dataclass(frozen=True)
+class BlockHead:
+    """All of a recorded block but its samples; see :class:`acquisition.raw.RawBlock`."""
+
+    epoch: int
+    first_index: int
+    start_ns: int
+    n_samples: int
+    ok: tuple[bool, ...]
+    slow: tuple[float, ...]
+    rejected: tuple[Rejection, ...]
+
+
+@dataclass(frozen=True)
 class Recording:
     """A recording whose files are those of its manifest; see :func:`open_recording`."""
 
@@ -55,8 +68,20 @@ class Recording:
             for number, row in enumerate(self._rows(blocks)):
                 n_samples = row["n_samples"]
                 if number >= first_block:
-                    yield self._raw(row, counts.read(first_row, n_samples))
+                    yield self._raw(self._head(row), counts.read(first_row, n_samples))
                 first_row += n_samples
+
+    def heads(self) -> Iterator[BlockHead]:
+        """All blocks without their samples.
+
+        Raises
+        ------
+        ConfigError
+            If the file cannot be read any more.
+        """
+        with self._blocks() as blocks:
+            for row in self._rows(blocks):
+                yield self._head(row)
 
     def require_lengths(self) -> None:
         """Go through the blocks without their samples: each must be possible, all must add up.
@@ -89,16 +114,27 @@ class Recording:
         for group in range(blocks.num_row_groups):
             yield from read_rows(blocks, group)
 
-    def _raw(self, row: dict[str, Any], counts: RawArray) -> RawBlock:
-        return RawBlock(
+    def _head(self, row: dict[str, Any]) -> BlockHead:
+        return BlockHead(
             epoch=row["epoch"],
             first_index=row["first_index"],
             start_ns=row["start_ns"],
-            rate_hz=self.manifest.rate_hz,
-            counts=counts,
+            n_samples=row["n_samples"],
             ok=tuple(bool(row["ok"] >> i & 1) for i in range(len(self.manifest.channels))),
             slow=tuple(row[f"slow:{channel.id}"] for channel in self.manifest.slow_channels),
             rejected=_rejected(row),
+        )
+
+    def _raw(self, head: BlockHead, counts: RawArray) -> RawBlock:
+        return RawBlock(
+            epoch=head.epoch,
+            first_index=head.first_index,
+            start_ns=head.start_ns,
+            rate_hz=self.manifest.rate_hz,
+            counts=counts,
+            ok=head.ok,
+            slow=head.slow,
+            rejected=head.rejected,
         )
 
     def _past(self, progress: Progress, row: dict[str, Any], place: str) -> Progress:

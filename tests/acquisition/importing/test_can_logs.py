@@ -69,6 +69,11 @@ def test_data_frames_come_back_with_time_to_a_microsecond(
     times_ns = np.concatenate([batch.times_ns for batch in found])
     np.testing.assert_array_equal(ids, [m.arbitration_id for m in sent])
     np.testing.assert_array_equal(extended, [m.is_extended_id for m in sent])
+    fd = np.concatenate([batch.fd for batch in found])
+    np.testing.assert_array_equal(fd, [m.is_fd for m in sent])
+    again = [message for batch in found for message in batch.messages()]
+    assert [bytes(m.data) for m in sent] == [m.data for m in again]
+    assert [m.arbitration_id for m in sent] == [m.arbitration_id for m in again]
     np.testing.assert_array_equal(lengths, [len(m.data) for m in sent])
     assert data.tobytes() == b"".join(bytes(m.data).ljust(64, b"\0") for m in sent)
     due_us = START_S * 10**6 + 1666 * np.delete(np.arange(20_000), 7)

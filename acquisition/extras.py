@@ -1,4 +1,4 @@
-"""Heavy readers, loaded when they are needed; they are an extra of the installation."""
+"""Libraries for the files of others, loaded when they are needed: an extra of the installation."""
 
 import importlib
 from typing import Any

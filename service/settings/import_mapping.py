@@ -1,0 +1,187 @@
+"""The mapping file: which column of a foreign file is which channel of a unit."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AwareDatetime, Field, StringConstraints, model_validator
+
+from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
+
+ColumnName = Annotated[str, StringConstraints(min_length=1, max_length=500)]
+UnitName = Annotated[str, StringConstraints(min_length=1, max_length=40)]
+Format = Literal["mdf4", "tdms", "hdf5", "csv", "candump", "blf"]
+Form = Literal[
+    "iso8601",
+    "epoch_s",
+    "epoch_ms",
+    "epoch_us",
+    "epoch_ns",
+    "elapsed_s",
+    "elapsed_ms",
+    "elapsed_us",
+    "elapsed_ns",
+    "timestamp",
+]
+
+CAN_LOGS = ("candump", "blf")
+WITH_GROUPS = ("tdms", "mdf4")
+WITH_OWN_TIME = ("tdms", "mdf4", *CAN_LOGS)
+IN_UTC = ("tdms", "candump")
+"""Formats whose own time is UTC by definition."""
+
+
+class TimeSettings(Settings):
+    """How the samples of the file lie in time."""
+
+    source: Literal["file", "column", "start"]
+    """"file": the format's own time (MDF4 time channel, TDMS waveform properties, stamps of a CAN
+    log). "column": a column of the file. "start": from `start` on at the unit's rate, no gaps."""
+
+    zone: Annotated[str, StringConstraints(pattern=r"^(UTC|[+-](0\d|1[0-4]):[0-5]\d)$")]
+    """Time zone of times that have none of their own: "UTC", or as an offset such as "-03:00"."""
+
+    column: ColumnName | None = None
+    """Column with the time of each sample; only for source "column"; example: "time"."""
+
+    group: Annotated[str, StringConstraints(max_length=500)] = ""
+    """Its TDMS or MDF4 group, where the name alone is not enough."""
+
+    form: Form | None = None
+    """What the column has: "iso8601" (CSV only), "epoch_s", "epoch_ms", "epoch_us", "epoch_ns"
+    (since 1970), "elapsed_s" … "elapsed_ns" (since `start`), "timestamp" (TDMS only)."""
+
+    start: AwareDatetime | None = None
+    """Time of the first sample, or of elapsed time zero, with its time zone; example:
+    2026-03-01T10:00:00-03:00."""
+
+    tolerance: Annotated[float, Field(ge=0.01, le=0.45)] = 0.4
+    """How far a time may be from its place at the unit's rate, in samples: 0.01 to 0.45."""
+
+
+class CsvSettings(Settings):
+    """How a CSV file is written."""
+
+    delimiter: Annotated[str, StringConstraints(min_length=1, max_length=1)] = ","
+    """Between columns; example: ";"."""
+
+    decimal: Literal[".", ","] = "."
+    """Decimal point of numbers: "." or ","."""
+
+    header_line: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Number of the line with the column names, from 1; what is before it is skipped."""
+
+
+class MappedChannel(Settings):
+    """A waveform channel of the unit."""
+
+    id: Identifier
+    """As in the plant file; example: "ujb_shaft_x"."""
+
+    column: ColumnName
+    """Name of the CSV column, the TDMS or MDF4 channel; path of the HDF5 dataset."""
+
+    group: Annotated[str, StringConstraints(max_length=500)] = ""
+    """TDMS group, or name or number of the MDF4 channel group, where the name is not enough."""
+
+    unit: UnitName
+    """Unit of the values in the file; example: "um", "mm/s", "g", "mV". Refused if the file itself
+    says otherwise, or if the channel is not measured in such a unit."""
+
+    unit_per_count: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    """If the column has the converter's counts: the unit per count; example: 0.00036621."""
+
+
+class MappedSlowChannel(Settings):
+    """A slow channel of the unit."""
+
+    id: Identifier
+    """As in the plant file; example: "ujb_oil_temperature"."""
+
+    column: ColumnName
+    """Name of the CSV column, the TDMS or MDF4 channel; path of the HDF5 dataset."""
+
+    group: Annotated[str, StringConstraints(max_length=500)] = ""
+    """TDMS group, or name or number of the MDF4 channel group, where the name is not enough."""
+
+    unit: UnitName
+    """Unit of the values in the file; example: "degC", "r/min", "kW"."""
+
+    time_column: ColumnName | None = None
+    """Its own time column, of the same form as that of the waveforms, if it has another rate."""
+
+    time_group: Annotated[str, StringConstraints(max_length=500)] = ""
+    """Group of that column."""
+
+
+class ImportMapping(Settings):
+    """A mapping file. Every waveform and slow channel of the unit that is to be there is named."""
+
+    format: Format
+    """"mdf4", "tdms", "hdf5", "csv", "candump" or "blf"."""
+
+    time: TimeSettings
+    """Time of the samples."""
+
+    csv: CsvSettings | None = None
+    """Only for CSV files."""
+
+    channel: Annotated[tuple[MappedChannel, ...], Field(max_length=32)] = ()
+    """Waveform channels; none for CAN logs, whose channels are those of the unit's DBC file."""
+
+    slow_channel: Annotated[tuple[MappedSlowChannel, ...], Field(max_length=50)] = ()
+    """Slow channels; as above."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self._check_time()
+        self._check_channels()
+        if self.csv is not None and self.format != "csv":
+            raise MisfitError(f"is for CSV files, this one is {self.format}", "csv")
+        return self
+
+    def _check_time(self) -> None:
+        time = self.time
+        if time.source == "file" and self.format not in WITH_OWN_TIME:
+            raise MisfitError(
+                f'{self.format} has no time of its own; write "column" or "start"', "time", "source"
+            )
+        if time.source != "file" and self.format in CAN_LOGS:
+            raise MisfitError(f'a {self.format} log has its own; write "file"', "time", "source")
+        if time.source == "file" and self.format in IN_UTC and time.zone != "UTC":
+            raise MisfitError(f'{self.format} is in UTC; write "UTC"', "time", "zone")
+        for key in ("column", "form"):
+            if (getattr(time, key) is None) == (time.source == "column"):
+                words = "is needed for" if time.source == "column" else "is only for"
+                raise MisfitError(f'{words} source "column"', "time", key)
+        self._check_form()
+
+    def _check_form(self) -> None:
+        form, start = self.time.form or "", self.time.start
+        for wanted, only in (("iso8601", "csv"), ("timestamp", "tdms")):
+            if form == wanted and self.format != only:
+                raise MisfitError(f"is only for {only}, this is {self.format}", "time", "form")
+        has_start = self.format == "mdf4"
+        needs = self.time.source == "start" or (form.startswith("elapsed") and not has_start)
+        if needs and start is None:
+            raise MisfitError("is needed: what time counts from", "time", "start")
+        allowed = needs or form.startswith("elapsed")
+        if start is not None and not allowed:
+            raise MisfitError("has no effect here; leave it out", "time", "start")
+
+    def _check_channels(self) -> None:
+        if (self.format in CAN_LOGS) == bool(self.channel):
+            words = "are those of the DBC file" if self.channel else "needs at least one"
+            raise MisfitError(f"{words} for {self.format}", "channel")
+        refuse_twice(("channel", n, "id", c.id) for n, c in enumerate(self.channel))
+        refuse_twice(("slow_channel", n, "id", c.id) for n, c in enumerate(self.slow_channel))
+        if self.format not in WITH_GROUPS:
+            self._refuse_groups()
+
+    def _refuse_groups(self) -> None:
+        for n, channel in enumerate(self.channel):
+            if channel.group:
+                raise MisfitError(f"{self.format} has no groups", "channel", n, "group")
+        for n, slow in enumerate(self.slow_channel):
+            if slow.group or slow.time_group:
+                raise MisfitError(f"{self.format} has no groups", "slow_channel", n)
+        if self.time.group:
+            raise MisfitError(f"{self.format} has no groups", "time", "group")

@@ -1,0 +1,67 @@
+"""Read one settings model from a TOML file; a wrong file is refused with line, key and fix."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from service.settings.base import MisfitError, Settings
+from service.settings.positions import Location, line_of
+
+MAX_BYTES = 1_000_000
+_MAX_SHOWN = 60
+
+Model = TypeVar("Model", bound=Settings)
+
+
+class TomlFileError(Exception):
+    """A file that cannot be used; the message has one line for each mistake."""
+
+
+def load_toml(path: Path, model: type[Model]) -> Model:
+    """Read and check a file.
+
+    Raises
+    ------
+    TomlFileError
+        If it cannot be read or anything in it is wrong.
+    """
+    text = _read(path)
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise TomlFileError(f"{path}: not TOML: {error}") from error
+    try:
+        # JSON, because only there strict (no text for a number) lets a list be a tuple
+        return model.model_validate_json(json.dumps(data, default=str), strict=True)
+    except ValidationError as error:
+        mistakes = error.errors(include_url=False)
+        raise TomlFileError("\n".join(_line(path, text, e) for e in mistakes)) from error
+
+
+def _read(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise TomlFileError(f"{path}: {error.strerror}") from error
+    if len(content) > MAX_BYTES:
+        raise TomlFileError(f"{path}: larger than {MAX_BYTES} bytes")
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        raise TomlFileError(f"{path}: not UTF-8 text at byte {error.start}") from error
+
+
+def _line(path: Path, text: str, error: ErrorDetails) -> str:
+    at: Location = tuple(error["loc"])
+    reason: Any = error.get("ctx", {}).get("error")
+    at += reason.at if isinstance(reason, MisfitError) else ()
+    key = "".join(f"[{p + 1}]" if isinstance(p, int) else f".{p}" for p in at).lstrip(".")
+    words = str(reason) if isinstance(reason, MisfitError) else error["msg"]
+    value = error["input"]
+    shown = f" = {value!r}"[:_MAX_SHOWN] if isinstance(value, int | float | str) else ""
+    return f"{path}:{line_of(at, text)}: {key}{shown}: {words}"

@@ -1,0 +1,151 @@
+"""What other tools get: engineering units with their unit, UTC, and gaps in sight."""
+
+import csv
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import asammdf
+import h5py
+import nptdms
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from acquisition.errors import ConfigError
+from acquisition.raw import RawBlock
+from acquisition.recording.export.writing import EXPORT_FORMATS, export_recording
+from acquisition.recording.manifest import RecordedUnit
+from acquisition.recording.reader import Recording, open_recording
+from acquisition.recording.writer import RecordingWriter
+
+Record = Callable[[Iterable[RawBlock]], Path]
+Numbered = Callable[..., RawBlock]
+
+INDEX = [*range(100), *range(137, 200), *range(40, 90)]
+EPOCHS = [1] * 163 + [2] * 50
+PER_COUNT = np.float32(12.0 / 32768 * -250.0)
+
+
+@pytest.fixture
+def recording(record: Record, numbered: Numbered) -> Recording:
+    """A gap, a restart, a channel that is not OK for a block, and a slow value that comes later."""
+    return open_recording(
+        record(
+            [
+                numbered(0, 50),
+                numbered(50, 50, ok=(True, False)),
+                numbered(137, 13, slow=(46.0, 1.5)),
+                numbered(150, 50, slow=(47.0, 2.5)),
+                numbered(40, 50, epoch=2, start_ns=1_767_225_700_000_001_000),
+            ]
+        )
+    )
+
+
+@pytest.fixture
+def expected() -> np.ndarray:
+    """Of both channels."""
+    samples = np.array([INDEX, np.array(INDEX) + 1]).astype(np.float32) * PER_COUNT
+    samples[1, 50:100] = np.nan
+    return samples
+
+
+def test_csv_is_plain_text_with_units_in_its_headings(
+    recording: Recording, expected: np.ndarray, tmp_path: Path
+) -> None:
+    export_recording(recording, "csv", tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == [
+        "time_utc",
+        "epoch",
+        "index",
+        "c0 [um]",
+        "c1 [um]",
+        "slow0 [degC]",
+        "slow1 [degC]",
+    ]
+    assert rows[0][:3] == ["2026-01-01 00:00:00.000000Z", "1", "0"]
+    assert rows[100][:3] == ["2026-01-01 00:00:00.228333Z", "1", "137"]
+    assert rows[-1][:3] == ["2026-01-01 00:01:40.081667Z", "2", "89"]
+    table = np.array([row[1:] for row in rows], dtype=np.float64).T
+    np.testing.assert_array_equal(table[0], EPOCHS)
+    np.testing.assert_array_equal(table[1], INDEX)
+    np.testing.assert_array_equal(table[2:4].astype(np.float32), expected)
+    np.testing.assert_array_equal(
+        table[5], [math.nan] * 100 + [1.5] * 13 + [2.5] * 50 + [math.nan] * 50
+    )
+
+
+def test_parquet_has_units_in_its_metadata(
+    recording: Recording, expected: np.ndarray, tmp_path: Path
+) -> None:
+    export_recording(recording, "parquet", tmp_path / "run.parquet")
+    table = pq.read_table(tmp_path / "run.parquet")
+    assert str(table.schema.field("time_utc").type) == "timestamp[ns, tz=UTC]"
+    assert table.schema.field("c0").metadata[b"unit"] == b"um"
+    assert table.schema.field("slow0").metadata[b"unit"] == b"degC"
+    np.testing.assert_array_equal([table["c0"], table["c1"]], expected)
+    np.testing.assert_array_equal(table["index"], INDEX)
+
+
+def test_hdf5_has_a_dataset_for_each_channel(
+    recording: Recording, expected: np.ndarray, tmp_path: Path
+) -> None:
+    export_recording(recording, "hdf5", tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        np.testing.assert_array_equal([file["c0"], file["c1"]], expected)
+        np.testing.assert_array_equal(file["index"], INDEX)
+        assert file["c1"].attrs["unit"] == "um"
+        assert file["time_ns"][137] - file["time_ns"][0] == 290_000_000
+        np.testing.assert_array_equal(file["slow/slow0"], [45.0, 45.0, 46.0, 47.0, 45.0])
+        assert file["slow/time_ns"][2] == file["time_ns"][100]
+
+
+def test_tdms_and_mdf4_have_groups_with_their_own_times(
+    recording: Recording, expected: np.ndarray, tmp_path: Path
+) -> None:
+    export_recording(recording, "tdms", tmp_path / "run.tdms")
+    with nptdms.TdmsFile.open(tmp_path / "run.tdms") as file:
+        group = file["waveforms"]
+        np.testing.assert_array_equal([group["c0"][:], group["c1"][:]], expected)
+        assert group["c0"].properties["unit_string"] == "um"
+        assert str(group["time_utc"][0]).startswith("2026-01-01T00:00:00.000000")
+        np.testing.assert_array_equal(file["slow"]["slow0"][:], [45.0, 45.0, 46.0, 47.0, 45.0])
+    export_recording(recording, "mdf4", tmp_path / "run.mdf")
+    with asammdf.MDF(tmp_path / "run.mdf") as mdf:
+        assert mdf.header.start_time.isoformat() == "2026-01-01T00:00:00+00:00"
+        found = [mdf.get(name).samples for name in ("c0", "c1")]
+        np.testing.assert_array_equal(found, expected)
+        assert mdf.get("c0").unit == "um"
+        np.testing.assert_array_equal(mdf.get("slow0").samples, [45.0, 45.0, 46.0, 47.0, 45.0])
+
+
+@pytest.mark.parametrize("kind", EXPORT_FORMATS)
+def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered, kind: str
+) -> None:
+    plain = unit.model_copy(update={"slow_channels": ()})
+    with RecordingWriter(tmp_path / "recording", plain, "a test") as writer:
+        for n in range(1200):
+            writer.write(numbered(7 * n, 7, slow=()))
+    recording = open_recording(tmp_path / "recording")
+    told: list[int] = []
+    export_recording(recording, kind, tmp_path / "out", told.append)
+    assert sum(told) == 8400
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "recording"]
+
+
+def test_nothing_is_overwritten_or_left_half_done(recording: Recording, tmp_path: Path) -> None:
+    (tmp_path / "there").write_text("precious")
+    with pytest.raises(ConfigError, match="there: is there already"):
+        export_recording(recording, "csv", tmp_path / "there")
+    assert (tmp_path / "there").read_text() == "precious"
+    with pytest.raises(ConfigError, match=r"out: .*No such file"):
+        export_recording(recording, "csv", tmp_path / "absent" / "out")
+    (recording.folder / "samples.parquet").write_bytes(b"PAR1")
+    for kind in EXPORT_FORMATS:
+        with pytest.raises(ConfigError, match="not a complete Parquet file"):
+            export_recording(recording, kind, tmp_path / "out")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["recording", "there"]
