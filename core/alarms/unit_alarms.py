@@ -23,7 +23,7 @@ from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.line_results import AMPLITUDES
 from core.machine import Unit
-from core.quality import Quality, Reading, Reason, missing
+from core.quality import Quality, Reading, Reason, missing, worst
 
 NOT_THERE = missing(Reason.NOT_MEASURED)
 
@@ -37,12 +37,19 @@ class UnitAlarms:
     ----------
     rules
         What is watched; alarms whose rule is gone can only be acknowledged.
+    rows
+        Which channel each row of a block is about, by id; the unit's channels if not given.
     """
 
-    def __init__(self, unit: Unit, rules: UnitRules) -> None:
+    def __init__(self, unit: Unit, rules: UnitRules, rows: Sequence[str] | None = None) -> None:
         self._watched = watch_list(unit, rules)
         self._rules = {watch.id: watch.rule for watch in self._watched.all}
         self._alarms = {watch.id: Alarm(watch.identity) for watch in self._watched.all}
+        of_rows = [channel.id for channel in unit.channels] if rows is None else list(rows)
+        self._rows_of = {
+            watch.source: [row for row, channel in enumerate(of_rows) if channel == watch.source]
+            for watch in self._watched.channels
+        }
         self._channels_of = {bearing.id: bearing.channels for bearing in unit.bearings}
         self._segment_faults: dict[str, Reason] = {}
         self._stop: tuple[int, int] | None = None
@@ -165,7 +172,8 @@ class UnitAlarms:
         """Judge every channel; where all rest and nothing is new, that is a single comparison."""
         if block.channel_quality == self._resting_with:
             return
-        for watch, quality in zip(self._watched.channels, block.channel_quality, strict=True):
+        for watch in self._watched.channels:
+            quality = worst(block.channel_quality[row] for row in self._rows_of[watch.source])
             condition = channel_condition(quality, self._segment_faults.get(watch.source))
             self._apply(watch, condition, block.stop_ns)
         resting = all(self._alarms[watch.id].is_resting for watch in self._watched.channels)

@@ -9,6 +9,7 @@ from fastapi import Path
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.api.problems import ProblemError
+from service.capture.captures import Captures
 from service.live import LiveView
 from service.origin import Origin
 from service.recorder import Recorder
@@ -43,6 +44,7 @@ class Context:
     references: ReferencesInForce
     alarms: AlarmEngine
     recorder: Recorder
+    captures: Captures
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
 

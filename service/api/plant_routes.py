@@ -6,6 +6,7 @@ from core.quantities import CATALOGUE
 from service.api.alarm_views import alarm_count_model
 from service.api.context import Context, UnitId
 from service.api.plant_models import (
+    CapturesModel,
     OverviewModel,
     PlantModel,
     QuantityModel,
@@ -31,6 +32,11 @@ def plant_router(context: Context) -> APIRouter:
             refresh_s=context.refresh_s,
             store=StoreModel(error=context.live.store_error, n_unstored=context.live.n_unstored),
             alarms=alarm_count_model(context.alarms),
+            captures=CapturesModel(
+                error=context.captures.error,
+                n_running=context.captures.n_running,
+                n_written=context.captures.n_written,
+            ),
             units=[_unit_overview(context, unit) for unit in context.units],
         )
 

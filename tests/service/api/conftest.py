@@ -24,6 +24,7 @@ from service.references import ReferencesInForce
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
+from service.wiring.captures import captures_of
 from service.wiring.simulations import simulated_feed
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
@@ -128,7 +129,8 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
     references = ReferencesInForce(monitors, store, clock)
     recorder = Recorder(store, live, clock)
     origin = Origin.LIVE
-    alarms = await alarm_engine(plant, monitors, origin, store, recorder.put, clock)
+    alarms = await alarm_engine(plant, origin, store, recorder.put, clock)
+    captures = captures_of(plant, Origin.REPLAY, clock)
     recording = asyncio.create_task(recorder.run())
     context = Context(
         plant_name=plant.plant.name,
@@ -140,6 +142,7 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
         references=references,
         alarms=alarms,
         recorder=recorder,
+        captures=captures,
         max_shelf_s=7200.0,
     )
     app = create_app(context)

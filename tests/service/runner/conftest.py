@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.recording.manifest import RecordedChannel, RecordedUnit
+from acquisition.recording.writer import RecordingWriter
 from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
@@ -17,6 +19,9 @@ from core.monitor import UnitMonitor
 from core.quality import GOOD
 from core.settings import AnalysisSettings
 from service.alarms.engine import AlarmEngine
+from service.capture.captures import Captures
+from service.capture.file import MakeWriter
+from service.capture.span import CaptureSettings
 from service.live import LiveView
 from service.recorder import Recorder
 from service.runner import Runner, WatchedUnit
@@ -96,6 +101,26 @@ def unit_named(name: str) -> Unit:
     return Unit(name, 60.0, RATE_HZ, channels, (bearing,))
 
 
+def recorded_unit(name: str) -> RecordedUnit:
+    """The same unit for a recording."""
+    limits = {"full_scale_v": 10.0, "unit_per_v": 100.0, "ok_min_v": -10.0, "ok_max_v": 10.0}
+    return RecordedUnit(
+        unit=name,
+        rate_hz=RATE_HZ,
+        channels=tuple(
+            RecordedChannel(id=channel.id, measurand=channel.measurand, **limits)
+            for channel in unit_named(name).channels
+        ),
+        slow_channels=(),
+        sample_type="float32",
+        block_samples=BLOCK,
+    )
+
+
+def writer_of(name: str) -> MakeWriter:
+    return lambda folder, made_by: RecordingWriter(folder, recorded_unit(name), made_by)
+
+
 def block_number(number: int, unit: str = "U1", rate_hz: float = RATE_HZ) -> SampleBlock:
     """Samples of a shaft that turns once a second; block 1 follows block 0, and so on."""
     first = number * BLOCK
@@ -128,12 +153,22 @@ class Plant:
         self.store = SqliteStore(path)
         self.live = LiveView(["U1", "U2"], self.clock, 30.0)
         self.recorder = Recorder(self.store, self.live, self.clock, capacity)
+        self.capture_folder = path.parent / "captures"
         self.start_alarms()
 
     def start_alarms(self) -> None:
         """Begin as after a restart, with what the store knows."""
-        alarms = {name: UnitAlarms(unit_named(name), RULES) for name in ("U1", "U2")}
-        self.alarms = AlarmEngine(alarms, self.recorder.put, self.clock)
+        names = ("U1", "U2")
+        self.captures = Captures(
+            self.capture_folder,
+            CaptureSettings(pre_s=10.0, post_s=20.0, max_s=60.0),
+            {name: writer_of(name) for name in names},
+            dict.fromkeys(names, RATE_HZ),
+            self.clock,
+        )
+        alarms = {name: UnitAlarms(unit_named(name), RULES) for name in names}
+        listener = self.captures.take
+        self.alarms = AlarmEngine(alarms, self.recorder.put, self.clock, listener)
         self.alarms.restore(self.store.alarms())
 
     def runner(self, **units: ScriptedPlant) -> Runner:

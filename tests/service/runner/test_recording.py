@@ -94,6 +94,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
             *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
             alarms=plant.alarms,
             recorder=plant.recorder,
+            captures=plant.captures,
         )
     )
     running = asyncio.create_task(plant.runner(U1=source).run())

@@ -1,0 +1,1 @@
+"""Samples around an alarm, kept as recordings in the data folder."""

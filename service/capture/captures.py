@@ -1,0 +1,239 @@
+"""`Captures`: keeps the samples around every alarm, without ever being in the way."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.event import AlarmEvent, AlarmNews
+from core.blocks import SampleBlock
+from service.capture.file import CaptureError, CaptureFile, MakeWriter
+from service.capture.folders import clear_leftovers, make_room
+from service.capture.history import BlockHistory
+from service.capture.span import CaptureSettings, Span, is_captured
+
+log = structlog.get_logger()
+
+WRITE_EVERY_S = 0.5
+
+PATIENCE_S = 30.0
+"""How much longer than its time a capture waits for samples that no longer come."""
+
+MAX_PENDING_SAMPLES = 50_000_000
+"""Of all channels and captures together that wait for the disk: 200 MB."""
+
+
+@dataclass
+class Capture:
+    """One capture that is being made.
+
+    Parameters
+    ----------
+    alarms
+        The events it is made for; the first has begun it.
+    deadline_s
+        When it is finished with what there is, on the steady clock.
+    pending
+        Blocks that are still to be written; filled on the event loop, emptied in the thread.
+    is_lost
+        Whether the disk was too slow for it.
+    """
+
+    file: CaptureFile
+    span: Span
+    alarms: list[AlarmEvent]
+    deadline_s: float
+    pending: deque[SampleBlock] = field(default_factory=deque)
+    is_lost: bool = False
+
+    def add(self, block: SampleBlock) -> None:
+        """Take a block, if it belongs here."""
+        if self.span.goes_on_to(block) and not self.is_lost:
+            self.pending.append(block)
+            self.span = self.span.with_block(block)
+
+    @property
+    def n_pending_samples(self) -> int:
+        """Samples of all channels that are still to be written."""
+        return len(self.pending) * self.pending[0].samples.size if self.pending else 0
+
+
+class Captures:
+    """Histories and captures of all units; told of every block, writes in a thread of its own.
+
+    Parameters
+    ----------
+    root
+        Folder of all captures.
+    make_writer
+        Opens a recording, by unit; without it nothing is kept of a unit.
+    rate_hz
+        Of each unit that has a writer.
+
+    Attributes
+    ----------
+    error
+        Why the last capture could not be written; None since one could.
+    n_written
+        Captures finished since the start.
+    """
+
+    def __init__(
+        self,
+        root: Path,
+        settings: CaptureSettings,
+        make_writer: Mapping[str, MakeWriter],
+        rate_hz: Mapping[str, float],
+        clock: Clock,
+    ) -> None:
+        self._root, self._settings, self._clock = root, settings, clock
+        self._make_writer, self._rate_hz = make_writer, rate_hz
+        self._histories = {
+            unit: BlockHistory(round(settings.pre_s * rate)) for unit, rate in rate_hz.items()
+        }
+        self._running: dict[str, Capture] = {}
+        self._ended: list[Capture] = []
+        self._news = asyncio.Event()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="captures")
+        self.error: str | None = None
+        self.n_written = 0
+
+    @property
+    def n_running(self) -> int:
+        """Captures that are being made now."""
+        return len(self._all)
+
+    @property
+    def _all(self) -> list[Capture]:
+        return [*self._ended, *self._running.values()]
+
+    def take(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        """Take in a block with the news that it has brought."""
+        if block.unit not in self._histories:
+            return
+        is_new = self._histories[block.unit].add(block)
+        events = [e for told in news for e in told.events if is_captured(e)]
+        running = self._running.get(block.unit)
+        if running is None and not events:
+            return
+        if running is None:
+            running = self._begin(block.unit, events)
+        else:
+            self._prolong(running, events)
+            if is_new:
+                running.add(block)
+        if running.span.is_over(block):
+            self._end(block.unit)
+        elif sum(each.n_pending_samples for each in self._all) > MAX_PENDING_SAMPLES:
+            self._give_up(block.unit)
+        self._news.set()
+
+    async def run(self) -> None:
+        """Write what is to be written, for ever; afterwards `close`."""
+        await self._in_thread(self._clear)
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            while self._all:
+                self._end_idle()
+                await self._write()
+                await self._clock.sleep(WRITE_EVERY_S)
+
+    async def close(self) -> None:
+        """Finish what is being made, with what there is, and let go of the thread."""
+        for unit in list(self._running):
+            self._end(unit)
+        await self._write()
+        self._thread.shutdown(wait=False)
+
+    def _begin(self, unit: str, events: list[AlarmEvent]) -> Capture:
+        first = events[0]
+        capture = Capture(
+            file=CaptureFile(self._root, first, self._make_writer[unit]),
+            span=Span.around(first.time_ns, self._rate_hz[unit], self._settings),
+            alarms=[],
+            deadline_s=0.0,
+        )
+        self._prolong(capture, events)
+        for block in self._histories[unit]:
+            if capture.span.begins_by(block):
+                capture.add(block)
+        self._running[unit] = capture
+        return capture
+
+    def _prolong(self, capture: Capture, events: Sequence[AlarmEvent]) -> None:
+        for event in events:
+            capture.alarms.append(event)
+            capture.span = capture.span.with_alarm(event.time_ns, self._settings)
+            patience_s = self._settings.post_s + PATIENCE_S
+            capture.deadline_s = self._clock.monotonic_s() + patience_s
+
+    def _end(self, unit: str) -> None:
+        self._ended.append(self._running.pop(unit))
+
+    def _end_idle(self) -> None:
+        """End what waits for samples that do not come."""
+        now_s = self._clock.monotonic_s()
+        for unit, capture in list(self._running.items()):
+            if now_s > capture.deadline_s:
+                self._end(unit)
+
+    def _give_up(self, unit: str) -> None:
+        """Let go of a capture that the disk cannot keep up with."""
+        capture = self._running[unit]
+        capture.is_lost = True
+        capture.pending.clear()
+        self._end(unit)
+
+    async def _write(self) -> None:
+        """Hand everything to the thread; what is over is finished there."""
+        for capture in self._all:
+            is_last = any(capture is ended for ended in self._ended)
+            await self._in_thread(self._put, capture, is_last)
+            if is_last:
+                self._ended = [each for each in self._ended if each is not capture]
+        self._running = {u: c for u, c in self._running.items() if not c.file.is_closed}
+
+    def _put(self, capture: Capture, is_last: bool) -> None:
+        """Write what is pending; in the thread."""
+        try:
+            capture.file.write(_drained(capture.pending))
+            if is_last and not capture.file.is_closed:
+                if capture.is_lost:
+                    raise capture.file.given_up("the disk is too slow for them")
+                capture.file.finish(capture.alarms)
+                self.n_written += 1
+                self._tell(None)
+                make_room(self._root, self._settings.max_bytes)
+        except (CaptureError, OSError) as error:
+            self._tell(str(error))
+
+    def _clear(self) -> None:
+        """Remove what a crash has left; in the thread."""
+        try:
+            for folder in clear_leftovers(self._root):
+                log.warning("an unfinished capture is removed", folder=folder.name)
+        except OSError as error:
+            self._tell(str(error))
+
+    def _tell(self, error: str | None) -> None:
+        if error is not None and error != self.error:
+            log.error("samples around alarms are not kept", reason=error)
+        if error is None and self.error is not None:
+            log.info("samples around alarms are kept again")
+        self.error = error
+
+    async def _in_thread(self, do: Callable[..., None], *arguments: object) -> None:
+        await asyncio.get_running_loop().run_in_executor(self._thread, do, *arguments)
+
+
+def _drained(pending: deque[SampleBlock]) -> list[SampleBlock]:
+    blocks = []
+    while pending:
+        blocks.append(pending.popleft())
+    return blocks

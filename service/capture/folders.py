@@ -1,0 +1,75 @@
+"""The folder of captures: names, how much it may hold, and what a crash has left in it."""
+
+import os
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES
+from acquisition.recording.writer import INCOMPLETE
+from core.alarms.event import AlarmEvent
+from core.units import NS_PER_S
+
+ALARM = "alarm.json"
+
+FILES = (ALARM, MANIFEST, BLOCKS, SAMPLES)
+"""All that is ever removed: a folder with anything else in it is none of ours."""
+
+
+def capture_folder(root: Path, event: AlarmEvent) -> Path:
+    """A folder for the capture of an alarm that is not there yet."""
+    seconds, ns = divmod(event.time_ns, NS_PER_S)
+    moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
+    name = f"{event.identity.unit}-{moment}-{event.identity.kind}"
+    folder, n = root / name, 1
+    while os.path.lexists(folder) or os.path.lexists(aside(folder)):
+        n += 1
+        folder = root / f"{name}-{n}"
+    return folder
+
+
+def aside(folder: Path) -> Path:
+    """Where a capture is while it is being written."""
+    return folder.with_name(folder.name + INCOMPLETE)
+
+
+def clear_leftovers(root: Path) -> list[Path]:
+    """Remove what was being written when the service was killed; it can no longer be read."""
+    left = [path for path in _folders(root) if path.name.endswith(INCOMPLETE)]
+    for path in left:
+        _remove(path)
+    return left
+
+
+def make_room(root: Path, max_bytes: int) -> list[Path]:
+    """Remove the oldest captures until all together fit, the newest apart.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    finished = [path for path in _folders(root) if not path.name.endswith(INCOMPLETE)]
+    by_age = sorted((path.stat().st_mtime_ns, path.name, path) for path in finished)
+    sizes = {path: sum(file.stat().st_size for file in path.iterdir()) for path in finished}
+    n_bytes, removed = sum(sizes.values()), []
+    for _, _, path in by_age[:-1]:
+        if n_bytes <= max_bytes:
+            break
+        _remove(path)
+        n_bytes -= sizes[path]
+        removed.append(path)
+    return removed
+
+
+def _folders(root: Path) -> Iterator[Path]:
+    if not root.is_dir():
+        return iter(())
+    folders = (path for path in root.iterdir() if path.is_dir() and not path.is_symlink())
+    return (path for path in folders if all(file.name in FILES for file in path.iterdir()))
+
+
+def _remove(folder: Path) -> None:
+    for name in FILES:
+        (folder / name).unlink(missing_ok=True)
+    folder.rmdir()

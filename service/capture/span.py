@@ -1,0 +1,93 @@
+"""`Span`: which blocks belong to the capture of an alarm, and when there are no more."""
+
+from dataclasses import dataclass, replace
+
+from core.alarms.alarm import AlarmKind, AlarmState
+from core.alarms.event import ANNOUNCED, AlarmEvent
+from core.blocks import SampleBlock
+from core.units import ns_from_s
+
+WITHOUT_SAMPLES = (
+    AlarmKind.CLOCK_OFFSET,
+    AlarmKind.CLOCK_DRIFT,
+    AlarmKind.TIME_STAMPS,
+    AlarmKind.LINK_LOST,
+)
+"""Kinds of alarms that no sample can explain."""
+
+
+@dataclass(frozen=True)
+class CaptureSettings:
+    """How much is kept around an alarm.
+
+    Parameters
+    ----------
+    pre_s, post_s
+        Before the alarm and after it.
+    max_s
+        Longest capture.
+    max_bytes
+        Space of all of them together.
+    """
+
+    pre_s: float = 60.0
+    post_s: float = 120.0
+    max_s: float = 600.0
+    max_bytes: int = 10_000_000_000
+
+
+def is_captured(event: AlarmEvent) -> bool:
+    """Whether samples are kept around an event: a new occurrence that nothing hides."""
+    return (
+        event.change in ANNOUNCED
+        and event.identity.kind not in WITHOUT_SAMPLES
+        and event.state_after is AlarmState.UNACKNOWLEDGED
+    )
+
+
+@dataclass(frozen=True)
+class Span:
+    """From when to when, in the time of the samples. Only whole blocks are kept.
+
+    Parameters
+    ----------
+    n_samples
+        Taken so far, per channel.
+    max_samples
+        Most that are taken, should the device's time stand still or run backwards.
+    """
+
+    start_ns: int
+    end_ns: int
+    last_end_ns: int
+    max_samples: int
+    n_samples: int = 0
+
+    @classmethod
+    def around(cls, time_ns: int, rate_hz: float, settings: CaptureSettings) -> "Span":
+        """The span around an alarm."""
+        start_ns = time_ns - ns_from_s(settings.pre_s)
+        last_end_ns = start_ns + ns_from_s(settings.max_s)
+        end_ns = time_ns + ns_from_s(settings.post_s)
+        return cls(start_ns, end_ns, last_end_ns, round(settings.max_s * rate_hz))
+
+    def with_alarm(self, time_ns: int, settings: CaptureSettings) -> "Span":
+        """The span prolonged by one more alarm, as far as that goes."""
+        end_ns = max(self.end_ns, time_ns + ns_from_s(settings.post_s))
+        return replace(self, end_ns=min(end_ns, self.last_end_ns))
+
+    def with_block(self, block: SampleBlock) -> "Span":
+        """The span when a block has been taken."""
+        return replace(self, n_samples=self.n_samples + block.n_samples)
+
+    def begins_by(self, block: SampleBlock) -> bool:
+        """Whether a block from before the alarm belongs to it, if only in part."""
+        return block.stop_ns > self.start_ns
+
+    def goes_on_to(self, block: SampleBlock) -> bool:
+        """Whether a block that follows belongs to it, if only in part."""
+        return block.start_ns < self.end_ns and self.n_samples < self.max_samples
+
+    def is_over(self, newest: SampleBlock) -> bool:
+        """Whether nothing that follows a block can belong to it."""
+        return newest.stop_ns >= self.end_ns or self.n_samples >= self.max_samples
