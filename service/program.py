@@ -21,6 +21,7 @@ from service.references import ReferencesInForce
 from service.runner import Runner, WatchedUnit
 from service.settings.plant import PlantFile
 from service.store.port import Store
+from service.wiring.captures import captures_of
 from service.wiring.stores import open_store
 
 STALE_HOPS = 2.5
@@ -119,7 +120,8 @@ async def _run(
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s)
     recorder = Recorder(store, live, clock)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
-    alarms = await alarm_engine(plant, monitors, performance.origin, store, recorder.put, clock)
+    captures = captures_of(plant, performance.origin, clock)
+    alarms = await alarm_engine(plant, performance.origin, store, recorder.put, clock, captures)
     runner = Runner(units, live, recorder, clock, alarms)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
@@ -133,6 +135,7 @@ async def _run(
         references=references,
         alarms=alarms,
         recorder=recorder,
+        captures=captures,
         origin=performance.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
     )
@@ -150,16 +153,18 @@ async def _run(
             running = tasks.create_task(runner.run(), name="run")
             looking = tasks.create_task(references.run(), name="references")
             watching = tasks.create_task(alarms.run(), name="alarms")
+            capturing = tasks.create_task(captures.run(), name="captures")
             serving = tasks.create_task(server.serve([listener]), name="serve")
             announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
             if performance.ends:
                 running.add_done_callback(lambda _: stopped.set())
             await stopped.wait()
             server.should_exit = True
-            for task in (running, looking, watching, announcing):
+            for task in (running, looking, watching, capturing, announcing):
                 task.cancel()
             await asyncio.wait([serving])
     finally:
+        await captures.close()
         await recorder.flush()  # also when a bug ends the program
 
 

@@ -128,6 +128,19 @@ class StoreModel(ApiModel):
     """Results given up because the store did not answer for too long."""
 
 
+class CapturesModel(ApiModel):
+    """Whether the samples around alarms reach the disk."""
+
+    error: str | None
+    """Why those of the last alarm did not."""
+
+    n_running: int
+    """Recordings that are being written."""
+
+    n_written: int
+    """Recordings finished since the service started."""
+
+
 class OverviewModel(ApiModel):
     """Everything that a control room wants to see at a glance."""
 
@@ -145,6 +158,9 @@ class OverviewModel(ApiModel):
 
     alarms: AlarmCountModel
     """How many alarms there are."""
+
+    captures: CapturesModel
+    """Whether the samples around them reach the disk."""
 
     units: list[UnitOverviewModel]
     """All units."""
