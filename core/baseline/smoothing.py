@@ -40,6 +40,9 @@ class Newest:
         return float(np.median(self.deviations))
 
 
+NOTHING_NEW = Newest()
+
+
 def running_median(deviation: FloatArray) -> FloatArray:
     """(n,) what `Newest.median` gives step by step."""
     n = deviation.size

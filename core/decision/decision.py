@@ -1,0 +1,183 @@
+"""Whether a film has changed: one decision, led on reading by reading."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.alarms.alarm import AlarmLevel
+from core.baseline.baseline import QuantityBaseline
+from core.condition.film_conditions import FilmConditions
+from core.decision.gathered import NOTHING_GATHERED, Finding, GatheredEvidence
+from core.decision.level_timer import REST, LevelTimer
+from core.decision.limits import ChangeLimits
+from core.decision.reading import WatchedReading
+from core.decision.verdict import OF_EVIDENCE, Verdict, counted_verdict
+from core.units import NS_PER_S
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What is known of one quantity in one direction.
+
+    Parameters
+    ----------
+    verdict
+        What the newest reading says.
+    finding
+        The most significant mean deviation, as of the newest reading that counted.
+    deviation, deviation_std
+        Of the newest reading that counted, single: ln over the baseline, and what it may stray by.
+    alert, danger
+        Levels with their delays.
+    last_ns, last_counted_ns
+        Newest reading, and newest that counted.
+    """
+
+    verdict: Verdict = Verdict.GATHERING_EVIDENCE
+    finding: Finding | None = None
+    deviation: float | None = None
+    deviation_std: float | None = None
+    evidence: GatheredEvidence = NOTHING_GATHERED
+    alert: LevelTimer = REST
+    danger: LevelTimer = REST
+    last_ns: int | None = None
+    last_counted_ns: int | None = None
+
+    @property
+    def level(self) -> AlarmLevel | None:
+        """Level that is held, whether or not the newest reading could be judged."""
+        if self.danger.is_active:
+            return AlarmLevel.DANGER
+        return AlarmLevel.ALERT if self.alert.is_active else None
+
+
+UNDECIDED = Decision()
+"""Where a film begins, and begins again with another baseline."""
+
+
+def advance(
+    decision: Decision,
+    reading: WatchedReading,
+    baseline: QuantityBaseline | None,
+    limits: ChangeLimits,
+) -> Decision:
+    """Take in one reading.
+
+    Readings that come sooner after the last one that counted than half of what a reading stands for
+    are not counted: they are much the same samples.
+
+    Raises
+    ------
+    ValueError
+        If the reading is not later than the one before.
+    """
+    if decision.last_ns is not None and reading.time_ns <= decision.last_ns:
+        raise ValueError(f"reading at {reading.time_ns} ns is not after {decision.last_ns} ns")
+    decision = replace(decision, last_ns=reading.time_ns)
+    unusable = _unusable(reading)
+    if unusable is not None:
+        return replace(decision, verdict=unusable)
+    if baseline is None:
+        return replace(decision, verdict=Verdict.NO_BASELINE)
+    condition = FilmConditions.one(
+        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
+    )
+    if not baseline.grid.is_known(condition)[0]:
+        return replace(decision, verdict=Verdict.BAD_QUALITY)
+    return _compared(decision, reading, condition, baseline, limits)
+
+
+def release(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Decision:
+    """Release latches whose condition has gone for the off-delay."""
+    n_off = readings_of(limits.off_delay_h, baseline.reading_h)
+    return replace(
+        decision, alert=decision.alert.released(n_off), danger=decision.danger.released(n_off)
+    )
+
+
+def readings_of(duration_h: float, reading_h: float) -> int:
+    """Readings that stand for running hours: at least one."""
+    return max(1, math.ceil(duration_h / reading_h - 1e-9))
+
+
+def least_step_ns(baseline: QuantityBaseline) -> int:
+    """Time after one reading before the next one counts."""
+    return round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
+
+
+def _unusable(reading: WatchedReading) -> Verdict | None:
+    if not reading.is_settled:
+        return Verdict.TRANSIENT
+    if reading.evidence in OF_EVIDENCE:
+        return OF_EVIDENCE[reading.evidence]
+    return Verdict.BAD_QUALITY if math.isnan(reading.value) else None
+
+
+def _compared(
+    decision: Decision,
+    reading: WatchedReading,
+    condition: FilmConditions,
+    baseline: QuantityBaseline,
+    limits: ChangeLimits,
+) -> Decision:
+    found = baseline.compare(condition, np.array([reading.value]), np.array([reading.u_random]))
+    if found.place[0] < 0:
+        return replace(decision, verdict=Verdict.NO_BASELINE)
+    last_ns = decision.last_counted_ns
+    if last_ns is not None and reading.time_ns - last_ns < least_step_ns(baseline):
+        return replace(decision, verdict=_verdict(decision, baseline, limits))
+    deviation, weight, surface_std = (
+        float(column[0]) for column in (found.deviation, found.weight, found.surface_std)
+    )
+    evidence = decision.evidence.step(deviation, weight, surface_std, baseline)
+    decision = replace(
+        decision,
+        deviation=deviation,
+        deviation_std=math.hypot(baseline.scatter / math.sqrt(weight), surface_std),
+        evidence=evidence,
+        last_counted_ns=reading.time_ns,
+    )
+    return _judged(decision, evidence.findings(baseline), baseline, limits)
+
+
+def _judged(
+    decision: Decision,
+    findings: tuple[Finding, ...],
+    baseline: QuantityBaseline,
+    limits: ChangeLimits,
+) -> Decision:
+    n_on = readings_of(limits.on_delay_h, baseline.reading_h)
+    n_off = readings_of(limits.off_delay_h, baseline.reading_h)
+    alert, danger = (
+        timer.step(
+            any(is_passed(f.change, f.significance, change, limits) for f in findings),
+            any(is_held(f.change, f.significance, change, limits) for f in findings),
+            n_on,
+            n_off,
+            limits.is_latching,
+        )
+        for timer, change in (
+            (decision.alert, limits.alert_change),
+            (decision.danger, limits.danger_change),
+        )
+    )
+    strongest = max(findings, key=lambda finding: finding.significance, default=None)
+    decision = replace(decision, finding=strongest, alert=alert, danger=danger)
+    return replace(decision, verdict=_verdict(decision, baseline, limits))
+
+
+def is_passed(change: float, significance: float, limit: float, limits: ChangeLimits) -> bool:
+    """Whether a change is large enough and sure."""
+    return abs(change) >= limit and significance >= limits.significance
+
+
+def is_held(change: float, significance: float, limit: float, limits: ChangeLimits) -> bool:
+    """Whether it still is, with the deadband."""
+    return abs(change) > limit - limits.deadband and significance > limits.holding_significance
+
+
+def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:
+    counted_h = decision.evidence.n_counted * baseline.reading_h
+    is_enough = decision.finding is not None and counted_h >= limits.min_evidence_h
+    return counted_verdict(decision.level, is_enough)

@@ -1,0 +1,123 @@
+"""`GatheredEvidence`: what the mean deviation over each time scale says, reading by reading."""
+
+import math
+from dataclasses import dataclass
+
+from core.baseline.baseline import QuantityBaseline, TimeScatter
+from core.baseline.smoothing import NOTHING_NEW, Newest, forgetting, forgetting_step
+
+
+@dataclass(frozen=True)
+class ScaleSums:
+    """Forgetting sums over one time scale.
+
+    Parameters
+    ----------
+    fill
+        Of ones: how much of the time scale has been seen.
+    weight, deviation, surface
+        Of weights, of weighted deviations, of weighted uncertainties of the surface.
+    """
+
+    fill: float = 0.0
+    weight: float = 0.0
+    deviation: float = 0.0
+    surface: float = 0.0
+
+    def step(
+        self, weight: float, deviation: float, surface_std: float, forgotten: float
+    ) -> "ScaleSums":
+        """Take in one reading."""
+        return ScaleSums(
+            forgetting_step(self.fill, 1.0, forgotten),
+            forgetting_step(self.weight, weight, forgotten),
+            forgetting_step(self.deviation, weight * deviation, forgotten),
+            forgetting_step(self.surface, weight * surface_std, forgotten),
+        )
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A mean deviation.
+
+    Parameters
+    ----------
+    change
+        ln of what is measured over what was learned.
+    std
+        Standard uncertainty of a healthy film's mean deviation.
+    """
+
+    time_scale_h: float
+    change: float
+    std: float
+
+    @property
+    def significance(self) -> float:
+        """Standard uncertainties away from no change."""
+        return abs(self.change) / self.std
+
+
+@dataclass(frozen=True)
+class GatheredEvidence:
+    """Deviations that have been counted so far.
+
+    Parameters
+    ----------
+    n_counted
+        How many.
+    scales
+        Sums over the time scales of the baseline.
+    """
+
+    n_counted: int = 0
+    newest: Newest = NOTHING_NEW
+    scales: tuple[ScaleSums, ...] = ()
+
+    def step(
+        self, deviation: float, weight: float, surface_std: float, baseline: QuantityBaseline
+    ) -> "GatheredEvidence":
+        """Count one more deviation.
+
+        Raises
+        ------
+        ValueError
+            If the evidence was gathered with another baseline's time scales.
+        """
+        times = baseline.time_scatter
+        scales = self.scales or (ScaleSums(),) * len(times)
+        if len(scales) != len(times):
+            raise ValueError(f"evidence on {len(scales)} time scales, baseline on {len(times)}")
+        newest = self.newest.step(deviation)
+        middle = newest.median
+        return GatheredEvidence(
+            self.n_counted + 1,
+            newest,
+            tuple(
+                sums.step(weight, middle, surface_std, _forgotten(time, baseline))
+                for sums, time in zip(scales, times, strict=True)
+            ),
+        )
+
+    def findings(self, baseline: QuantityBaseline) -> tuple[Finding, ...]:
+        """What the time scales say that have been seen in full."""
+        return tuple(
+            _finding(sums, time)
+            for sums, time in zip(self.scales, baseline.time_scatter, strict=True)
+            if self.n_counted * baseline.reading_h >= time.time_scale_h
+        )
+
+
+def _forgotten(time: TimeScatter, baseline: QuantityBaseline) -> float:
+    return forgetting(time.time_scale_h, baseline.reading_h)
+
+
+def _finding(sums: ScaleSums, time: TimeScatter) -> Finding:
+    surface = sums.surface / sums.weight
+    # half-filled means stray further; the surface's error stays, however long one averages
+    own = time.std / sums.fill
+    std = math.sqrt(own * own + surface * surface)
+    return Finding(time.time_scale_h, sums.deviation / sums.weight, std)
+
+
+NOTHING_GATHERED = GatheredEvidence()

@@ -1,0 +1,62 @@
+"""How large, how sure and how lasting a change must be."""
+
+import math
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True)
+class ChangeLimits:
+    """Limits of the change of a film, in ln (0.03 is 3 %), either way.
+
+    Parameters
+    ----------
+    alert_change, danger_change
+        Size from which a change that is sure is an alert, or danger.
+    deadband
+        How far below its limit a change must fall for a level to be left; significance must fall by
+        the same share.
+    significance
+        Standard uncertainties that a mean deviation must be away from zero to be sure.
+    min_evidence_h
+        Running hours with a baseline before anything is called normal. A time scale counts from its
+        own length on.
+    on_delay_h, off_delay_h
+        Running hours without interruption before a level counts, or counts no longer.
+    is_latching
+        Whether a level stays until it is released.
+
+    Raises
+    ------
+    ValueError
+        With key and value, if one is not a number above zero, alert is not below danger, or the
+        deadband is not below the alert limit.
+    """
+
+    alert_change: float = 0.03
+    danger_change: float = 0.15
+    deadband: float = 0.01
+    significance: float = 5.0
+    min_evidence_h: float = 4.0
+    on_delay_h: float = 1.0
+    off_delay_h: float = 8.0
+    is_latching: bool = False
+
+    def __post_init__(self) -> None:
+        for key in (field.name for field in fields(self) if field.name != "is_latching"):
+            value = getattr(self, key)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{key} = {value:g} must be a number above 0")
+        if not self.alert_change < self.danger_change:
+            raise ValueError(
+                f"alert_change = {self.alert_change:g} must be below"
+                f" danger_change = {self.danger_change:g}"
+            )
+        if not self.deadband < self.alert_change:
+            raise ValueError(
+                f"deadband = {self.deadband:g} must be below alert_change = {self.alert_change:g}"
+            )
+
+    @property
+    def holding_significance(self) -> float:
+        """Significance below which a level is left."""
+        return self.significance * (1.0 - self.deadband / self.alert_change)
