@@ -1,0 +1,249 @@
+"""C2, C3: a line is exactly a frame, or it is refused."""
+
+import os
+import string
+from collections.abc import Iterator
+
+import can
+import numpy as np
+import pytest
+import serial
+
+from acquisition.can.slcan import SlcanBus, open_slcan
+from acquisition.daq.can_frames import FD_LENGTHS, WireFrame
+from acquisition.daq.can_slcan import slcan_line
+
+N_KINDS = 200
+IDS = (0x100, 0x123)
+
+
+class Wire:
+    """A pseudo-terminal with a bus at one end."""
+
+    def __init__(self, ids=None, answer: bytes = b"\r") -> None:
+        self._master, self._slave = os.openpty()
+        path = os.ttyname(self._slave)
+        self.bus = open_slcan(path, ids, listen_only=True, sleep_after_open=0.0)
+        os.read(self._master, 100)
+        self.say(answer)
+
+    def say(self, data: bytes) -> None:
+        os.write(self._master, data)
+
+    def heard(self) -> list[can.Message]:
+        messages = []
+        while (message := self.bus.recv(0.01)) is not None:
+            messages.append(message)
+        return messages
+
+    def close(self) -> None:
+        self.bus.shutdown()
+        os.close(self._master)
+        os.close(self._slave)
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    wire = Wire()
+    yield wire
+    wire.close()
+
+
+def random_frame(random: np.random.Generator) -> WireFrame:
+    fd, extended = bool(random.integers(2)), bool(random.integers(2))
+    length = int(random.choice(FD_LENGTHS if fd else FD_LENGTHS[:9]))
+    frame_id = int(random.integers(0, 1 << 29 if extended else 1 << 11))
+    return WireFrame(frame_id, extended, fd, random.bytes(length))
+
+
+def test_what_is_written_is_read(wire):
+    random = np.random.default_rng(1)
+    frames = [random_frame(random) for _ in range(300)]
+    heard = []
+    for frame in frames:
+        line = slcan_line(frame)
+        wire.say(line if random.integers(2) else line.replace(b"A", b"a").replace(b"C", b"c"))
+        heard += wire.heard() if random.random() < 0.05 else []
+    heard += wire.heard()
+    assert [(m.arbitration_id, m.is_extended_id, m.is_fd, m.dlc, bytes(m.data)) for m in heard] == [
+        (f.frame_id, f.extended, f.fd, len(f.data), f.data) for f in frames
+    ]
+    assert wire.bus.take_n_malformed() == 0
+
+
+def test_a_line_cut_anywhere_between_two_reads_is_one_line(wire):
+    line = slcan_line(WireFrame(0x123, False, False, bytes(range(8))))
+    for cut in range(1, len(line)):
+        wire.say(line[:cut])
+        assert wire.heard() == []
+        wire.say(line[cut:])
+        [message] = wire.heard()
+        assert bytes(message.data) == bytes(range(8))
+
+
+def non_hex(line: bytes, random: np.random.Generator) -> bytes:
+    place = int(random.integers(1, len(line) - 1))
+    wrong = random.choice([ord(c) for c in string.printable if c not in string.hexdigits + "\r\a"])
+    return line[:place] + bytes([int(wrong)]) + line[place + 1 :]
+
+
+def not_ascii(line: bytes, random: np.random.Generator) -> bytes:
+    place = int(random.integers(0, len(line) - 1))
+    return line[:place] + bytes([int(random.integers(128, 256))]) + line[place + 1 :]
+
+
+def truncated(line: bytes, random: np.random.Generator) -> bytes:
+    return line[: int(random.integers(1, len(line) - 1))] + b"\r"
+
+
+def merged(line: bytes, random: np.random.Generator) -> bytes:
+    return line[: int(random.integers(1, len(line) - 1))] + line
+
+
+def too_long(line: bytes, random: np.random.Generator) -> bytes:
+    extra = random.bytes(int(random.integers(1, 9))).hex().upper().encode()
+    return line[:-1] + extra + b"\r"
+
+
+def five_kilobytes(line: bytes, random: np.random.Generator) -> bytes:
+    return line[:5] + random.bytes(2500).hex().upper().encode() + b"\r"
+
+
+def wrong_length_code(line: bytes, random: np.random.Generator) -> bytes:
+    codes = [c for c in b"01234567" if c != line[4]]
+    return line[:4] + bytes([int(random.choice(codes))]) + line[5:]
+
+
+def length_above_eight(line: bytes, random: np.random.Generator) -> bytes:
+    return line[:4] + bytes([int(random.choice(list(b"9ABCDEFabcdef")))]) + line[5:]
+
+
+def unknown_letter(line: bytes, random: np.random.Generator) -> bytes:
+    return bytes([int(random.choice(list(b"xXyYqQ1!")))]) + line[1:]
+
+
+def odd_digits(line: bytes, random: np.random.Generator) -> bytes:  # noqa: ARG001
+    return line[:-2] + b"\r"
+
+
+def id_too_large(line: bytes, random: np.random.Generator) -> bytes:
+    return b"t" + random.choice([b"8", b"F"]) + line[2:]
+
+
+KINDS = [
+    non_hex,
+    not_ascii,
+    truncated,
+    merged,
+    too_long,
+    five_kilobytes,
+    wrong_length_code,
+    length_above_eight,
+    unknown_letter,
+    odd_digits,
+    id_too_large,
+]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_a_malformed_line_never_becomes_a_frame_and_the_next_one_does(kind, wire):
+    random = np.random.default_rng(20261121)
+    good = slcan_line(WireFrame(0x123, False, False, b"\1\2\3\4\5\6\7\x08"))
+    accepted = []
+    for n in range(N_KINDS):
+        line = slcan_line(WireFrame(0x100, False, False, random.bytes(8)))
+        wire.say(kind(line, random) + good)
+        if n % 2:
+            accepted += wire.heard()
+    assert [bytes(m.data) for m in accepted] == [b"\1\2\3\4\5\6\7\x08"] * N_KINDS
+    assert wire.bus.take_n_malformed() == N_KINDS
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [(b"t1008AABB\r", "accepted"), (b"t100400112233AABBCC\r", "accepted"), (b"t10Z0\r", "trips")],
+)
+def test_python_can_alone_accepts_it_or_trips_over_it(line, what):
+    """Why there is a reader of our own; if python-can becomes strict, it may go."""
+    master, slave = os.openpty()
+    bus = can.Bus(os.ttyname(slave), interface="slcan", sleep_after_open=0.0, ignore_config=True)
+    os.write(master, line)
+    if what == "accepted":
+        assert bus.recv(0.1) is not None
+    else:
+        with pytest.raises(ValueError, match="invalid literal"):
+            bus.recv(0.1)
+    bus.shutdown()
+    os.close(master)
+    os.close(slave)
+
+
+def test_answers_of_an_adapter_are_no_frames_and_no_errors(wire):
+    wire.say(b"\r\a\rz\rZ\rV1013\rvABCD\rNA123\rF00\r")
+    assert wire.heard() == []
+    assert wire.bus.take_n_malformed() == 0
+
+
+@pytest.mark.parametrize("tail", [b"D0000012300\r", b"b1230\r", b"t1230\r", b"sb256256\r"])
+def test_joining_in_the_middle_of_a_line_gives_no_frame(tail):
+    wire = Wire(answer=b"")
+    wire.say(tail + b"t1001FF\r")
+    assert [(m.arbitration_id, m.is_error_frame) for m in wire.heard()] == [(0x100, False)]
+    assert wire.bus.take_n_malformed() == 0
+    wire.close()
+
+
+@pytest.mark.parametrize(
+    ("line", "bits"),
+    [(b"sb256256\r", 0x40), (b"sp128000\r", 0x04), (b"e1o\r", 0x8C), (b"e2bc\r", 0x88)],
+)
+def test_state_lines_become_error_frames(line, bits, wire):
+    wire.say(line)
+    [message] = wire.heard()
+    assert message.is_error_frame
+    assert message.arbitration_id == bits
+
+
+@pytest.mark.parametrize("line", [b"sb25625\r", b"sx000000\r", b"e9bc\r", b"e3bc\r", b"s\r"])
+def test_a_state_line_that_is_none_is_refused(line, wire):
+    wire.say(line)
+    assert wire.heard() == []
+    assert wire.bus.take_n_malformed() == 1
+
+
+def test_only_wanted_ids_are_heard_standard_and_extended():
+    wire = Wire(ids=IDS)
+    wire.say(b"t1001AA\rt3001AA\rT000001231BB\rT100001231CC\rt1231DD\r")
+    assert [bytes(m.data) for m in wire.heard()] == [b"\xaa", b"\xbb", b"\xdd"]
+    wire.close()
+
+
+def test_an_unplugged_adapter_is_an_error_of_python_can_and_leaves_no_port_open():
+    wire = Wire()
+    os.close(wire._master)
+    os.close(wire._slave)
+    with pytest.raises(can.CanOperationError):
+        wire.bus.recv(1.0)
+    with pytest.raises(can.CanError):
+        wire.bus.shutdown()
+    assert not wire.bus.serialPortOrig.is_open
+
+
+def test_a_port_whose_commands_fail_is_not_left_open(monkeypatch):
+    opened = []
+
+    def fails(self, data):  # noqa: ARG001
+        opened.append(self)
+        raise serial.SerialTimeoutException("Write timeout")
+
+    monkeypatch.setattr(serial.Serial, "write", fails)
+    master, slave = os.openpty()
+    with pytest.raises(can.CanInitializationError):
+        open_slcan(os.ttyname(slave), None, sleep_after_open=0.0)
+    assert not opened[0].is_open
+    os.close(master)
+    os.close(slave)
+
+
+def test_the_bus_is_python_cans_own():
+    assert issubclass(SlcanBus, can.interfaces.slcan.slcanBus)
