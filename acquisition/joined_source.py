@@ -15,7 +15,10 @@ class SlowValues(Protocol):
     """A device that is asked for slow values while another one sends waveforms."""
 
     def watch(self) -> AbstractAsyncContextManager[None]:
-        """Ask it again and again until the context is left; losing it ends nothing."""
+        """Ask it again and again until the context is left; losing it ends nothing.
+
+        Entering waits for its first answer, or until it is known that there is none.
+        """
         ...
 
     def current(self) -> Mapping[str, Reading]:
@@ -42,7 +45,7 @@ class JoinedSource:
         LinkError, ConfigError
             As the source of the waveforms does.
         """
-        async with self._source.connect() as blocks, self._slow.watch():
+        async with self._slow.watch(), self._source.connect() as blocks:
             joined = self._joined(blocks)
             try:
                 yield joined

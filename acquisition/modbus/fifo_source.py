@@ -134,10 +134,10 @@ class FifoSource:
             if not self._layout.has_counter and self._uncounted.has_lost(now_s):
                 waiting.clear()  # nobody knows where among these the loss is
                 self._uncounted.begin()
-            for raw in self._raw_blocks(waiting, arrived_ns):
-                for block in self._delivery.take(raw, arrived_ns):
-                    yield block
+            raw_blocks = self._raw_blocks(waiting, arrived_ns)
             waiting.clear()
+            for block in [b for raw in raw_blocks for b in self._delivery.take(raw, arrived_ns)]:
+                yield block
             self._freshness.note(repr(self._newest).encode(), now_s)
             await self._clock.sleep(self._settings.poll_period_s)
 

@@ -59,13 +59,16 @@ class PolledSlowValues:
         self._freshness = Freshness("nothing that is read", settings.stale_after_s)
         self._newest: tuple[float, Mapping[str, Reading]] | None = None
         self._task: asyncio.Task[None] | None = None
+        self._asked = asyncio.Event()
         self.trouble: str | None = "not asked yet"
 
     @asynccontextmanager
     async def watch(self) -> AsyncIterator[None]:
-        """Poll in the background until the context is left."""
+        """Poll in the background until the context is left; the first poll is waited for."""
+        self._asked.clear()
         self._task = task = asyncio.create_task(self._run(), name="poll slow values")
         try:
+            await self._asked.wait()
             yield
         finally:
             task.cancel()
@@ -96,6 +99,7 @@ class PolledSlowValues:
                 await self._poll()
             except AcquisitionError as error:
                 self.trouble = str(error)
+                self._asked.set()
                 wait_s = max(self._settings.poll_period_s, _MIN_RETRY_S)
                 is_config = isinstance(error, ConfigError)
                 await self._clock.sleep(max(wait_s, _CONFIG_RETRY_S) if is_config else wait_s)
@@ -115,6 +119,7 @@ class PolledSlowValues:
                     self._freshness.note(reading.alive, now_s)
                     self._newest = (now_s, self._readings(reading))
                     self.trouble = None
+                    self._asked.set()
                     await self._clock.sleep(self._settings.poll_period_s)
         finally:
             link.close()

@@ -1,7 +1,8 @@
 """The rigs of all sources; a new adapter joins the contract suite here.
 
 A rig goes into `ALL`, and into `WIRED` if it has a link that can be cut; such a rig says in
-`absence` what its source has to say of a device that is not there. Its module lies in `rigs`.
+`absence` what its source has to say of a device that is not there, and has `keeps` = False if the
+device keeps nothing while nobody is connected. Its module lies in `rigs`.
 """
 
 from collections.abc import AsyncIterator
@@ -10,9 +11,30 @@ import pytest
 from rigs.can import CanFdRig, CanRig
 from rigs.modbus import ModbusRig, ModbusRtuRig
 from rigs.recording import RecordingRig
+from rigs.registers import (
+    ChannelFifoTcpRig,
+    FifoRtuRig,
+    FifoTcpRig,
+    PolledRtuRig,
+    PolledTcpRig,
+    VectorRtuRig,
+    VectorTcpRig,
+)
 from rigs.simulated import SimulatedRig
 
-WIRED = [CanRig, CanFdRig, ModbusRig, ModbusRtuRig]
+WIRED = [
+    CanRig,
+    CanFdRig,
+    ModbusRig,
+    ModbusRtuRig,
+    PolledTcpRig,
+    PolledRtuRig,
+    VectorTcpRig,
+    VectorRtuRig,
+    FifoTcpRig,
+    FifoRtuRig,
+    ChannelFifoTcpRig,
+]
 ALL = [*WIRED, SimulatedRig, RecordingRig]
 
 

@@ -125,5 +125,7 @@ async def test_a_source_goes_on_after_the_plug_is_back(wired_rig):
     await wired_rig.plug_in()
     async with wired_rig.source.connect() as stream:
         second = await anext(stream)
-    assert second.first_index == first.stop_index
+    # what is polled and not kept is lost, but for the poll that is due on return
+    n_lost = 0 if getattr(wired_rig, "keeps", True) else 3 * wired_rig.step_samples - 1
+    assert second.first_index == first.stop_index + n_lost
     assert_samples_are_their_own_numbers(second)

@@ -1,0 +1,252 @@
+"""Modbus sources other than the ring, on a counting plant: polled registers, vectors, queues."""
+
+import tempfile
+from contextlib import AsyncExitStack
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.clock import SystemClock
+from acquisition.daq.fifo_device import FifoDevice
+from acquisition.daq.map_device import MapDevice
+from acquisition.daq.modbus_server import ModbusDevice, ModbusServer
+from acquisition.daq.rtu_server import ModbusRtuServer
+from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.joined_source import JoinedSource, only_slow, without_slow
+from acquisition.modbus.fifo_source import FifoSettings, FifoSource
+from acquisition.modbus.polled_slow_values import PolledSlowValues
+from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
+from acquisition.raw import RawBlock
+from acquisition.registers.cells import ByteOrder, Cell, NumberType
+from acquisition.registers.fifo_layout import FifoKind, FifoLayout
+from acquisition.registers.register_map import (
+    FlagCheck,
+    MapValue,
+    Meaning,
+    RegisterMap,
+    Together,
+)
+from acquisition.source import SampleSource
+from acquisition.vector_calibration import vector_calibration
+from core.vector_rows import VectorPart, VectorRow
+
+SLOW = ("slow0", "slow1")
+VECTORS = tuple(VectorRow(f"c{n}", VectorPart.ORDER1_AMPLITUDE) for n in range(2))
+STATUS = Cell(address=200)
+
+
+def value(id_: str, address: int, type_: str = "float32", **settings) -> MapValue:
+    cell = Cell(address=address, type=NumberType(type_), byte_order=ByteOrder.CDAB)
+    return MapValue(id=id_, cell=cell, **settings)
+
+
+def registers(rows) -> RegisterMap:
+    """A map with a status register, a heartbeat and a block that must not be split."""
+    flag = FlagCheck(cell=STATUS, mask=0x0020, set_means=Meaning.BAD)
+    values = [value(id_, 101 + 4 * n, "int32", flags=(flag,)) for n, id_ in enumerate(rows)]
+    values += [value(id_, 110 + 2 * n) for n, id_ in enumerate(SLOW)]
+    return RegisterMap(
+        values=tuple(values),
+        base=1,
+        together=(Together(address=101, count=14),),
+        heartbeat=Cell(address=201),
+    )
+
+
+class _Rig:
+    """A device on a real link; pulling the plug takes the link away."""
+
+    absence: str
+    keeps = True
+
+    def __init__(self, feed, calibration, clock) -> None:
+        self._feed, self._calibration, self._clock = feed, calibration, clock
+        self._plug = AsyncExitStack()
+        self._folder = tempfile.TemporaryDirectory()
+        self._server: ModbusServer
+        self.step_samples = 1
+        self.source: SampleSource
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.pull()
+        self._folder.cleanup()
+
+    async def plug_in(self) -> None:
+        await self._plug.enter_async_context(self._server)
+
+    async def pull(self) -> None:
+        await self._plug.aclose()
+
+    def _serve(self, device: ModbusDevice) -> ModbusServer:
+        return ModbusTcpServer(device)
+
+    def _transport(self) -> Transport:
+        return TcpTransport(**self._server.endpoint)
+
+
+class _OnTcp(_Rig):
+    absence = r"127\.0\.0\.1:\d+: Connection refused"
+    timeout_s = 5.0
+
+
+class _OnRtu(_Rig):
+    absence = r"/line: No such file or directory"
+    timeout_s = 0.3
+
+    def _serve(self, device: ModbusDevice) -> ModbusServer:
+        return ModbusRtuServer(device, link=Path(self._folder.name) / "line")
+
+    def _transport(self) -> Transport:
+        device = str(self._server.endpoint["device"])
+        return SerialTransport(device=device, baudrate=230_400, parity="none")
+
+
+class _ClockedDevice(MapDevice):
+    """Shows the sample that belongs to the time of the rig's clock."""
+
+    clock = None
+
+    def read_registers(self, function: int, address: int, count: int) -> bytes | None:
+        number = int(self.clock.monotonic_s() * self._calibration.rate_hz + 1e-6)
+        self.produce(number - self.newest.first_index)
+        return super().read_registers(function, address, count)
+
+
+class _PolledRig(_Rig):
+    """Time passes by the source's own waiting; while nobody is connected, by the rig."""
+
+    keeps = False
+    rows = ("c0", "c1")
+
+    async def __aenter__(self) -> "_PolledRig":
+        device = _ClockedDevice(self._feed, registers(self.rows), self.rows, self._calibration)
+        device.clock = self._clock
+        self._server = self._serve(device)
+        await self.plug_in()
+        settings = PolledSettings(
+            transport=self._transport(),
+            poll_period_s=1.0 / self._calibration.rate_hz,
+            timeout_s=self.timeout_s,
+        )
+        self._source = PolledSource(
+            settings, registers(self.rows), self.rows, self._source_calibration(), self._clock
+        )
+        self.source = _Counted(self._source)
+        return self
+
+    def _source_calibration(self):
+        return self._calibration
+
+    def run(self, n_samples: int) -> None:
+        if not self.source.n_connected:
+            self._clock.step(n_samples / self._calibration.rate_hz)
+
+
+class _Counted:
+    """Knows whether anybody is connected."""
+
+    def __init__(self, source: SampleSource) -> None:
+        self._source, self.n_connected = source, 0
+
+    def connect(self):
+        return self._connect()
+
+    def _connect(self):
+        return _CountedConnection(self, self._source.connect())
+
+
+class _CountedConnection:
+    def __init__(self, counted: _Counted, connection) -> None:
+        self._counted, self._connection = counted, connection
+
+    async def __aenter__(self):
+        stream = await self._connection.__aenter__()
+        self._counted.n_connected += 1
+        return stream
+
+    async def __aexit__(self, *error: object):
+        self._counted.n_connected -= 1
+        return await self._connection.__aexit__(*error)
+
+
+class PolledTcpRig(_OnTcp, _PolledRig):
+    """Polled registers over Modbus TCP."""
+
+
+class PolledRtuRig(_OnRtu, _PolledRig):
+    """Polled registers over Modbus RTU."""
+
+
+class VectorTcpRig(_OnTcp, _PolledRig):
+    """A vector rack over Modbus TCP."""
+
+    rows = tuple(row.id for row in VECTORS)
+
+    def _source_calibration(self):
+        return vector_calibration(self._calibration, ("c0", "c1"), VECTORS)
+
+
+class VectorRtuRig(_OnRtu, VectorTcpRig):
+    """A vector rack over Modbus RTU."""
+
+
+class _FifoRig(_Rig):
+    """Queues, with slow values in the registers of another device."""
+
+    layout = FifoLayout(addresses=(1000,), n_channels=2)
+
+    async def __aenter__(self) -> "_FifoRig":
+        self.step_samples = 50
+        ids = frozenset(SLOW)
+        beside = MapDevice(
+            _Slow(self._feed.slow), registers(()), (), only_slow(self._calibration, ids)
+        )
+        self._device = FifoDevice(self._feed, self.layout, depth_samples=4000, step_samples=50)
+        self._server = self._serve(self._device)
+        await self.plug_in()
+        self._beside = ModbusTcpServer(beside)
+        await self._beside.__aenter__()
+        settings = FifoSettings(
+            transport=self._transport(), poll_period_s=0.001, timeout_s=self.timeout_s
+        )
+        polled = PolledSettings(transport=TcpTransport(**self._beside.endpoint))
+        self.source = JoinedSource(
+            FifoSource(settings, self.layout, without_slow(self._calibration, ids), self._clock),
+            PolledSlowValues(polled, registers(()), self._calibration.slow, SystemClock()),
+        )
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        await self._beside.__aexit__(*error)
+        await super().__aexit__(*error)
+
+    def run(self, n_samples: int) -> None:
+        self._clock.step(n_samples / self._calibration.rate_hz)
+        self._device.produce(n_samples // self.step_samples)
+
+
+class _Slow:
+    """A feed of slow values alone, that never ends."""
+
+    def __init__(self, slow) -> None:
+        self._slow, self._n = slow, 0
+
+    def advance(self, n_samples: int):
+        first, self._n = self._n, self._n + n_samples
+        counts = np.zeros((0, n_samples), dtype=np.int16)
+        return RawBlock(0, first, 0, 600.0, counts, (), self._slow)
+
+
+class FifoTcpRig(_OnTcp, _FifoRig):
+    """A queue of all channels over Modbus TCP."""
+
+
+class FifoRtuRig(_OnRtu, _FifoRig):
+    """A queue of all channels over Modbus RTU."""
+
+
+class ChannelFifoTcpRig(_OnTcp, _FifoRig):
+    """A queue for each channel, over Modbus TCP."""
+
+    layout = FifoLayout(addresses=(1000, 1100), n_channels=2, kind=FifoKind.PER_CHANNEL)
