@@ -9,8 +9,8 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
+from acquisition.calibration import UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.recording.inversion import raw_of
@@ -28,6 +28,7 @@ from acquisition.recording.manifest import (
     Manifest,
     RecordedFile,
     RecordedUnit,
+    SampleType,
     manifest_text,
     start_text,
 )
@@ -57,6 +58,9 @@ class RecordingWriter:
         The recording to be; must not exist yet.
     made_by
         Program and person, for the manifest.
+    first_decides
+        Whether the first block decides about the sample type, instead of the unit: counts if it is
+        exactly counts, else engineering units.
 
     Raises
     ------
@@ -64,7 +68,9 @@ class RecordingWriter:
         If the folder exists, is being written by another, or cannot be made.
     """
 
-    def __init__(self, folder: Path, unit: RecordedUnit, made_by: str) -> None:
+    def __init__(
+        self, folder: Path, unit: RecordedUnit, made_by: str, *, first_decides: bool = False
+    ) -> None:
         self.unit = unit
         self.n_samples = 0
         self.n_blocks = 0
@@ -74,7 +80,8 @@ class RecordingWriter:
         self._calibration = unit.calibration
         self._progress = Progress()
         self._start_ns = 0
-        self._dtype = np.dtype(unit.sample_type)
+        self._first_decides = first_decides
+        self._samples_file: Any = None
         self._counts: list[RawArray] = []
         self._n_waiting = 0
         self._blocks: list[RawBlock] = []
@@ -82,7 +89,6 @@ class RecordingWriter:
             raise ConfigError(f"{folder}: is there already; a recording is never overwritten")
         with self._renamed_errors():
             self._aside.mkdir()
-            self._samples_file = samples_writer(self._aside / SAMPLES, unit)
             self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
 
     def __enter__(self) -> Self:
@@ -113,7 +119,9 @@ class RecordingWriter:
             If it is not of this unit's shape and rate or beyond the format's limits, or if the
             disk refuses it.
         """
-        _require_fit(raw, self.unit, self._dtype)
+        if self._first_decides:
+            self._decide(_type_of(raw))
+        _require_fit(raw, self.unit)
         n_samples = raw.counts.shape[1]
         progress = self._progress.after(raw.epoch, raw.first_index, n_samples, raw.rejected)
         if self.n_samples + n_samples > MAX_SAMPLES:
@@ -141,7 +149,9 @@ class RecordingWriter:
             As :meth:`write`, and if the block is not exactly samples of the recorded type with this
             calibration.
         """
-        self.write(raw_of(block, self._calibration, self._dtype))
+        if self._first_decides:
+            self._decide(_type_behind(block, self._calibration))
+        self.write(raw_of(block, self._calibration, np.dtype(self.unit.sample_type)))
 
     def finish(self) -> Manifest:
         """Bring everything to the disk and give the recording its name.
@@ -182,9 +192,15 @@ class RecordingWriter:
                 (self._aside / name).unlink(missing_ok=True)
             self._aside.rmdir()
 
+    def _decide(self, sample_type: SampleType) -> None:
+        self.unit = self.unit.model_copy(update={"sample_type": sample_type})
+        self._first_decides = False
+
     def _write_counts(self, n_samples: int) -> None:
         if n_samples == 0:
             return
+        if self._samples_file is None:
+            self._samples_file = samples_writer(self._aside / SAMPLES, self.unit)
         counts: Any = np.concatenate(self._counts, axis=1)
         self._samples_file.write_table(samples_table(counts[:, :n_samples], self.unit))
         rest = counts[:, n_samples:].copy()
@@ -196,8 +212,9 @@ class RecordingWriter:
             self._blocks = []
 
     def _close(self) -> None:
-        self._samples_file.close()
-        self._blocks_file.close()
+        for file in (self._samples_file, self._blocks_file):
+            if file is not None:
+                file.close()
 
     def _manifest(self) -> Manifest:
         return Manifest(
@@ -229,9 +246,24 @@ def recorded_file(path: Path) -> RecordedFile:
         )
 
 
-def _require_fit(raw: RawBlock, unit: RecordedUnit, dtype: npt.DTypeLike) -> None:
+def _type_of(raw: RawBlock) -> SampleType:
+    return "int16" if raw.counts.dtype == np.int16 else "float32"
+
+
+def _type_behind(block: SampleBlock, calibration: UnitCalibration) -> SampleType:
+    try:
+        return _type_of(raw_of(block, calibration))
+    except ConfigError:
+        return "float32"
+
+
+def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
     shape = (len(unit.channels), len(unit.channels), len(unit.slow_channels))
-    if (len(raw.counts), len(raw.ok), len(raw.slow)) != shape or raw.counts.dtype != dtype:
+    if (
+        len(raw.counts),
+        len(raw.ok),
+        len(raw.slow),
+    ) != shape or raw.counts.dtype != unit.sample_type:
         raise ConfigError(
             f"a block of {len(raw.counts)} channels and {len(raw.slow)} slow values as"
             f" {raw.counts.dtype}, to be recorded are {shape[0]} and {shape[2]} as"

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import cast
 
 from acquisition.block_grid import BlockGrid
 from acquisition.errors import ConfigError
@@ -21,7 +20,7 @@ from acquisition.importing.job import (
 from acquisition.importing.reading import Reading, reading
 from acquisition.importing.units import slow_conversion, waveform_factor
 from acquisition.raw import RawBlock
-from acquisition.recording.manifest import Manifest, SampleType, read_manifest
+from acquisition.recording.manifest import Manifest, read_manifest
 from acquisition.recording.writer import RecordingWriter
 from service.conversion import calibration_of
 from service.settings.import_mapping import (
@@ -99,8 +98,7 @@ def import_recording(
         first = next(blocks, None)
         if first is None:
             raise ConfigError(f"{path}: has no samples of unit {unit.id}")
-        recorded = recorded_unit(unit, cast(SampleType, first.counts.dtype.name))
-        with RecordingWriter(folder, recorded, made_by) as writer:
+        with RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True) as writer:
             for block in _chained(first, blocks):
                 writer.write(block if decoder else _with_all_slow(block, job, unit))
                 advanced(found.done)

@@ -1,15 +1,10 @@
 """What a recording says of the unit that it is of."""
 
-from acquisition.recording.manifest import (
-    RecordedChannel,
-    RecordedSlowChannel,
-    RecordedUnit,
-    SampleType,
-)
+from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from service.settings.units import UnitSettings
 
 
-def recorded_unit(unit: UnitSettings, sample_type: SampleType = "int16") -> RecordedUnit:
+def recorded_unit(unit: UnitSettings) -> RecordedUnit:
     """Channels and calibration of a unit as they stand in the manifest of its recordings."""
     return RecordedUnit(
         unit=unit.id,
@@ -26,6 +21,5 @@ def recorded_unit(unit: UnitSettings, sample_type: SampleType = "int16") -> Reco
             for channel in unit.channel
         ),
         slow_channels=tuple(RecordedSlowChannel(**slow.model_dump()) for slow in unit.slow_channel),
-        sample_type=sample_type,
         block_samples=unit.block_samples,
     )

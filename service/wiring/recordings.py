@@ -8,12 +8,7 @@ from acquisition.clock import Clock
 from acquisition.errors import ConfigError
 from acquisition.raw import RawFeed
 from acquisition.recording.feed import RecordedFeed
-from acquisition.recording.manifest import (
-    RecordedChannel,
-    RecordedSlowChannel,
-    RecordedUnit,
-    read_manifest,
-)
+from acquisition.recording.manifest import read_manifest
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.selection import Selection, select
 from acquisition.recording.source import RecordingSource
@@ -22,33 +17,18 @@ from acquisition.source import SampleSource
 from service.conversion import calibration_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
+from service.wiring.recorded_units import recorded_unit
 
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
-    """A recording of a unit, about to be written.
+    """A recording of a unit, about to be written; of counts if the first block is just that.
 
     Raises
     ------
     ConfigError
         If the folder exists or cannot be made.
     """
-    recorded = RecordedUnit(
-        unit=unit.id,
-        rate_hz=unit.rate_hz,
-        channels=tuple(
-            RecordedChannel(
-                id=channel.id,
-                measurand=channel.measurand,
-                full_scale_v=channel.full_scale_v,
-                unit_per_v=channel.unit_per_v,
-                ok_min_v=channel.ok_min_v,
-                ok_max_v=channel.ok_max_v,
-            )
-            for channel in unit.channel
-        ),
-        slow_channels=tuple(RecordedSlowChannel(**slow.model_dump()) for slow in unit.slow_channel),
-    )
-    return RecordingWriter(folder, recorded, made_by)
+    return RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True)
 
 
 def recording_of(folder: Path) -> Recording:

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from acquisition.calibration import calibrate
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.recording import reader, tables, writer
@@ -237,3 +238,20 @@ def test_samples_of_the_other_type_are_refused(
     with pytest.raises(ConfigError, match="as int16, to be recorded are 2 and 2 as float32"):
         recorder.write(numbered(0, 10))
     recorder.abandon()
+
+
+@pytest.mark.parametrize("is_calibrated", [True, False])
+@pytest.mark.parametrize("dtype", [np.int16, np.float32])
+def test_the_first_block_may_decide_what_is_recorded(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered, dtype: type, is_calibrated: bool
+) -> None:
+    block = numbered(0, 50, counts=np.arange(100).reshape(2, 50).astype(dtype))
+    with RecordingWriter(tmp_path / "run", unit, "x", first_decides=True) as recorder:
+        if is_calibrated:
+            recorder.write_calibrated(calibrate(block, unit.calibration))
+        else:
+            recorder.write(block)
+    opened = open_recording(tmp_path / "run")
+    assert opened.manifest.sample_type == np.dtype(dtype).name
+    (found,) = opened.raw_blocks()
+    np.testing.assert_array_equal(found.counts, block.counts)
