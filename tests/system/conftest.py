@@ -48,12 +48,18 @@ class Program:
         assert response.status_code == 200, response.text
         return response.json()
 
-    async def until(self, path: str, condition: Callable[[Any], bool]) -> Any:
+    async def until(
+        self,
+        path: str,
+        condition: Callable[[Any], bool],
+        within_s: float = PATIENCE_S,
+        **parameters: Any,
+    ) -> Any:
         """Ask the API until its answer is as wanted."""
         answer = None
         try:
-            async with asyncio.timeout(PATIENCE_S):
-                while not condition(answer := await self.get(path)):
+            async with asyncio.timeout(within_s):
+                while not condition(answer := await self.get(path, **parameters)):
                     await asyncio.sleep(0.1)
         except TimeoutError:
             raise AssertionError(f"{path} never came to be so; last: {answer}") from None

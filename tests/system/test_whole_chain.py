@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.simulated.scenario import (
     BearingScenario,
