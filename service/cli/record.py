@@ -1,29 +1,30 @@
 """`padwatch record`: the samples of one unit into a recording."""
 
 import asyncio
-import getpass
-import os
-import platform
+import random
 import signal
 import sys
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import uvloop
 
-from acquisition.clock import SystemClock
-from acquisition.errors import AcquisitionError
+from acquisition.clock import Clock, SystemClock
+from acquisition.errors import AcquisitionError, LinkError
 from acquisition.recording.writer import RecordingWriter
 from acquisition.source import SampleSource
+from service.cli.made_by import made_by
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
 from service.wiring.recordings import recording_of, recording_writer
 from service.wiring.sources import source_of
 
 MAX_SECONDS = 7 * 86_400.0
+
+RETRY_S = 0.5
+"""Longest wait before a lost link is tried again; as the service waits."""
 
 
 def record(
@@ -33,18 +34,24 @@ def record(
     seconds: Annotated[
         float, typer.Option(min=0.1, max=MAX_SECONDS, help="Length of the recording.")
     ] = 600.0,
+    reconnect: Annotated[
+        bool, typer.Option("--reconnect", help="Go on after a lost link; what it cost is a gap.")
+    ] = False,
     json_output: Annotated[
         bool, typer.Option("--json", help="Print the manifest instead of a sentence.")
     ] = False,
 ) -> None:
     """Record a unit's samples exactly as its DAQ delivers them.
 
-    Ctrl-C and SIGTERM end the recording early and keep it. So does a lost link, with exit code 1.
+    Ctrl-C and SIGTERM end the recording early and keep it. So does a lost link, with exit code 1,
+    unless --reconnect is given: then the recording ends when its length has passed.
     """
     settings = one_unit(read_plant_file(plant_file), unit, plant_file)
     try:
-        writer = recording_writer(settings, out, _made_by())
-        problem = uvloop.run(record_blocks(source_of(settings, SystemClock()), writer, seconds))
+        writer = recording_writer(settings, out, made_by())
+        clock = SystemClock()
+        patience = Patience(seconds, clock) if reconnect else None
+        problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, patience))
         manifest = recording_of(out).manifest
     except AcquisitionError as error:
         fail(f"padwatch record: {error}")
@@ -60,10 +67,33 @@ def record(
         fail(f"padwatch record: ended early: {problem}")
 
 
+class Patience:
+    """Waits before a lost link is tried again, until the recording should have ended."""
+
+    def __init__(self, seconds: float, clock: Clock) -> None:
+        self._clock = clock
+        self._deadline_s = clock.monotonic_s() + seconds
+
+    async def wait(self, error: LinkError) -> None:
+        """Wait a little; raises the error if there is no time left."""
+        if self._clock.monotonic_s() >= self._deadline_s:
+            raise error
+        # a share at random, as the service does, so that many recorders do not call together
+        await self._clock.sleep(RETRY_S * random.uniform(0.5, 1.0))  # noqa: S311  not a secret
+
+
 async def record_blocks(
-    source: SampleSource, writer: RecordingWriter, seconds: float
+    source: SampleSource,
+    writer: RecordingWriter,
+    seconds: float,
+    patience: Patience | None = None,
 ) -> str | None:
     """Record until enough has passed, SIGINT or SIGTERM comes, or the link is lost.
+
+    Parameters
+    ----------
+    patience
+        If the link is to be tried again when it is lost.
 
     Returns
     -------
@@ -75,7 +105,7 @@ async def record_blocks(
         If nothing at all could be recorded; then nothing is left behind.
     """
     with writer:
-        reading = asyncio.create_task(_read(source, writer, seconds))
+        reading = asyncio.create_task(_read(source, writer, seconds, patience))
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, reading.cancel)
@@ -89,22 +119,30 @@ async def record_blocks(
     return None
 
 
-async def _read(source: SampleSource, writer: RecordingWriter, seconds: float) -> None:
+async def _read(
+    source: SampleSource, writer: RecordingWriter, seconds: float, patience: Patience | None
+) -> None:
     on_terminal = sys.stderr.isatty()
     with typer.progressbar(
         length=round(seconds), label="Recording", file=sys.stderr, hidden=not on_terminal
     ) as bar:
-        async with source.connect() as blocks:
-            async for block in blocks:
-                writer.write_calibrated(block)
-                bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
-                if writer.duration_s >= seconds:
-                    return
+        while True:
+            try:
+                await _read_once(source, writer, seconds, bar)
+            except LinkError as error:
+                if patience is None:
+                    raise
+                await patience.wait(error)
+            else:
+                return
 
 
-def _made_by() -> str:
-    try:
-        person = getpass.getuser()
-    except (KeyError, OSError):  # a container's user need not have a name
-        person = f"user {os.getuid()}"
-    return f"padwatch {version('padwatch')}, {person} on {platform.node()}"[:200]
+async def _read_once(
+    source: SampleSource, writer: RecordingWriter, seconds: float, bar: Any
+) -> None:
+    async with source.connect() as blocks:
+        async for block in blocks:
+            writer.write_calibrated(block)
+            bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
+            if writer.duration_s >= seconds:
+                return

@@ -3,8 +3,8 @@
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from enum import StrEnum
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
 
 from acquisition.errors import ConfigError
 from acquisition.recording.export.arrow import CsvExporter, ParquetExporter
@@ -16,15 +16,23 @@ from acquisition.recording.manifest import Manifest
 from acquisition.recording.reader import Recording
 from acquisition.recording.tables import foreign_errors_of
 
-ExportFormat: TypeAlias = Literal["csv", "hdf5", "mdf4", "parquet", "tdms"]
-EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
+
+class ExportFormat(StrEnum):
+    """What a recording can be exported as."""
+
+    CSV = "csv"
+    HDF5 = "hdf5"
+    MDF4 = "mdf4"
+    PARQUET = "parquet"
+    TDMS = "tdms"
+
 
 _EXPORTERS: dict[ExportFormat, Callable[[Path, Manifest], Exporter]] = {
-    "csv": CsvExporter,
-    "hdf5": Hdf5Exporter,
-    "mdf4": Mdf4Exporter,
-    "parquet": ParquetExporter,
-    "tdms": TdmsExporter,
+    ExportFormat.CSV: CsvExporter,
+    ExportFormat.HDF5: Hdf5Exporter,
+    ExportFormat.MDF4: Mdf4Exporter,
+    ExportFormat.PARQUET: ParquetExporter,
+    ExportFormat.TDMS: TdmsExporter,
 }
 
 

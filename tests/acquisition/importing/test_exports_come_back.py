@@ -12,7 +12,7 @@ import pytest
 from acquisition.calibration import calibrate
 from acquisition.importing.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
 from acquisition.raw import RawBlock
-from acquisition.recording.export.writing import export_recording
+from acquisition.recording.export.writing import ExportFormat, export_recording
 from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.writer import RecordingWriter
@@ -105,7 +105,7 @@ def job_for(kind: Any) -> ImportJob:
 def test_every_block_is_the_same_to_the_last_bit(
     recording: Recording, tmp_path: Path, read: Callable[..., Any], kind: str
 ) -> None:
-    export_recording(recording, kind, tmp_path / "run.mf4")
+    export_recording(recording, ExportFormat(kind), tmp_path / "run.mf4")
     found = read(tmp_path / "run.mf4", job_for(kind))
     calibration = recording.manifest.calibration
     for again, before in itertools.zip_longest(found.blocks, recording.raw_blocks()):

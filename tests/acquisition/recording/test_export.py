@@ -14,7 +14,7 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
-from acquisition.recording.export.writing import EXPORT_FORMATS, export_recording
+from acquisition.recording.export.writing import ExportFormat, export_recording
 from acquisition.recording.manifest import RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.writer import RecordingWriter
@@ -54,7 +54,7 @@ def expected() -> np.ndarray:
 def test_csv_is_plain_text_with_units_in_its_headings(
     recording: Recording, expected: np.ndarray, tmp_path: Path
 ) -> None:
-    export_recording(recording, "csv", tmp_path / "run.csv")
+    export_recording(recording, ExportFormat.CSV, tmp_path / "run.csv")
     with (tmp_path / "run.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
     assert header == [
@@ -81,7 +81,7 @@ def test_csv_is_plain_text_with_units_in_its_headings(
 def test_parquet_has_units_in_its_metadata(
     recording: Recording, expected: np.ndarray, tmp_path: Path
 ) -> None:
-    export_recording(recording, "parquet", tmp_path / "run.parquet")
+    export_recording(recording, ExportFormat.PARQUET, tmp_path / "run.parquet")
     table = pq.read_table(tmp_path / "run.parquet")
     assert str(table.schema.field("time_utc").type) == "timestamp[ns, tz=UTC]"
     assert table.schema.field("c0").metadata[b"unit"] == b"um"
@@ -93,7 +93,7 @@ def test_parquet_has_units_in_its_metadata(
 def test_hdf5_has_a_dataset_for_each_channel(
     recording: Recording, expected: np.ndarray, tmp_path: Path
 ) -> None:
-    export_recording(recording, "hdf5", tmp_path / "run.h5")
+    export_recording(recording, ExportFormat.HDF5, tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5") as file:
         np.testing.assert_array_equal([file["c0"], file["c1"]], expected)
         np.testing.assert_array_equal(file["index"], INDEX)
@@ -106,14 +106,14 @@ def test_hdf5_has_a_dataset_for_each_channel(
 def test_tdms_and_mdf4_have_groups_with_their_own_times(
     recording: Recording, expected: np.ndarray, tmp_path: Path
 ) -> None:
-    export_recording(recording, "tdms", tmp_path / "run.tdms")
+    export_recording(recording, ExportFormat.TDMS, tmp_path / "run.tdms")
     with nptdms.TdmsFile.open(tmp_path / "run.tdms") as file:
         group = file["waveforms"]
         np.testing.assert_array_equal([group["c0"][:], group["c1"][:]], expected)
         assert group["c0"].properties["unit_string"] == "um"
         assert str(group["time_utc"][0]).startswith("2026-01-01T00:00:00.000000")
         np.testing.assert_array_equal(file["slow"]["slow0"][:], [45.0, 45.0, 46.0, 47.0, 45.0])
-    export_recording(recording, "mdf4", tmp_path / "run.mdf")
+    export_recording(recording, ExportFormat.MDF4, tmp_path / "run.mdf")
     with asammdf.MDF(tmp_path / "run.mdf") as mdf:
         assert mdf.header.start_time.isoformat() == "2026-01-01T00:00:00+00:00"
         found = [mdf.get(name).samples for name in ("c0", "c1")]
@@ -122,7 +122,7 @@ def test_tdms_and_mdf4_have_groups_with_their_own_times(
         np.testing.assert_array_equal(mdf.get("slow0").samples, [45.0, 45.0, 46.0, 47.0, 45.0])
 
 
-@pytest.mark.parametrize("kind", EXPORT_FORMATS)
+@pytest.mark.parametrize("kind", ExportFormat)
 def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
     tmp_path: Path, unit: RecordedUnit, numbered: Numbered, kind: str
 ) -> None:
@@ -140,12 +140,12 @@ def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
 def test_nothing_is_overwritten_or_left_half_done(recording: Recording, tmp_path: Path) -> None:
     (tmp_path / "there").write_text("precious")
     with pytest.raises(ConfigError, match="there: is there already"):
-        export_recording(recording, "csv", tmp_path / "there")
+        export_recording(recording, ExportFormat.CSV, tmp_path / "there")
     assert (tmp_path / "there").read_text() == "precious"
     with pytest.raises(ConfigError, match=r"out: .*No such file"):
-        export_recording(recording, "csv", tmp_path / "absent" / "out")
+        export_recording(recording, ExportFormat.CSV, tmp_path / "absent" / "out")
     (recording.folder / "samples.parquet").write_bytes(b"PAR1")
-    for kind in EXPORT_FORMATS:
+    for kind in ExportFormat:
         with pytest.raises(ConfigError, match="not a complete Parquet file"):
             export_recording(recording, kind, tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["recording", "there"]

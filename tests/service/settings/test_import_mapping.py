@@ -1,0 +1,105 @@
+"""A mapping file says everything, or is refused with line, key and fix."""
+
+from pathlib import Path
+
+import pytest
+
+from service.settings.import_mapping import ImportMapping
+from service.settings.toml_file import TomlFileError, load_toml
+
+CSV = """\
+format = "csv"
+
+[time]
+source = "column"
+column = "time"
+form = "iso8601"
+zone = "-03:00"
+
+[[channel]]
+id = "ujb_shaft_x"
+column = "UJB X"
+unit = "um"
+"""
+
+MDF = CSV.replace("csv", "mdf4").replace(
+    'source = "column"\ncolumn = "time"\nform = "iso8601"', 'source = "file"'
+)
+
+
+def refusal(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "map.toml"
+    path.write_text(text)
+    with pytest.raises(TomlFileError) as error:
+        load_toml(path, ImportMapping)
+    assert str(error.value).startswith(f"{path}:")
+    return str(error.value).removeprefix(str(path))
+
+
+@pytest.mark.parametrize("text", [CSV, MDF])
+def test_a_right_mapping_is_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "map.toml").write_text(text)
+    mapping = load_toml(tmp_path / "map.toml", ImportMapping)
+    assert mapping.channel[0].column == "UJB X"
+    assert mapping.time.zone == "-03:00"
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "says"),
+    [
+        (CSV, 'zone = "-03:00"\n', "", ":3: time.zone: Field required"),
+        (CSV, '"-03:00"', '"CET"', ":7: time.zone = 'CET': String should match pattern"),
+        (CSV, '"-03:00"', '"-15:00"', "time.zone = '-15:00': String should match"),
+        (CSV, 'format = "csv"', 'format = "wav"', ":1: format = 'wav': Input should be 'mdf4'"),
+        (CSV, 'format = "csv"', 'format = "tdms"', ":6: time.form: is only for csv, this is tdms"),
+        (CSV, '"column"\n', '"file"\n', ":4: time.source: csv has no time of its own; write"),
+        (CSV, 'form = "iso8601"\n', "", 'time.form: is needed for source "column"'),
+        (CSV, "iso8601", "elapsed_s", "time.start: is needed: what time counts from"),
+        (CSV, "iso8601", "timestamp", "time.form: is only for tdms, this is csv"),
+        (CSV, "zone = ", "start = 2026-01-01\nzone = ", "time.start"),
+        (CSV, "zone = ", "start = 2026-01-01T00:00:00\nzone = ", "time.start"),
+        (CSV, "zone = ", "start = 2026-01-01T00:00:00Z\nzone = ", "time.start: has no effect here"),
+        (CSV, 'unit = "um"', "", ":9: channel[1].unit: Field required"),
+        (
+            CSV,
+            'unit = "um"',
+            "unit = 3",
+            ":12: channel[1].unit = 3: Input should be a valid string",
+        ),
+        (
+            CSV,
+            'unit = "um"',
+            'unit = "um"\ngroup = "a"',
+            ":13: channel[1].group: csv has no groups",
+        ),
+        (CSV, 'unit = "um"', 'unit = "um"\ngain = 2', ":13: channel[1].gain = 2: Extra inputs"),
+        (CSV, "[[channel]]", "[[chanel]]", "chanel"),
+        (CSV, CSV[CSV.index("[[channel]]") :], "", "channel: needs at least one for csv"),
+        (CSV, "[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
+        (MDF, "[[channel]]", "[csv]\n[[channel]]", "csv: is for CSV files, this one is mdf4"),
+        (MDF, "mdf4", "tdms", ':5: time.zone: tdms is in UTC; write "UTC"'),
+        (MDF, "mdf4", "candump", "candump is in UTC"),
+        (MDF.replace("-03:00", "UTC"), "mdf4", "candump", "channel: are those of the DBC file for"),
+        (MDF, 'source = "file"', 'source = "start"', "time.start: is needed"),
+        (CSV, "[time]", "[time", "not TOML"),
+    ],
+)
+def test_a_wrong_mapping_is_refused_with_line_and_key(
+    tmp_path: Path, text: str, old: str, new: str, says: str
+) -> None:
+    assert old in text
+    assert says in refusal(tmp_path, text.replace(old, new, 1))
+
+
+def test_a_mapping_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    for content, words in (
+        (b"\xff\xfe", "not UTF-8 text at byte 0"),
+        (b"#" * 1_000_001, "larger than 1000000 bytes"),
+        (b"a = " + b"[" * 100_000, "not TOML"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(TomlFileError, match=words):
+            load_toml(path, ImportMapping)
+    with pytest.raises(TomlFileError, match="No such file"):
+        load_toml(tmp_path / "absent", ImportMapping)
