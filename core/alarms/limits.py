@@ -4,7 +4,10 @@ import math
 from dataclasses import dataclass
 
 from core.alarms.alarm import AlarmLevel, Condition, unknown
-from core.quality import Level, Reading, Reason
+from core.quality import Reading, Reason
+
+MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
+"""Doubts about a reading that may have made it too low: it was read beside its line."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,8 @@ class Limits:
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Condition:
     """Compare a reading with limits.
 
-    A doubtful reading may raise an alarm but not clear it. A shaft that does not turn has no
+    A reading at a speed that something contradicts may be too low: it can raise an alarm but not
+    clear it. A shaft that does not turn has no
     vibration to be judged: its alarms are suppressed, not returned, for it may be the speed that
     is wrong.
 
@@ -76,7 +80,7 @@ def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Conditio
         why = reading.quality.reason
         return unknown(why, why if why is Reason.STANDSTILL else None)
     level = limits.passed(reading.value, held)
-    if reading.quality.level is not Level.GOOD and (level or 0) < (held or 0):
+    if reading.quality.reason in MAYBE_TOO_LOW and (level or 0) < (held or 0):
         return unknown(reading.quality.reason)
     reason = "ok" if level is None else "above_limit"
     return Condition(level, value=reading.value, limit=limits.of(level), reason=reason)
