@@ -1,0 +1,288 @@
+"""`padwatch recording info|verify|export|import` as a user sees them."""
+
+import asyncio
+import json
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from acquisition.calibration import calibrate
+from acquisition.clock import SystemClock
+from acquisition.errors import LinkError
+from acquisition.raw import RawBlock
+from core.blocks import Rejection, SampleBlock
+from service.cli import recording as commands
+from service.cli.record import Patience, record_blocks
+from service.conversion import calibration_of
+from service.settings.loading import load_plant_file
+from service.settings.units import UnitSettings
+from service.wiring.recordings import recording_of, recording_writer
+from service.wiring.simulations import simulated_feed
+
+START_NS = 1_767_225_600_000_000_000
+
+
+def padwatch_recording(*arguments: object) -> Result:
+    return CliRunner().invoke(commands.app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def plant_path(plant_text: str, tmp_path: Path) -> Path:
+    path = tmp_path / "plant.toml"
+    path.write_text(plant_text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def unit(plant_path: Path) -> UnitSettings:
+    return load_plant_file(plant_path).unit[0]
+
+
+def raw_block(unit: UnitSettings, first_index: int, epoch: int = 1, **changes: object) -> RawBlock:
+    n_channels = len(unit.channel)
+    index = np.arange(first_index, first_index + 50)
+    values: dict[str, object] = {
+        "epoch": epoch,
+        "first_index": first_index,
+        "start_ns": START_NS + first_index * 10**7 // 6 // 1000 * 1000,
+        "rate_hz": 600.0,
+        "counts": (index + 1000 * np.arange(1, n_channels + 1)[:, np.newaxis]).astype(np.int16),
+        "ok": (True,) * n_channels,
+        "slow": tuple(20.0 + n for n in range(len(unit.slow_channel))),
+    }
+    return RawBlock(**(values | changes))
+
+
+@pytest.fixture
+def folder(unit: UnitSettings, tmp_path: Path) -> Path:
+    """A gap of 200 samples, of which 20 were rejected, a channel not OK, and a restart."""
+    with recording_writer(unit, tmp_path / "run", "a test") as writer:
+        writer.write(raw_block(unit, 0))
+        writer.write(raw_block(unit, 50, ok=(False,) + (True,) * (len(unit.channel) - 1)))
+        writer.write(raw_block(unit, 300, rejected=(Rejection("torn", 20),)))
+        late_ns = START_NS + 30_000_834_000
+        writer.write(raw_block(unit, 0, epoch=2, start_ns=late_ns))
+    return tmp_path / "run"
+
+
+def test_info_counts_gaps_rejections_and_restarts_exactly(folder: Path, unit: UnitSettings) -> None:
+    told = json.loads(padwatch_recording("info", folder, "--json").stdout)
+    assert (told["unit"], told["sample_type"], told["rate_hz"]) == ("U1", "int16", 600.0)
+    assert (told["samples"], told["offered"], told["gaps"], told["gap_samples"]) == (
+        200,
+        400,
+        1,
+        180,
+    )
+    assert told["gap_list"] == [
+        {"epoch": 1, "first_index": 100, "samples": 180, "end": "2026-01-01T00:00:00.500Z"}
+    ]
+    assert told["rejected"] == {"torn": 20}
+    assert told["epochs"] == [1, 2]
+    assert told["not_ok"] == {unit.channel[0].id: 50}
+    assert [c["id"] for c in told["channels"]] == [c.id for c in unit.channel]
+    assert told["channels"][0]["unit"] == "um"
+    assert len(told["files"]["samples.parquet"]["sha256"]) == 64
+
+
+def test_info_for_people_says_the_same(folder: Path) -> None:
+    result = padwatch_recording("info", folder)
+    assert result.exit_code == 0
+    for line in (
+        "  from         2026-01-01T00:00:00.000Z",
+        "  samples      200 of 400 per channel",
+        "  gaps         1, 180 samples",
+        "    180 samples from index 100, to 2026-01-01T00:00:00.500Z",
+        "  rejected     20 samples: torn",
+        "  restarts     1 of the device's sample count",
+        "  not OK       50 samples of ujb_shaft_x",
+    ):
+        assert f"{line}\n" in result.stdout
+
+
+def test_verify_reads_every_page(folder: Path) -> None:
+    result = padwatch_recording("verify", folder)
+    assert (result.exit_code, result.stdout) == (
+        0,
+        f"{folder}: sound, 200 samples of each channel\n",
+    )
+    assert json.loads(padwatch_recording("verify", folder, "--json").stdout) == {
+        "folder": str(folder),
+        "sound": True,
+        "samples": 200,
+    }
+
+
+@pytest.mark.parametrize("command", ["info", "verify"])
+def test_a_damaged_recording_is_one_sentence_and_exit_code_1(folder: Path, command: str) -> None:
+    content = bytearray((folder / "samples.parquet").read_bytes())
+    content[100] ^= 1
+    (folder / "samples.parquet").write_bytes(content)
+    result = padwatch_recording(command, folder)
+    assert (result.exit_code, result.stdout) == (1, "")
+    damaged = f"padwatch recording {command}: {folder}/samples.parquet: damaged: checksum"
+    assert result.stderr.startswith(damaged)
+    assert result.stderr.count("\n") == 1
+
+
+MAPPING = """\
+format = "{kind}"
+
+[time]
+source = "{source}"
+{time}
+zone = "UTC"
+"""
+
+TIMES = {
+    "csv": ("column", 'column = "time_utc"\nform = "iso8601"'),
+    "hdf5": ("column", 'column = "time_ns"\nform = "epoch_ns"'),
+    "tdms": ("column", 'column = "time_utc"\ngroup = "waveforms"\nform = "timestamp"'),
+    "mdf4": ("file", ""),
+}
+SLOW_TIMES = {
+    "hdf5": 'time_column = "slow/time_ns"\n',
+    "tdms": 'time_column = "time_utc"\ntime_group = "slow"\n',
+}
+UNITS = {"gap_um": "um", "velocity_mm_s": "mm/s", "acceleration_m_s2": "m/s2", "key_phase_v": "V"}
+
+
+def mapping_of(unit: UnitSettings, kind: str) -> str:
+    """As a user writes it who knows what padwatch exports."""
+    source, time = TIMES[kind]
+    text = MAPPING.format(kind=kind, source=source, time=time)
+    for channel in unit.channel:
+        name = f"{channel.id} [{UNITS[channel.measurand]}]" if kind == "csv" else channel.id
+        text += f'\n[[channel]]\nid = "{channel.id}"\ncolumn = "{name}"\n'
+        text += f'unit = "{UNITS[channel.measurand]}"\n'
+    for slow in unit.slow_channel:
+        name = f"{slow.id} [{slow.unit}]" if kind == "csv" else slow.id
+        name = f"slow/{name}" if kind == "hdf5" else name
+        text += f'\n[[slow_channel]]\nid = "{slow.id}"\ncolumn = "{name}"\nunit = "{slow.unit}"\n'
+        text += SLOW_TIMES.get(kind, "")
+    return text
+
+
+@pytest.mark.parametrize("kind", TIMES)
+def test_what_is_exported_can_be_imported_again(
+    folder: Path, plant_path: Path, unit: UnitSettings, tmp_path: Path, kind: str
+) -> None:
+    result = padwatch_recording("export", folder, "--format", kind, "--out", tmp_path / "run.mf4")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == f"{tmp_path}/run.mf4: 200 samples of each channel\n"
+    (tmp_path / "map.toml").write_text(mapping_of(unit, kind))
+    plain = ("--mapping", tmp_path / "map.toml", "--plant", plant_path, "--unit", "U1")
+    result = padwatch_recording(
+        "import", tmp_path / "run.mf4", *plain, "--out", tmp_path / "again", "--json"
+    )
+    assert (result.exit_code, result.stderr) == (0, "")
+    told = json.loads(result.stdout)
+    assert (told["samples"], told["gap_samples"], told["sample_type"]) == (200, 200, "float32")
+    calibration = calibration_of(unit)
+    before = [calibrate(raw, calibration) for raw in recording_of(folder).raw_blocks()]
+    after = [calibrate(raw, calibration) for raw in recording_of(tmp_path / "again").raw_blocks()]
+    for first, second in zip(before, after, strict=True):
+        assert (first.start_ns, first.first_index) == (second.start_ns, second.first_index)
+        assert first.slow == second.slow
+        good = [quality.level == 0 for quality in first.channel_quality]
+        assert any(good)
+        np.testing.assert_array_equal(first.samples[good], second.samples[good])
+        assert [quality.level == 0 for quality in second.channel_quality] == good
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "words"),
+    [
+        ('unit = "um"', 'unit = "mm/s"', 1, "channel ujb_shaft_x: unit 'mm/s' is none for gap_um"),
+        (
+            "ujb_shaft_x",
+            "ujb_shaft_z",
+            1,
+            "channel ujb_shaft_z is mapped, but unit U1 has ujb_shaft",
+        ),
+        (
+            'column = "ujb_shaft_x [um]"',
+            'column = "nope"',
+            1,
+            "column 'nope' is not there; the file",
+        ),
+        ('zone = "UTC"', "", 2, "time.zone: Field required"),
+        (
+            'unit = "r/min"',
+            'unit = "degF"',
+            1,
+            "unit 'degF' is none for r/min; known are r/min, Hz",
+        ),
+    ],
+)
+def test_a_mapping_that_does_not_fit_is_refused_and_leaves_nothing(
+    folder: Path,
+    plant_path: Path,
+    unit: UnitSettings,
+    tmp_path: Path,
+    old: str,
+    new: str,
+    code: int,
+    words: str,
+) -> None:
+    padwatch_recording("export", folder, "--format", "csv", "--out", tmp_path / "run.csv")
+    text = mapping_of(unit, "csv")
+    assert old in text
+    (tmp_path / "map.toml").write_text(text.replace(old, new, 1))
+    plain = ("--mapping", tmp_path / "map.toml", "--plant", plant_path, "--unit", "U1")
+    result = padwatch_recording("import", tmp_path / "run.csv", *plain, "--out", tmp_path / "again")
+    assert (result.exit_code, result.stdout) == (code, "")
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not list(tmp_path.glob("again*"))
+
+
+def test_nothing_that_exists_is_overwritten(folder: Path) -> None:
+    result = padwatch_recording("export", folder, "--format", "csv", "--out", folder)
+    assert result.exit_code == 1
+    assert "is there already; nothing is overwritten" in result.stderr
+
+
+class LosingSource:
+    """A simulated unit whose link is lost after every other block; what passes then is missed."""
+
+    def __init__(self, unit: UnitSettings) -> None:
+        self._feed = simulated_feed(unit, SystemClock())
+        self._calibration = calibration_of(unit)
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        async with aclosing(self._blocks()) as blocks:
+            yield blocks
+
+    async def _blocks(self) -> AsyncGenerator[SampleBlock]:
+        for _ in range(2):
+            await asyncio.sleep(0)
+            yield calibrate(self._feed.advance(50), self._calibration)
+        self._feed.advance(100)
+        raise LinkError("cable cut")
+
+
+async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
+    unit: UnitSettings, tmp_path: Path, stepped_clock
+) -> None:
+    writer = recording_writer(unit, tmp_path / "run", "a test")
+    patience = Patience(10.0, stepped_clock)
+    assert await record_blocks(LosingSource(unit), writer, 1.0, patience) is None
+    first = [block.first_index for block in recording_of(tmp_path / "run").raw_blocks()]
+    assert first == [0, 50, 200, 250, 400, 450, 600]
+
+
+async def test_a_link_that_stays_lost_ends_the_recording_when_its_time_has_passed(
+    unit: UnitSettings, tmp_path: Path, stepped_clock
+) -> None:
+    source = LosingSource(unit)
+    writer = recording_writer(unit, tmp_path / "run", "a test")
+    found = await record_blocks(source, writer, 3600.0, Patience(0.2, stepped_clock))
+    assert found == "cable cut"
+    assert recording_of(tmp_path / "run").manifest.n_samples == 200
