@@ -9,7 +9,7 @@ from cantools.errors import Error as CantoolsError
 from serial import SerialException
 
 from acquisition.can.settings import CanLinkSettings
-from acquisition.can.slcan import open_slcan
+from acquisition.can.slcan import SlcanBus, open_slcan
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 
 _ID_MASK = 0x1FFFFFFF
@@ -94,6 +94,7 @@ def _opened(settings: CanLinkSettings, ids: list[int] | None) -> can.BusABC:
 
 def _slcan_speed(settings: CanLinkSettings) -> dict[str, Any]:
     """Listen only unless an option says otherwise: some bus needs a second node to acknowledge."""
+    SlcanBus.require_speed(settings.bitrate, settings.data_bitrate)
     speed: dict[str, Any] = {}
     if "listen_only" not in settings.options:
         speed["listen_only"] = True

@@ -73,10 +73,9 @@ class CounterAxis:
             silence = self._elapsed(arrived_ns)
             if silence > min(_SILENCE_S * self._rate_hz, half):
                 return None
-            self._newest_ns = arrived_ns
         ahead = (counter - newest) % modulus
         if ahead <= min(self._near, half):
-            self.newest = newest + ahead
+            self.newest, self._newest_ns = newest + ahead, arrived_ns
             return newest + ahead
         behind = modulus - ahead
         return newest - behind if behind <= min(self._near, half // 2) else None

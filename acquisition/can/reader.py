@@ -162,18 +162,21 @@ class FrameReader:
 
     def _listen(self, bus: can.BusABC) -> None:
         while not self._stopping.is_set():
-            frames = self._received(bus)
-            if isinstance(bus, SlcanBus):
-                self._refused[Refusal.MALFORMED] += bus.take_n_malformed()
+            frames: list[Frame] = []
+            try:
+                self._receive(bus, frames)
+            finally:  # what came before the bus failed is good
+                if isinstance(bus, SlcanBus):
+                    self._refused[Refusal.MALFORMED] += bus.take_n_malformed()
+                if frames:
+                    self._hand_over(Batch(frames, self._clock.now_ns()))
             if frames:
-                self._hand_over(Batch(frames, self._clock.now_ns()))
                 self._stopping.wait(_REST_S)
             elif bus.state is can.BusState.ERROR:
                 raise LinkError(f"{self._where}: the interface says that it is in error")
 
-    def _received(self, bus: can.BusABC) -> list[Frame]:
-        """All frames that have come, after waiting for the first."""
-        frames: list[Frame] = []
+    def _receive(self, bus: can.BusABC, frames: list[Frame]) -> None:
+        """Take all frames that have come, after waiting for the first."""
         timeout_s = _RECEIVE_S
         while len(frames) < _MAX_BATCH and not self._stopping.is_set():
             message = self._next_message(bus, timeout_s)
@@ -183,7 +186,6 @@ class FrameReader:
             frame = self._gate.admit(message)
             if frame is not None:
                 frames.append(frame)
-        return frames
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
         """Next message, over what nobody can read; a bus that says nothing else is lost."""

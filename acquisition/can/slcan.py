@@ -25,7 +25,7 @@ from acquisition.can.error_frames import (
     RX_PASSIVE,
     TX_PASSIVE,
 )
-from acquisition.errors import FrameError
+from acquisition.errors import ConfigError, FrameError
 
 _MAX_LINE = 1 + 8 + 1 + 2 * 64
 _CHUNK_BYTES = 65536
@@ -95,6 +95,23 @@ class SlcanBus(slcanBus):
             self._skipping = True
         if self._skipping:
             self._rest = b""
+
+    @classmethod
+    def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
+        """Refuse speeds that the protocol has no word for.
+
+        Raises
+        ------
+        ConfigError
+            Naming those it has.
+        """
+        for name, speed, known in (
+            ("bitrate", bitrate, cls._BITRATES),
+            ("data_bitrate", data_bitrate, cls._DATA_BITRATES),
+        ):
+            if speed is not None and speed not in known:
+                words = ", ".join(str(n) for n in known if n)
+                raise ConfigError(f"slcan: {name} is {speed}, allowed are {words}")
 
     def take_n_malformed(self) -> int:
         """Lines since the last call that were neither a frame nor an answer."""

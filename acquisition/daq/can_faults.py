@@ -14,6 +14,8 @@ Item: TypeAlias = WireFrame | bytes
 
 _LONG_LINE = b"t100" + b"8" * 5000 + b"\r"
 _FOREIGN_ID = 0x7F0
+_FLOOD = 10
+"""Foreign frames before each of the device's own."""
 
 
 class FrameFaults:
@@ -37,7 +39,7 @@ class FrameFaults:
             "wrong_dlc": lambda frame: [shortened(frame)],
             "error_frame": lambda frame: [_bare(FrameKind.ERROR), frame],
             "bus_off": lambda _: [_bare(FrameKind.BUS_OFF)],
-            "flood": lambda frame: [self._foreign(), frame],
+            "flood": lambda frame: [*(self._foreign() for _ in range(_FLOOD)), frame],
             "rtr": lambda frame: [replace(frame, kind=FrameKind.REMOTE, data=b"", fd=False), frame],
             "extended_twin": lambda frame: [self._twin(frame), frame],
         }

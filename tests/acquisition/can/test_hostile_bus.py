@@ -1,0 +1,247 @@
+"""C1 to C10 over the real slcan wire: nothing false is accepted, what is lost is counted."""
+
+import asyncio
+import threading
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from acquisition.daq.can_device import CanDevice
+from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.errors import LinkError
+
+N_EACH = 200
+N_CHANNELS = 4
+LINE_FAULTS = ["non_hex_line", "long_line", "truncated_line"]
+LOSING = {
+    "drop": "incomplete_frames",
+    "wrong_dlc": "incomplete_frames",
+    "non_hex_line": "incomplete_frames",
+    "truncated_line": "incomplete_frames",
+    "reorder": "incomplete_frames",
+}
+COUNTED_AS = {
+    "repeat": "duplicate_frame",
+    "wrong_dlc": "wrong_length",
+    "reorder": "out_of_order_frame",
+    "error_frame": "error_frame",
+    "rtr": "remote_frame",
+    "extended_twin": "other_id_kind",
+    "non_hex_line": "malformed_line",
+    "long_line": "malformed_line",
+    "truncated_line": "malformed_line",
+}
+
+
+class Watch:
+    """Reads a source and checks that every sample is its own number."""
+
+    def __init__(self, stream) -> None:
+        self._stream = stream
+        self.lost: Counter[str] = Counter()
+        self.stop: int | None = None
+        self.blocks = []
+
+    async def up_to(self, stop_index: int) -> None:
+        while self.stop is None or self.stop < stop_index:
+            block = await anext(self._stream)
+            self.blocks.append(block)
+            index = np.arange(block.first_index, block.stop_index)
+            for c, samples in enumerate(block.samples):
+                np.testing.assert_array_equal(samples, (index + c) % 2**15)
+            if self.stop is not None:
+                rejected = Counter({r.reason: r.n_samples for r in block.rejected})
+                self.lost += rejected
+                self.lost["gap"] += block.first_index - self.stop - rejected.total()
+            self.stop = block.stop_index
+
+
+@pytest.fixture(params=[False, True], ids=["classic", "fd"])
+def shape(request, shape_of):
+    return shape_of(n_channels=12 if request.param else N_CHANNELS, fd=request.param)
+
+
+@pytest.fixture
+def device(shape, counting_feed):
+    return CanDevice(counting_feed(n_channels=len(shape.channels)), shape)
+
+
+@pytest.mark.parametrize("fault", sorted({*COUNTED_AS, "drop", "flood"}))
+async def test_two_hundred_of_each_fault_and_no_false_sample(fault, shape, device, source_of):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint, when_full="wait")
+        async with source.connect() as stream:
+            watch = Watch(stream)
+            await watch.up_to(50)
+            for n in range(1, N_EACH // 4 + 1):
+                server.inject(fault, 4)
+                server.produce(1)
+                await watch.up_to(0)
+                if n % 10 == 0:
+                    server.produce(2)
+                    await watch.up_to(device.ledger.n_samples("U1") - 50)
+            server.produce(2)
+            await watch.up_to(device.ledger.n_samples("U1"))
+    n_stored = sum(block.n_samples for block in watch.blocks)
+    assert n_stored + watch.lost.total() == device.ledger.n_samples("U1")
+    found = source.refused_frames
+    if fault in COUNTED_AS:
+        assert found == {COUNTED_AS[fault]: N_EACH}
+    else:
+        assert found == {}
+    lost = +watch.lost
+    if fault in LOSING:
+        assert set(lost) <= {"incomplete_frames", "gap", "wrong_length"}
+        assert 0 < lost.total() <= 2 * N_EACH * shape.samples_per_frame
+    else:
+        assert lost == Counter()
+
+
+async def test_thousands_of_seeded_losses_over_the_wire_are_exact(shape, device, source_of):
+    random = np.random.default_rng(20261121)
+    n_losses, n_expected = 0, 0
+    n_waves = len(shape.waves)
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint, when_full="wait")
+        async with source.connect() as stream:
+            watch = Watch(stream)
+            await watch.up_to(50)
+            while n_losses < 2000:
+                for _ in range(20):
+                    n_instants = int(random.integers(0, 50 // shape.samples_per_frame))
+                    server.inject("drop", n_instants * n_waves)
+                    n_losses += n_instants
+                    n_expected += n_instants * shape.samples_per_frame
+                    server.produce(1)
+                server.produce(1)
+                await watch.up_to(device.ledger.n_samples("U1"))
+    assert watch.lost == Counter({"gap": n_expected})
+    assert sum(b.n_samples for b in watch.blocks) + n_expected == device.ledger.n_samples("U1")
+    assert len({block.epoch for block in watch.blocks}) == 1
+
+
+async def test_a_flood_of_foreign_ids_at_ten_times_the_rate_loses_nothing(shape, device, source_of):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint)
+        async with source.connect() as stream:
+            watch = Watch(stream)
+            server.inject("flood", 40 * 50 * len(shape.waves))
+            for _ in range(40):
+                server.produce(1)
+            await watch.up_to(40 * 50)
+    assert watch.lost.total() == 0
+    assert source.refused_frames == {}
+
+
+async def test_bus_off_is_a_lost_link_at_once_and_reopening_restarts_the_controller(
+    shape, device, source_of
+):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint, stale_after_s=1000.0)
+        async with source.connect() as stream:
+            await Watch(stream).up_to(50)
+            server.inject("bus_off")
+            server.produce(1)
+            with pytest.raises(LinkError, match="bus-off"):
+                await Watch(stream).up_to(10_000)
+        async with source.connect() as stream:
+            server.produce(3)
+            watch = Watch(stream)
+            await watch.up_to(device.ledger.n_samples("U1"))
+    assert watch.blocks[-1].epoch == 7
+
+
+async def test_a_device_that_repeats_itself_for_ever_is_stale(shape, device, source_of):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint, stale_after_s=0.3)
+        async with source.connect() as stream:
+            await Watch(stream).up_to(50)
+            server.inject("freeze", 30)
+            for _ in range(30):
+                server.produce(1)
+            with pytest.raises(LinkError, match=r"no complete sample for .* duplicate_frame"):
+                await anext(stream)
+
+
+async def test_a_restarted_device_begins_a_new_epoch(shape, device, source_of):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint)
+        async with source.connect() as stream:
+            await Watch(stream).up_to(50)
+            server.produce(3)
+            server.inject("reset_epoch")
+            server.produce(2)
+            blocks = [await anext(stream) for _ in range(5)]
+    assert [(b.epoch, b.first_index) for b in blocks] == [
+        (7, 50),
+        (7, 100),
+        (7, 150),
+        (8, 0),
+        (8, 50),
+    ]
+
+
+async def test_a_cut_cable_is_a_lost_link_and_the_gap_is_exact(shape, device, source_of):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint)
+        async with source.connect() as stream:
+            await Watch(stream).up_to(50)
+            server.inject("cut")
+            with pytest.raises(LinkError, match=r"socket|disconnected"):
+                await anext(stream)
+        server.produce(100)  # the device's buffer holds 64
+        async with source.connect() as stream:
+            block = await anext(stream)
+    assert (block.epoch, block.first_index) == (7, 37 * 50)
+    np.testing.assert_array_equal(block.samples[0], np.arange(37 * 50, 38 * 50))
+
+
+async def test_an_unplugged_serial_adapter_comes_back_without_a_thread_left(
+    tmp_path, shape, device, source_of
+):
+    async with SlcanPtyServer(device, link=tmp_path / "adapter") as server:
+        source = source_of(shape, server.endpoint, options={"sleep_after_open": 0.0})
+        for n in range(1, 6):
+            async with source.connect() as stream:
+                server.produce(1)
+                await Watch(stream).up_to(50 * n)
+                server.inject("cut")
+                with pytest.raises(LinkError):
+                    await Watch(stream).up_to(1_000_000)
+            assert not any(t.name.startswith("can ") for t in threading.enumerate())
+
+
+async def test_padwatch_sends_nothing_but_open_and_close(shape, device, source_of):
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint)
+        for _ in range(2):
+            async with source.connect() as stream:
+                server.produce(1)
+                await anext(stream)
+        while server.commands["C"] < 2:
+            await asyncio.sleep(0)
+    assert set(server.commands) == {"L", "C"}
+
+
+async def test_a_stalled_reader_drops_frames_counts_them_and_finds_the_gap(
+    shape, device, source_of
+):
+    """C7: the event loop is busy while frames keep coming; a bounded queue takes what it can."""
+    async with SlcanTcpServer(device) as server:
+        source = source_of(shape, server.endpoint, queue_frames=500)
+        async with source.connect() as stream:
+            watch = Watch(stream)
+            await watch.up_to(50)
+            while not source.refused_frames.get("queue_overflow"):
+                server.produce(1)
+                await asyncio.sleep(0.001)  # lets the DAQ send; the stream is not read
+            while source.refused_frames:
+                before = source.refused_frames["queue_overflow"]
+                server.produce(3)
+                await watch.up_to(device.ledger.n_samples("U1"))
+                if source.refused_frames["queue_overflow"] == before:
+                    break
+    assert watch.lost.total() > 0
+    n_stored = sum(block.n_samples for block in watch.blocks)
+    assert n_stored + watch.lost.total() == device.ledger.n_samples("U1")
