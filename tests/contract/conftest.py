@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator
 import pytest
 from rigs.can import CanFdRig, CanRig
 from rigs.modbus import ModbusRig, ModbusRtuRig
-from rigs.recording import RecordingRig
+from rigs.recording import RecordingRig, UnitsRecordingRig
 from rigs.registers import (
     ChannelFifoTcpRig,
     FifoRtuRig,
@@ -35,7 +35,7 @@ WIRED = [
     FifoRtuRig,
     ChannelFifoTcpRig,
 ]
-ALL = [*WIRED, SimulatedRig, RecordingRig]
+ALL = [*WIRED, SimulatedRig, RecordingRig, UnitsRecordingRig]
 
 
 @pytest.fixture(params=ALL, ids=lambda kind: kind.__name__)

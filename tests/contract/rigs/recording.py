@@ -1,6 +1,7 @@
 """A recording of a counting plant."""
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
@@ -20,11 +21,15 @@ class RecordingRig:
         self.step_samples = 50
         self.source: SampleSource
 
+    sample_type = "int16"
+
     async def __aenter__(self) -> "RecordingRig":
         folder = Path(self._parent.name) / "recording"
-        with RecordingWriter(folder, recorded(self._calibration), "contract suite") as writer:
+        unit = recorded(self._calibration).model_copy(update={"sample_type": self.sample_type})
+        with RecordingWriter(folder, unit, "contract suite") as writer:
             for _ in range(400):
-                writer.write(self._feed.advance(self.step_samples))
+                raw = self._feed.advance(self.step_samples)
+                writer.write(replace(raw, counts=raw.counts.astype(self.sample_type)))
         self.source = RecordingSource(open_recording(folder), self._clock, speed=1.0)
         return self
 
@@ -33,6 +38,12 @@ class RecordingRig:
 
     def run(self, n_samples: int) -> None:
         self._clock.step(n_samples / self._calibration.rate_hz)
+
+
+class UnitsRecordingRig(RecordingRig):
+    """The same in engineering units, as from a device that has no counts."""
+
+    sample_type = "float32"
 
 
 def recorded(calibration) -> RecordedUnit:
