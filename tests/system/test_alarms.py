@@ -1,0 +1,150 @@
+"""A probe is lost before the eyes of the running service, and nothing makes it forget that."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.raw import RawBlock, RawFeed
+from acquisition.recording.reader import open_recording
+from service.settings.loading import load_plant_file
+from service.wiring.simulations import simulated_feed
+
+Start = Callable[..., Awaitable[Any]]
+
+PROBE = "U1:ujb_shaft_x:channel_not_ok"
+LINK = "U1:link:link_lost"
+
+SETTINGS = """
+[alarms]
+channel_on_delay_s = 0.5
+link_lost_after_s = 1.0
+
+[capture]
+pre_s = 1.5
+post_s = 2.0
+max_s = 10.0
+
+[[unit]]"""
+
+
+class BreakableFeed:
+    """A simulated machine whose first probe fails when told, and a copy of all it has delivered."""
+
+    def __init__(self, feed: RawFeed) -> None:
+        self._feed = feed
+        self.is_broken = False
+        self.delivered: list[RawBlock] = []
+
+    def advance(self, n_samples: int) -> RawBlock:
+        raw = self._feed.advance(n_samples)
+        if self.is_broken:
+            raw = replace(raw, ok=(False, *raw.ok[1:]))
+        self.delivered.append(raw)
+        return raw
+
+    def counts(self, first_index: int, n_samples: int) -> Any:
+        """What was delivered of these samples."""
+        found = np.concatenate([raw.counts for raw in self.delivered], axis=1)
+        start = first_index - self.delivered[0].first_index
+        return found[:, start : start + n_samples]
+
+
+@asynccontextmanager
+async def plugged_in(feed: RawFeed) -> AsyncIterator[int]:
+    """A DAQ with this machine behind it, at its own pace; the port it listens on."""
+    async with ModbusRingServer(RingDevice(feed), SystemClock()) as server:
+        running = asyncio.create_task(server.run())
+        try:
+            yield server.port
+        finally:
+            running.cancel()
+            with suppress(asyncio.CancelledError):
+                await running
+
+
+def write_plant(path: Path, demo_file: Path, port: int, folder: Path) -> Path:
+    head, unit = demo_file.read_text(encoding="utf-8").split("[[unit]]")[:2]
+    text = head.replace("var/demo", str(folder)) + SETTINGS + unit
+    path.write_text(text.replace("port = 0", f"port = {port}"), encoding="utf-8")
+    return path
+
+
+def by_id(answer: Any) -> dict[str, Any]:
+    return {alarm["id"]: alarm for alarm in answer["alarms"]}
+
+
+@pytest.mark.slow
+async def test_a_lost_probe_outlives_a_lost_link_and_kill_9(
+    start: Start, tmp_path: Path, demo_file: Path
+) -> None:
+    folder = tmp_path / "data"
+    feed = BreakableFeed(simulated_feed(load_plant_file(demo_file).unit[0], SystemClock()))
+    async with plugged_in(feed) as port:
+        plant = write_plant(tmp_path / "plant.toml", demo_file, port, folder)
+        service = await start("run", str(plant), "--port", "0")
+        await service.wait_for_url()
+        await service.until("/api/v1/units/U1", lambda u: u["source"]["n_stored"] > 2000)
+        assert (await service.get("/api/v1/alarms"))["alarms"] == []
+
+        feed.is_broken = True
+        lost = await service.until("/api/v1/alarms", lambda a: PROBE in by_id(a))
+        overview = await service.until("/api/v1/overview", lambda o: o["captures"]["n_written"])
+
+    assert by_id(lost)[PROBE]["state"] == "unacknowledged"
+    assert by_id(lost)[PROBE]["condition_reason"] == "sensor_failure"
+    assert overview["captures"]["error"] is None
+    check_capture(folder / "captures", feed)
+
+    silent = await service.until("/api/v1/alarms", lambda a: LINK in by_id(a))
+    probe = by_id(silent)[PROBE]
+    assert (probe["state"], probe["is_active"]) == ("unacknowledged", True)
+    assert (probe["condition"], probe["condition_reason"]) == ("unknown", "not_connected")
+    before = (await service.get("/api/v1/alarms/events"))["events"]
+    service.kill()
+    await service.process.wait()
+
+    again = await start("run", str(plant), "--port", "0")
+    await again.wait_for_url()
+    restored = by_id(await again.get("/api/v1/alarms"))
+    assert restored[PROBE]["raised"] == probe["raised"]
+    assert (restored[PROBE]["state"], restored[PROBE]["occurrence"]) == ("unacknowledged", 1)
+    assert restored[PROBE]["condition"] == "unknown"
+    assert restored[LINK]["is_active"]
+    async with httpx2.AsyncClient(base_url=again.url, trust_env=False) as client:
+        body = {"actor": "A. Name", "occurrence": 1}
+        answer = await client.post(f"/api/v1/alarms/{PROBE}/acknowledge", json=body)
+    assert answer.json()["state"] == "acknowledged"
+    after = (await again.get("/api/v1/alarms/events"))["events"]
+    assert after[-len(before) :] == before  # nothing lost, nothing changed
+    of_probe = [e for e in reversed(after) if e["alarm"] == PROBE]
+    assert [e["number"] for e in of_probe] == list(range(1, len(of_probe) + 1))
+    assert [e["change"] for e in of_probe] == ["raised", "condition_unknown", "acknowledged"]
+    assert await again.end() == 0
+    assert "Traceback" not in service.errors + again.errors
+
+
+def check_capture(captures: Path, feed: BreakableFeed) -> None:
+    """One recording, bit for bit what the device delivered from before the fault to after it."""
+    [path] = captures.iterdir()
+    recording = open_recording(path)
+    assert f"alarm {PROBE} occurrence 1" in recording.manifest.made_by
+    blocks = list(recording.raw_blocks())
+    for raw in blocks:
+        n_samples = raw.counts.shape[1]
+        assert np.array_equal(raw.counts, feed.counts(raw.first_index, n_samples))
+    ok = [raw.ok[0] for raw in blocks]
+    n_before, n_after = ok.count(True), ok.count(False)
+    assert ok == [True] * n_before + [False] * n_after
+    # a block is a twelfth of a second: 1.5 s before the alarm, of which 0.5 s is its delay
+    assert 10 <= n_before <= 13
+    assert 29 <= n_after <= 33
