@@ -78,6 +78,11 @@ class ByteOrder(StrEnum):
         """Whether the first byte of a register is the least significant."""
         return self in (ByteOrder.BADC, ByteOrder.DCBA)
 
+    @property
+    def pair(self) -> str:
+        """The same of a single register: "AB" or "BA"."""
+        return "BA" if self.low_byte_first else "AB"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:

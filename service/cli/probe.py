@@ -1,0 +1,208 @@
+"""`padwatch probe`: what a Modbus device has in its registers, before anything is stored."""
+
+import asyncio
+import json
+from collections.abc import Coroutine, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+from pydantic import ValidationError
+
+from acquisition.errors import AcquisitionError
+from acquisition.registers.cells import ByteOrder
+from service.cli.plant_file import fail, read_plant_file
+from service.cli.units import UnitOption, one_unit
+from service.probing import RegisterLook, ValueLook, looks, value_looks
+from service.settings.map_file import MapFileError, load_map_file
+from service.settings.modbus_link import ModbusLinkSettings
+from service.settings.modbus_map import RegisterMapSettings
+from service.settings.modbus_sources import MappedDeviceSettings
+from service.settings.units import UnitSettings
+from service.wiring.probes import identify_once, read_map_once, read_once
+
+app = typer.Typer(
+    no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."
+)
+
+MAX_COUNT = 1000
+BIT_FUNCTIONS = (1, 2)
+RTU_PREFIX = "/"
+SINGLES = ("int16", "uint16")
+
+Result = TypeVar("Result")
+DevicePlace = Annotated[
+    str,
+    typer.Argument(help="HOST[:PORT], or the path of a serial port.", metavar="HOST[:PORT]|/dev/…"),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+UnitIdOption = Annotated[int, typer.Option("--unit-id", min=1, max=255, help="Modbus unit id.")]
+TimeoutOption = Annotated[float, typer.Option(min=0.05, max=60.0, help="Wait for a reply, s.")]
+BaudOption = Annotated[int, typer.Option(help="Bits per second of a serial port.")]
+ParityOption = Annotated[str, typer.Option(help='"none", "even" or "odd" of a serial port.')]
+
+
+@app.command()
+def modbus(
+    device: DevicePlace,
+    address: Annotated[int, typer.Option(min=0, max=65535, help="First register, from 0.")],
+    count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="How many.")] = 10,
+    function: Annotated[int, typer.Option(min=1, max=4, help="Function code 1 to 4.")] = 3,
+    unit_id: UnitIdOption = 1,
+    timeout_s: TimeoutOption = 1.0,
+    baudrate: BaudOption = 115_200,
+    parity: ParityOption = "even",
+    json_output: JsonOption = False,
+) -> None:
+    """Print registers raw, and read in every type and byte order.
+
+    A float between 0.001 and 1,000,000 is marked: in its byte order the map may be right.
+    """
+    place = _place(device, unit_id, timeout_s, baudrate, parity)
+    data = _done(read_once(place, function, address, count))
+    if function in BIT_FUNCTIONS:
+        bits = [data[n // 8] >> n % 8 & 1 for n in range(count)]
+        rows: list[Any] = [{"address": address + n, "bit": bit} for n, bit in enumerate(bits)]
+        lines = [f"{row['address']:>6} {row['bit']}" for row in rows]
+    else:
+        found = looks(data, address)
+        rows, lines = [asdict(look) for look in found], list(_register_table(found))
+    typer.echo(json.dumps(rows, indent=1) if json_output else "\n".join(lines))
+
+
+@app.command("map")
+def map_(
+    file: Annotated[Path, typer.Argument(help="A plant file, or with --at a register map.")],
+    unit: UnitOption = None,
+    at: Annotated[
+        str | None, typer.Option(help="HOST[:PORT] or /dev/…: try a register map there.")
+    ] = None,
+    slow: Annotated[bool, typer.Option(help="The unit's slow_source instead.")] = False,
+    unit_id: UnitIdOption = 1,
+    timeout_s: TimeoutOption = 1.0,
+    baudrate: BaudOption = 115_200,
+    parity: ParityOption = "even",
+    json_output: JsonOption = False,
+) -> None:
+    """Read a configured map once; print each value with its unit, raw registers and flags."""
+    if at is None:
+        settings = one_unit(read_plant_file(file), unit, file)
+        device = _mapped_device(settings, slow)
+        units, registers = _units_of(settings), device.registers
+        place: ModbusLinkSettings = device
+    else:
+        units, registers = {}, _map_of(file).register_map()
+        place = _place(at, unit_id, timeout_s, baudrate, parity)
+    found = value_looks(*_done(read_map_once(place, registers)))
+    if json_output:
+        rows = [asdict(look) | {"unit": _unit(look, units)} for look in found]
+        typer.echo(json.dumps(rows, indent=1))
+    else:
+        typer.echo("\n".join(_value_table(found, units)))
+
+
+@app.command()
+def identity(
+    device: DevicePlace,
+    unit_id: UnitIdOption = 1,
+    timeout_s: TimeoutOption = 1.0,
+    baudrate: BaudOption = 115_200,
+    parity: ParityOption = "even",
+    json_output: JsonOption = False,
+) -> None:
+    """Print vendor, product code and revision that a device gives by function 43/14."""
+    place = _place(device, unit_id, timeout_s, baudrate, parity)
+    found = asdict(_done(identify_once(place)))
+    lines = [f"{name.replace('_', ' ')}: {text}" for name, text in found.items()]
+    typer.echo(json.dumps(found) if json_output else "\n".join(lines))
+
+
+def _done(look: Coroutine[Any, Any, Result]) -> Result:
+    try:
+        return asyncio.run(look)
+    except AcquisitionError as error:
+        fail(f"padwatch probe: {error}")
+
+
+def _place(
+    device: str, unit_id: int, timeout_s: float, baudrate: int, parity: str
+) -> ModbusLinkSettings:
+    """Where a device is, or end with exit code 2."""
+    given: dict[str, Any] = {"device_id": unit_id, "timeout_s": timeout_s}
+    if device.startswith(RTU_PREFIX):
+        given |= {"device": device, "baudrate": baudrate, "parity": parity}
+    else:
+        host, colon, port = device.rpartition(":")
+        given |= {"host": host if colon else device}
+        given |= {"port": port} if colon else {}
+    try:
+        return ModbusLinkSettings.model_validate(given)
+    except ValidationError as error:
+        what = error.errors()[0]
+        key = what["loc"][-1] if what["loc"] else "device"
+        fail(f"padwatch probe: {device}: {key}: {what['msg']}", code=2)
+
+
+def _map_of(path: Path) -> RegisterMapSettings:
+    try:
+        return load_map_file(path)
+    except MapFileError as error:
+        fail(str(error), code=2)
+
+
+def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
+    """The device of a unit that has a register map, or end with exit code 2."""
+    device = getattr(unit, "slow_source", None) if slow else unit.source
+    if not isinstance(device, MappedDeviceSettings):
+        key = "slow_source" if slow else "source"
+        fail(f"padwatch probe: the {key} of unit {unit.id} has no register map", code=2)
+    return device
+
+
+def _units_of(unit: UnitSettings) -> dict[str, str]:
+    """In which unit each channel is read."""
+    waveforms = {c.id: c.measurand.value.partition("_")[2] for c in unit.channel}
+    return waveforms | {c.id: c.unit for c in unit.slow_channel}
+
+
+def _unit(look: ValueLook, units: dict[str, str]) -> str:
+    channel, _, part = look.id.partition(".")
+    unit = units.get(channel, "")
+    if part.endswith("phase"):
+        return "deg lead"
+    return f"{unit} pk" if part.endswith("amplitude") or part == "overall" else unit
+
+
+def _register_table(found: list[RegisterLook]) -> Iterator[str]:
+    yield (
+        f"{'address':>7} {'raw':>7} {'order':>6} {'int16':>7} {'uint16':>7}"
+        f" {'int32':>12} {'uint32':>11} {'float32':>14}"
+    )
+    for look in found:
+        for n, order in enumerate(ByteOrder):
+            where = f"{look.address:>7}  {look.raw:#06x}" if n == 0 else " " * 15
+            single = " ".join(f"{look.singles[f'{t} {order.pair}']:>7}" for t in SINGLES)
+            yield f"{where} {order:>6} {single}{_pair(look, order)}".rstrip()
+
+
+def _pair(look: RegisterLook, order: str) -> str:
+    if not look.pairs:
+        return ""
+    int32, uint32, float32 = (look.pairs[name][order] for name in ("int32", "uint32", "float32"))
+    shown = "nan" if float32 is None else f"{float32:.7g}"
+    mark = " *" if order in look.plausible else ""
+    return f" {int32:>12} {uint32:>11} {shown:>14}{mark}"
+
+
+def _value_table(found: list[ValueLook], units: dict[str, str]) -> Iterator[str]:
+    width = max(len(look.id) for look in found)
+    for look in found:
+        number = "none" if look.value is None else f"{look.value:.6g}"
+        raw = " ".join(f"{word:#06x}" for word in look.registers)
+        flags = " ".join(f"{at}={word:#06x}" for at, word in look.flags.items())
+        where = f"{look.function}:{look.address} {raw}"
+        yield (
+            f"{look.id:<{width}} {number:>12} {_unit(look, units):<8} {look.state:<8}"
+            f" [{where}] {flags}".rstrip()
+        )

@@ -1,0 +1,141 @@
+"""Looking into a Modbus device before anything of it is believed or stored."""
+
+import math
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from acquisition.registers.cells import N_BYTES, ByteOrder, Cell, NumberType
+from acquisition.registers.decoding import MapDecoder, byte_permutation
+from acquisition.registers.register_map import MapValue
+
+PLAUSIBLE = (1e-3, 1e6)
+"""Absolute values of a float that a machine may have; anything else is likely another type or byte
+order. Exact zero is neither."""
+
+FORMATS = {
+    NumberType.INT16: ">h",
+    NumberType.UINT16: ">H",
+    NumberType.INT32: ">i",
+    NumberType.UINT32: ">I",
+    NumberType.FLOAT32: ">f",
+}
+PAIR_TYPES = (NumberType.INT32, NumberType.UINT32, NumberType.FLOAT32)
+
+
+@dataclass(frozen=True)
+class RegisterLook:
+    """One register and what it may be.
+
+    Parameters
+    ----------
+    singles
+        int16 and uint16, bytes as they come and exchanged, by name.
+    pairs
+        With the next register: each type in each byte order; empty for the last one.
+    plausible
+        Byte orders in which the pair is a float that a machine may have.
+    """
+
+    address: int
+    raw: int
+    singles: dict[str, int]
+    pairs: dict[str, dict[str, float | int | None]]
+    plausible: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ValueLook:
+    """One value of a map.
+
+    Parameters
+    ----------
+    registers
+        Raw words of its own number; a single bit of functions 1 and 2 is 0 or 1.
+    flags
+        Status registers that speak of it, by address.
+    """
+
+    id: str
+    address: int
+    function: int
+    registers: tuple[int, ...]
+    value: float | None
+    state: str
+    flags: dict[int, int]
+
+
+def looks(data: bytes, address: int) -> list[RegisterLook]:
+    """Read each register in every way.
+
+    Parameters
+    ----------
+    data
+        Big-endian words.
+    address
+        Of the first one.
+    """
+    return [_look(data[2 * n : 2 * n + 4], address + n) for n in range(len(data) // 2)]
+
+
+def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
+    """Show every value of a map with the registers that it came from."""
+    reading = decoder.read(content)
+    return [
+        ValueLook(
+            id=value.id,
+            address=value.cell.address,
+            function=value.cell.function,
+            registers=_words(decoder, content, value.cell),
+            value=float(number) if math.isfinite(number) else None,
+            state=state.name.lower(),
+            flags=dict(_flags(decoder, content, value)),
+        )
+        for value, number, state in zip(
+            decoder.map.values, reading.values, reading.states, strict=True
+        )
+    ]
+
+
+def _look(data: bytes, address: int) -> RegisterLook:
+    singles = {
+        f"{type_} {order.pair}": int(_number(data[:2], type_, order))
+        for order in (ByteOrder.ABCD, ByteOrder.BADC)
+        for type_ in (NumberType.INT16, NumberType.UINT16)
+    }
+    pairs: dict[str, dict[str, float | int | None]] = {}
+    plausible: tuple[str, ...] = ()
+    if len(data) == N_BYTES[NumberType.FLOAT32]:
+        pairs = {
+            type_.value: {order.value: _shown(_number(data, type_, order)) for order in ByteOrder}
+            for type_ in PAIR_TYPES
+        }
+        floats = pairs[NumberType.FLOAT32.value]
+        plausible = tuple(order for order, number in floats.items() if _is_plausible(number))
+    return RegisterLook(address, int.from_bytes(data[:2], "big"), singles, pairs, plausible)
+
+
+def _number(data: bytes, type_: NumberType, order: ByteOrder) -> float:
+    straight = bytes(data[place] for place in byte_permutation(type_, order))
+    number: float = struct.unpack(FORMATS[type_], straight)[0]
+    return number
+
+
+def _shown(number: float) -> float | int | None:
+    return number if math.isfinite(number) else None
+
+
+def _is_plausible(number: float | None) -> bool:
+    return number is not None and PLAUSIBLE[0] <= abs(number) <= PLAUSIBLE[1]
+
+
+def _words(decoder: MapDecoder, content: bytes, cell: Cell) -> tuple[int, ...]:
+    start = decoder.plan.byte_of(cell)
+    if cell.function in (1, 2):
+        return (content[start] >> decoder.plan.bit_of(cell) & 1,)
+    return struct.unpack_from(f">{cell.n_places}H", content, start)
+
+
+def _flags(decoder: MapDecoder, content: bytes, value: MapValue) -> Iterator[tuple[int, int]]:
+    for flag in value.flags:
+        yield flag.cell.address, _words(decoder, content, flag.cell)[0]

@@ -1,0 +1,78 @@
+"""One look into a Modbus device: connect, read once, leave."""
+
+from acquisition.modbus.identification import Identification
+from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.map_reader import MapReader
+from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.wrong_replies import wrong_replies_drop_the_link
+from acquisition.registers.cells import BIT_FUNCTIONS
+from acquisition.registers.decoding import MapDecoder
+from acquisition.registers.register_map import RegisterMap
+from service.settings.modbus_link import ModbusLinkSettings
+from service.wiring.modbus import transport_of
+
+
+def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
+    """How a device is reached."""
+    return LinkSettings(
+        transport=transport_of(device), device_id=device.device_id, timeout_s=device.timeout_s
+    )
+
+
+async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
+    """Read registers, big-endian words, or bits, eight in a byte.
+
+    Raises
+    ------
+    LinkError
+        If the device does not answer, or answers nonsense.
+    ConfigError
+        If it has no such registers.
+    """
+    link = ModbusLink(link_settings_of(device))
+    try:
+        with wrong_replies_drop_the_link():
+            await link.open()
+            read = link.read_bits if function in BIT_FUNCTIONS else link.read
+            return await read(address, count, function)
+    finally:
+        link.close()
+
+
+async def read_map_once(
+    device: ModbusLinkSettings, registers: RegisterMap
+) -> tuple[MapDecoder, bytes]:
+    """Check the signature, then read everything that a map names.
+
+    Raises
+    ------
+    LinkError, ConfigError
+        As `read_once`; ConfigError too if it is another device.
+    """
+    decoder = MapDecoder(registers)
+    link = ModbusLink(link_settings_of(device))
+    try:
+        with wrong_replies_drop_the_link():
+            await link.open()
+            reader = MapReader(link, decoder)
+            await reader.require_signature()
+            return decoder, await reader.content()
+    finally:
+        link.close()
+
+
+async def identify_once(device: ModbusLinkSettings) -> Identification:
+    """Ask a device who it is.
+
+    Raises
+    ------
+    LinkError, ConfigError
+        As `read_once`; ConfigError too if it does not say.
+    """
+    link = ModbusLink(link_settings_of(device))
+    try:
+        with wrong_replies_drop_the_link():
+            await link.open()
+            return await link.identify()
+    finally:
+        link.close()

@@ -1,0 +1,105 @@
+"""Sources that are read from registers and queues, and the monitor of a vector rack."""
+
+from acquisition.calibration import UnitCalibration
+from acquisition.clock import Clock
+from acquisition.joined_source import JoinedSource, only_slow, without_slow
+from acquisition.modbus.fifo_source import FifoSettings, FifoSource
+from acquisition.modbus.polled_slow_values import PolledSlowValues
+from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.source import SampleSource
+from acquisition.vector_calibration import vector_calibration
+from core.machine import Unit
+from core.settings import AnalysisSettings
+from core.vector_monitor import VectorMonitor
+from service.settings.modbus_sources import (
+    MappedDeviceSettings,
+    ModbusFifoSettings,
+    ModbusPolledSettings,
+    ModbusVectorSettings,
+    SlowDeviceSettings,
+)
+from service.wiring.modbus import transport_of
+
+
+def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
+    """How a mapped device is asked."""
+    return PolledSettings(
+        transport=transport_of(device),
+        device_id=device.device_id,
+        timeout_s=device.timeout_s,
+        poll_period_s=device.poll_period_s,
+        stale_after_s=device.stale_after_s,
+    )
+
+
+def polled_source(
+    source: ModbusPolledSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
+) -> SampleSource:
+    """Registers as a source; the unit's rate is that of the polls."""
+    rows = [channel.id for channel in unit.channels]
+    return PolledSource(polled_settings(source), source.registers, rows, calibration, clock)
+
+
+def vector_source(
+    source: ModbusVectorSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
+) -> SampleSource:
+    """A vector rack as a source; goes with :func:`vector_monitor`."""
+    ids = [channel.id for channel in unit.channels]
+    return PolledSource(
+        polled_settings(source),
+        source.registers,
+        [row.id for row in source.rows],
+        vector_calibration(calibration, ids, source.rows),
+        clock,
+    )
+
+
+def vector_monitor(
+    source: ModbusVectorSettings, unit: Unit, settings: AnalysisSettings
+) -> VectorMonitor:
+    """The monitor of a unit with a vector rack."""
+    return VectorMonitor(unit, source.rows, settings, source.averaging)
+
+
+def fifo_source(
+    source: ModbusFifoSettings, calibration: UnitCalibration, clock: Clock
+) -> SampleSource:
+    """Queues as a source."""
+    settings = FifoSettings(
+        transport=transport_of(source),
+        device_id=source.device_id,
+        timeout_s=source.timeout_s,
+        poll_period_s=source.poll_period_s,
+        stale_after_s=source.stale_after_s,
+        loss_tolerance_s=source.loss_tolerance_s,
+    )
+    layout = source.fifo_layout(len(calibration.channels))
+    return FifoSource(settings, layout, calibration, clock)
+
+
+def slow_channels_of(slow: SlowDeviceSettings) -> frozenset[str]:
+    """Slow channels that another device measures: leave them out of the source's calibration."""
+    return frozenset(slow.mapped_channels)
+
+
+def without_channels_of(slow: SlowDeviceSettings, calibration: UnitCalibration) -> UnitCalibration:
+    """Calibration of the source that sends the waveforms."""
+    return without_slow(calibration, slow_channels_of(slow))
+
+
+def joined_source(
+    source: SampleSource, slow: SlowDeviceSettings, calibration: UnitCalibration, clock: Clock
+) -> SampleSource:
+    """Waveforms of one device with slow values of another.
+
+    Parameters
+    ----------
+    source
+        Built with `without_channels_of` the unit's calibration.
+    calibration
+        Of the whole unit.
+    """
+    channels = only_slow(calibration, slow_channels_of(slow)).slow
+    return JoinedSource(
+        source, PolledSlowValues(polled_settings(slow), slow.registers, channels, clock)
+    )

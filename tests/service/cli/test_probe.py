@@ -1,0 +1,188 @@
+"""`padwatch probe` shows what a device has, in every way it may be meant, and stores nothing."""
+
+import asyncio
+import json
+import struct
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from acquisition.calibration import SlowCalibration, UnitCalibration
+from acquisition.daq.map_device import MapDevice
+from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.raw import RawBlock
+from service.cli.probe import app
+from service.settings.map_file import load_map_file
+
+MAPS = Path(__file__).parents[3] / "deploy" / "maps"
+GATEWAY = MAPS / "slow-gateway.toml"
+SLOW = {
+    "speed": 92.25,
+    "active_power": 512.5,
+    "ujb_oil_temperature": 45.5,
+    "ljb_oil_temperature": float("nan"),
+}
+
+
+class SlowFeed:
+    """Slow values alone."""
+
+    def __init__(self, slow: tuple[float, ...]) -> None:
+        self._slow, self._n = slow, 0
+
+    def advance(self, n_samples: int) -> RawBlock:
+        first, self._n = self._n, self._n + n_samples
+        counts = np.zeros((0, n_samples), dtype=np.int16)
+        return RawBlock(0, first, 1_800_000_000 * 10**9, 1.0, counts, (), self._slow)
+
+
+@pytest.fixture
+def gateway() -> MapDevice:
+    slow = tuple(SlowCalibration(id_, -1e9, 1e9) for id_ in SLOW)
+    calibration = UnitCalibration("U1", 1.0, (), slow)
+    registers = load_map_file(GATEWAY).register_map()
+    return MapDevice(SlowFeed(tuple(SLOW.values())), registers, (), calibration)
+
+
+@pytest.fixture
+async def server(gateway: MapDevice) -> AsyncIterator[ModbusTcpServer]:
+    async with ModbusTcpServer(gateway) as server:
+        yield server
+
+
+@pytest.fixture
+def probe() -> Callable:
+    """Run the command in a thread, since the device answers on this one."""
+
+    async def run(*arguments: str):
+        return await asyncio.to_thread(CliRunner().invoke, app, [*arguments])
+
+    return run
+
+
+def at(server: ModbusTcpServer) -> str:
+    return f"127.0.0.1:{server.port}"
+
+
+async def test_registers_are_read_in_every_type_and_byte_order(probe, server) -> None:
+    result = await probe("modbus", at(server), "--address", "100", "--count", "2", "--json")
+
+    assert result.exit_code == 0, result.output
+    first, last = json.loads(result.stdout)
+    straight = struct.pack(">f", 92.25)
+    assert first["address"] == 100
+    assert first["raw"] == int.from_bytes(straight[2:], "big")
+    assert first["pairs"]["float32"]["CDAB"] == 92.25
+    assert first["pairs"]["uint32"]["CDAB"] == int.from_bytes(straight, "big")
+    backwards = bytes(straight[n] for n in (1, 0, 3, 2))
+    assert first["pairs"]["int32"]["DCBA"] == int.from_bytes(backwards, "big", signed=True)
+    assert "CDAB" in first["plausible"]
+    assert "ABCD" not in first["plausible"]
+    assert last["pairs"] == {}
+    assert last["singles"]["uint16 AB"] == int.from_bytes(straight[:2], "big")
+    assert last["singles"]["uint16 BA"] == int.from_bytes(straight[1::-1], "big")
+
+
+async def test_the_table_marks_the_float_that_makes_sense(probe, server) -> None:
+    result = await probe("modbus", at(server), "--address", "100", "--count", "2")
+
+    marked = [line for line in result.stdout.splitlines() if line.endswith("*")]
+    assert [line.split()[-2] for line in marked] == ["92.25"]
+    assert max(map(len, result.stdout.splitlines())) <= 80
+
+
+async def test_a_map_is_read_once_and_every_value_shown_with_its_registers(probe, server) -> None:
+    result = await probe("map", str(GATEWAY), "--at", at(server), "--json")
+
+    assert result.exit_code == 0, result.output
+    found = {row["id"]: row for row in json.loads(result.stdout)}
+    assert found["speed"]["value"] == 92.25
+    assert found["active_power"]["value"] == pytest.approx(512.5)
+    assert found["ujb_oil_temperature"] | {"unit": ""} == {
+        "id": "ujb_oil_temperature",
+        "address": 40105,
+        "function": 3,
+        "registers": [455],
+        "value": 45.5,
+        "state": "ok",
+        "flags": {"40106": 0},
+        "unit": "",
+    }
+    assert found["ljb_oil_temperature"]["state"] == "invalid"
+
+
+async def test_a_flagged_value_is_shown_with_its_word(probe, server, gateway) -> None:
+    gateway.spoil("flag", 1)
+    gateway.produce()
+    result = await probe("map", str(GATEWAY), "--at", at(server))
+
+    [line] = [x for x in result.stdout.splitlines() if x.startswith("ujb_oil_temperature")]
+    assert "flagged" in line
+    assert "40106=0x0003" in line
+
+
+async def test_nothing_but_reads_is_sent(probe, server) -> None:
+    await probe("modbus", at(server), "--address", "100")
+    await probe("map", str(GATEWAY), "--at", at(server))
+    await probe("identity", at(server))
+
+    assert set(server.function_codes) <= {3, 43}
+
+
+async def test_bits_are_printed_as_bits(probe, server) -> None:
+    arguments = ("--address", "0", "--count", "3", "--function", "1")
+    result = await probe("modbus", at(server), *arguments)
+
+    assert result.exit_code == 1
+    assert "illegal address" in result.stderr
+
+
+async def test_a_device_tells_who_it_is(probe, server, gateway) -> None:
+    gateway.identification = {0: b"Maker", 1: b"Rack 7", 2: b"1.2"}
+    result = await probe("identity", at(server), "--json")
+
+    assert json.loads(result.stdout) == {
+        "vendor": "Maker",
+        "product_code": "Rack 7",
+        "revision": "1.2",
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("modbus", "127.0.0.1:{port}", "--address", "5000"), 1, "illegal address"),
+        (("modbus", "127.0.0.1:1", "--address", "0"), 1, "refused"),
+        (("modbus", "/dev/there-is-none", "--address", "0"), 1, "No such file"),
+        (("modbus", "127.0.0.1:port", "--address", "0"), 2, "integer"),
+        (("modbus", "127.0.0.1:{port}", "--address", "70000"), 2, "65535"),
+        (
+            ("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "6"),
+            2,
+            "less than or equal to 4",
+        ),
+        (("map", "absent.toml", "--at", "127.0.0.1:{port}"), 2, "No such file"),
+        (("map", "absent.toml"), 2, "No such file"),
+    ],
+)
+async def test_what_cannot_be_read_is_one_sentence(
+    probe, server, arguments: tuple[str, ...], code: int, said: str
+) -> None:
+    result = await probe(*(a.format(port=server.port) for a in arguments))
+
+    assert result.exit_code == code, result.output
+    assert said in result.stderr
+    assert "Traceback" not in result.output
+
+
+async def test_another_device_than_the_map_is_for_is_refused(probe, server, tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    signature = "[[signature]]\naddress = 40101\nexpected = 7\n"
+    path.write_text(GATEWAY.read_text().replace("[heartbeat]", signature + "[heartbeat]"))
+    result = await probe("map", str(path), "--at", at(server))
+
+    assert result.exit_code == 1
+    assert "another device than configured: register 40101" in result.stderr

@@ -1,0 +1,127 @@
+"""Register maps in files: the examples load, and a wrong one is refused with line, key and fix."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from acquisition.registers.decoding import MapDecoder
+from core.vector_rows import VectorPart, VectorRow
+from service.settings.map_file import MapFileError, load_map_file
+
+MAPS = Path(__file__).parents[3] / "deploy" / "maps"
+
+
+@pytest.mark.parametrize("path", sorted(MAPS.glob("*.toml")), ids=lambda path: path.name)
+def test_every_example_can_be_read(path: Path) -> None:
+    decoder = MapDecoder(load_map_file(path).register_map())
+
+    assert decoder.plan.requests
+    assert all(request.count <= 125 for request in decoder.plan.requests)
+
+
+def test_an_skf_like_rack_is_read_as_its_manual_demands() -> None:
+    registers = load_map_file(MAPS / "vector-rack-skf-like.toml").register_map()
+    requests = [(r.start, r.count) for r in MapDecoder(registers).plan.requests]
+
+    assert (608, 14) in requests
+    amplitude = registers.values[0]
+    assert amplitude.id == VectorRow("ujb_shaft_x", VectorPart.ORDER1_AMPLITUDE).id
+    assert amplitude.scale == 0.5, "peak-to-peak becomes zero-to-peak"
+    assert registers.values[1].scale == -0.1, "lag becomes lead"
+
+
+MINIMAL = """
+base = 1
+[[value]]
+channel = "a"
+address = 10
+type = "float32"
+[[value]]
+channel = "b"
+address = 20
+"""
+
+
+@pytest.fixture
+def mistakes(tmp_path: Path) -> Callable[[str], str]:
+    """Everything that is said of a map."""
+
+    def load(text: str) -> str:
+        path = tmp_path / "map.toml"
+        path.write_text(text)
+        with pytest.raises(MapFileError) as refusal:
+            load_map_file(path)
+        return str(refusal.value).replace(f"{tmp_path}/", "")
+
+    return load
+
+
+def changed(old: str, new: str) -> str:
+    assert old in MINIMAL
+    return MINIMAL.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (changed("address = 20", "address = 11"), "map.toml:9: value[2].address: lies on a"),
+        (changed('"float32"', '"float16"'), "map.toml:6: value[1].type = 'float16'"),
+        (changed("address = 10", "address = 0"), "value[1].address: must be 1 to 65535"),
+        (changed("base = 1", "base = 2"), "map.toml:2: base: must be 0, 1, 10001"),
+        (changed("base = 1", "bass = 1"), "map.toml:2: bass = 1: Extra inputs"),
+        (changed("address = 20", "address = 20\nscale = 0.0"), "value[2].scale: must not be 0"),
+        (changed("address = 20", 'address = 20\ndetector = "pp"'), "value[2].detector"),
+        (
+            changed("address = 20", 'address = 20\nquantity = "order1_amplitude"'),
+            'value[2].detector: must be "pk", "pp" or "rms"',
+        ),
+        (
+            changed("address = 20", 'address = 20\nquantity = "order1_phase"'),
+            'value[2].phase: must be "lag" or "lead"',
+        ),
+        (changed("address = 20", "address = 20\nbit = 3"), "value[2].bit: is the number of a bit"),
+        (
+            MINIMAL + "[[value.flag]]\naddress = 30\nmask = 0\nset_means = 'bad'\n",
+            "map.toml:12: value[2].flag[1].mask = 0: Input should be greater",
+        ),
+        (MINIMAL + "[[value.flag]]\naddress = 30\n", "value[2].flag[1].set_means: must be given"),
+        (MINIMAL + "[[together]]\naddress = 11\ncount = 5\n", "together: the block from 11 cuts"),
+        (MINIMAL + "[[together]]\naddress = 40\ncount = 126\n", "together[1].count = 126"),
+        (
+            changed("address = 20", "address = 20\nscale_register = { address = 25 }"),
+            "value[2].scale_register: is read in another request",
+        ),
+        (
+            changed("address = 20", "address = 20\nfull_scale = { minimum = 0.0 }"),
+            "value[2].full_scale.maximum: give either",
+        ),
+        (changed("address = 20", "address = 20\ninvalid_below = nan"), "invalid_below"),
+        (
+            MINIMAL + '[time]\nkind = "epoch"\nseconds = { address = 0 }\n',
+            "time.address: must be 1",
+        ),
+        (
+            MINIMAL
+            + '[time]\nkind = "calendar"\nfirst = { address = 50 }\n'
+            + 'fields = ["day", "day", "year", "hour", "minute", "second"]\n',
+            "time.fields: must name each of year, month",
+        ),
+        ("base = ", "not TOML"),
+        ("", "value: Field required"),
+    ],
+)
+def test_a_wrong_map_is_refused_with_line_key_and_fix(mistakes, text: str, said: str) -> None:
+    assert said in mistakes(text)
+
+
+def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MapFileError, match="No such file"):
+        load_map_file(tmp_path / "absent.toml")
+    path = tmp_path / "map.toml"
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(MapFileError, match="not UTF-8"):
+        load_map_file(path)
+    path.write_bytes(b"#" * 1_000_001)
+    with pytest.raises(MapFileError, match="larger than"):
+        load_map_file(path)
