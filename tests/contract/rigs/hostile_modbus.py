@@ -96,7 +96,7 @@ class HostileLine(Liar):
 
     async def __aexit__(self, *_: object) -> None:
         self._answering.cancel()
-        await asyncio.wait([self._answering])
+        await asyncio.gather(self._answering, return_exceptions=True)
         self._close()
 
     def write(self, data: bytes) -> None:
