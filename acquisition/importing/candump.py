@@ -16,9 +16,9 @@ _LINE = re.compile(
 _ERROR_FLAG = 0x20000000
 
 
-@dataclass(frozen=True)
+@dataclass
 class LoggedFrame:
-    """A frame with the names that python-can has for its parts."""
+    """A frame with the names that python-can has for its parts, and as changeable."""
 
     timestamp: float
     arbitration_id: int
@@ -26,12 +26,8 @@ class LoggedFrame:
     is_fd: bool
     is_remote_frame: bool
     is_error_frame: bool
-    data: bytes
-
-    @property
-    def dlc(self) -> int:
-        """Bytes of data."""
-        return len(self.data)
+    dlc: int
+    data: bytearray
 
 
 def frames_of_candump(stream: BinaryIO) -> Iterator[LoggedFrame]:
@@ -57,13 +53,14 @@ def frames_of_candump(stream: BinaryIO) -> Iterator[LoggedFrame]:
 
 def _frame(match: re.Match[bytes]) -> LoggedFrame:
     id_ = int(match["id"], 16)
-    is_error = bool(id_ & _ERROR_FLAG)
+    data = bytearray.fromhex((match["data"] or b"").decode())
     return LoggedFrame(
         timestamp=float(match["time"]),
         arbitration_id=id_ & ~_ERROR_FLAG,
         is_extended_id=len(match["id"]) == 8,
         is_fd=match["fd"] is not None,
         is_remote_frame=match["remote"] is not None,
-        is_error_frame=is_error,
-        data=bytes.fromhex((match["data"] or b"").decode()),
+        is_error_frame=bool(id_ & _ERROR_FLAG),
+        dlc=len(data),
+        data=data,
     )

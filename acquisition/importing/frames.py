@@ -72,8 +72,17 @@ class FrameBatch:
             strict=True,
         )
         for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
-            content = data[n * MAX_DATA : n * MAX_DATA + length]
-            yield LoggedFrame(time_ns / 1e9, id_, extended, fd, False, False, content)
+            content = bytearray(data[n * MAX_DATA : n * MAX_DATA + length])
+            yield LoggedFrame(
+                timestamp=time_ns / 1e9,
+                arbitration_id=id_,
+                is_extended_id=extended,
+                is_fd=fd,
+                is_remote_frame=False,
+                is_error_frame=False,
+                dlc=length,
+                data=content,
+            )
 
 
 class FrameDecoder(Protocol):

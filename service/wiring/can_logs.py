@@ -1,0 +1,45 @@
+"""Frames of an imported CAN log through the decoder of live ones."""
+
+from acquisition.calibration import UnitCalibration
+from acquisition.can.assembly import Assembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.gate import FrameGate
+from acquisition.can.settings import CanSettings
+from acquisition.importing.frames import FrameBatch
+from acquisition.raw import RawBlock
+
+
+class CanLogDecoder:
+    """What a CAN source would have made of these frames, had it listened when they were logged.
+
+    A device that does not stamp its samples gets the stamps of the log.
+
+    Raises
+    ------
+    ConfigError
+        If DBC, settings and calibration do not fit together.
+    """
+
+    def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
+        plan = compile_plan(settings, calibration)
+        self._assembler = Assembler(
+            plan,
+            n_channels=len(calibration.channels),
+            n_slow=len(calibration.slow),
+            rate_hz=calibration.rate_hz,
+            hold_s=settings.hold_s,
+        )
+        self._gate = FrameGate(plan, self._assembler.refused)
+
+    def take(self, frames: FrameBatch) -> list[RawBlock]:
+        """Decode frames; see :class:`acquisition.importing.frames.FrameDecoder`."""
+        blocks: list[RawBlock] = []
+        for time_ns, message in zip(frames.times_ns.tolist(), frames.messages(), strict=True):
+            frame = self._gate.admit(message)
+            if frame is not None:
+                blocks += self._assembler.take([frame], time_ns)
+        return blocks
+
+    def flush(self) -> list[RawBlock]:
+        """Frames of a sample that never became complete are nothing."""
+        return []

@@ -1,0 +1,93 @@
+"""A log of a CAN DAQ's frames is imported as what the DAQ measured."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from acquisition.block_grid import BlockGrid
+from acquisition.calibration import UnitCalibration
+from acquisition.can.settings import CanLinkSettings, CanSettings
+from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_device import CanDevice
+from acquisition.daq.can_shape import CanShape, DaqSignal
+from acquisition.importing.job import ImportJob, TimeAxis
+from acquisition.importing.reading import reading
+from acquisition.raw import FeedEndedError, RawBlock
+from service.wiring.can_logs import CanLogDecoder
+
+START_S = 1_767_225_600
+
+
+class GappyFeed:
+    """The counting feed with holes, a sick channel and slow values that change."""
+
+    def __init__(self, feed) -> None:
+        self._feed, self.sent = feed, []
+
+    def advance(self, n_samples: int) -> RawBlock:
+        number = len(self.sent)
+        if number == 200:
+            raise FeedEndedError
+        if number % 30 == 29:
+            self._feed.advance(7 * number)
+        raw = self._feed.advance(n_samples)
+        ok = (True, number % 13 != 0)
+        stamp_ns = raw.start_ns // 1000 * 1000
+        self.sent.append(replace(raw, ok=ok, slow=(40.0 + number, float("nan")), start_ns=stamp_ns))
+        return self.sent[-1]
+
+
+@pytest.mark.parametrize("kind", ["candump", "blf"])
+@pytest.mark.parametrize("fd", [False, True])
+def test_every_sample_flag_and_stamp_comes_back(
+    counting_feed: Callable[..., object],
+    counts_calibration: Callable[..., UnitCalibration],
+    tmp_path: Path,
+    kind: str,
+    fd: bool,
+) -> None:
+    shape = CanShape(
+        channels=(DaqSignal("c0", "V", 1.0), DaqSignal("c1", "V", 1.0)),
+        slow=(DaqSignal("slow0", "degC"), DaqSignal("slow1", "degC")),
+        fd=fd,
+    )
+    feed = GappyFeed(counting_feed())
+    device = CanDevice(feed, shape)
+    write_log(tmp_path / "log", kind, device)
+    (tmp_path / "daq.dbc").write_text(daq_dbc(shape), encoding="utf-8")
+    link = CanLinkSettings(interface="virtual", channel="none", fd=fd)
+    settings: CanSettings = daq_settings(shape, link, tmp_path / "daq.dbc", ("um", "um"))
+    decoder = CanLogDecoder(settings, counts_calibration())
+    job = ImportJob(format=kind, rate_hz=600.0, time=TimeAxis("file", 0))
+    with reading(tmp_path / "log", job) as found:
+        raws = [raw for frames in found.frames() for raw in decoder.take(frames)]
+    assert on_grid(raws) == on_grid(feed.sent)
+
+
+def write_log(path: Path, kind: str, device: CanDevice) -> None:
+    writer = can.CanutilsLogWriter if kind == "candump" else can.BLFWriter
+    with writer(path) as log:
+        n_frames = 0
+        while device.has_frames:
+            for frame in device.next_frames():
+                log(
+                    can.Message(
+                        timestamp=START_S + n_frames * 1e-4,
+                        arbitration_id=frame.frame_id,
+                        is_extended_id=frame.extended,
+                        is_fd=frame.fd,
+                        data=frame.data,
+                    )
+                )
+                n_frames += 1
+            device.produce()
+
+
+def on_grid(raws: list[RawBlock]) -> list[str]:
+    grid = BlockGrid(50)
+    blocks = [block for raw in raws for block in grid.put(raw)] + grid.flush()
+    return [repr(replace(b, counts=np.array(b.counts).tobytes())) for b in blocks]
