@@ -91,6 +91,12 @@ def test_a_wrong_mapping_is_refused_with_line_and_key(
     assert says in refusal(tmp_path, text.replace(old, new, 1))
 
 
+def test_the_example_in_the_guide_is_a_right_mapping(tmp_path: Path) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
+    (tmp_path / "map.toml").write_text(guide.split("```toml\n")[1].split("```")[0])
+    assert load_toml(tmp_path / "map.toml", ImportMapping).slow_channel[0].unit == "degC"
+
+
 def test_a_mapping_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     for content, words in (
