@@ -92,7 +92,9 @@ class CountedInstants:
             return None
         self._last[wave] = index
         n_samples = self._n_samples(part, placed.data)
-        pending = self._pending.setdefault(index, PendingInstant(self._plan.n_waves, n_samples))
+        pending = self._pending.get(index)
+        if pending is None:
+            pending = self._pending[index] = PendingInstant(self._plan.n_waves, n_samples)
         frames = pending.put(wave, placed.data, n_samples)
         if frames is None:
             self._give_up_oldest()

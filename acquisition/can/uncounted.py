@@ -32,7 +32,8 @@ class ArrivalCheck:
             self._origin_ns = self._previous_ns = arrived_ns
             self._least_ns = -stop_index * self._period_ns
         delay_ns = arrived_ns - self._origin_ns - stop_index * self._period_ns
-        self._least_ns += _MAX_DRIFT * max(0, arrived_ns - self._previous_ns)
+        passed_ns = min(max(0, arrived_ns - self._previous_ns), _MAX_UNSURE_NS)
+        self._least_ns += _MAX_DRIFT * passed_ns
         self._previous_ns = arrived_ns
         self._least_ns = min(self._least_ns, delay_ns)
         return delay_ns - self._least_ns

@@ -1,0 +1,218 @@
+"""A device that counts nothing: the clock finds what is missing, and nothing false is joined."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from acquisition.can.assembly import Assembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.settings import (
+    CanChannel,
+    CanLinkSettings,
+    CanSettings,
+    CanSlowChannel,
+)
+from acquisition.errors import ConfigError
+
+RATE_HZ = 600.0
+NS_PER_S = 1_000_000_000
+START_NS = 1_767_225_600 * NS_PER_S
+LINK = CanLinkSettings(interface="virtual", channel="none")
+IDS = (0x220, 0x221, 0x222)
+STATUS = 0x230
+DBC = "".join(
+    [
+        'VERSION ""\nBU_: N\n',
+        *(
+            f"BO_ {frame_id} M{n}: 8 N\n"
+            + "".join(f' SG_ s{c} : {16 * c}|16@1- (1,0) [0|0] "V" N\n' for c in range(4))
+            for n, frame_id in enumerate(IDS)
+        ),
+        f"BO_ {STATUS} STATUS: 8 N\n",
+        ' SG_ t : 0|16@1- (0.1,0) [0|0] "degC" N\n SG_ ok : 16|16@1+ (1,0) [0|0] "" N\n',
+        ' SG_ run : 32|16@1+ (1,0) [0|0] "" N\n',
+    ]
+)
+
+
+@pytest.fixture
+def settings(tmp_path) -> CanSettings:
+    dbc = tmp_path / "plain.dbc"
+    dbc.write_text(DBC)
+    return CanSettings(
+        link=LINK,
+        dbc=dbc,
+        channels=tuple(CanChannel(f"c{n}", "um", (f"M{n // 4}.s{n % 4}",)) for n in range(12)),
+        slow=(CanSlowChannel("oil", "degC", "STATUS.t"),),
+        ok_bits="STATUS.ok",
+        epoch="STATUS.run",
+        hold_s=2.0,
+    )
+
+
+@pytest.fixture
+def assembler(settings, counts_calibration) -> Assembler:
+    plan = compile_plan(settings, counts_calibration(n_channels=12, n_slow=1))
+    return Assembler(plan, 12, 1, RATE_HZ, settings.hold_s)
+
+
+def instant(number: int):
+    """Three frames of four channels; channel c of sample n is n + c."""
+    for n, frame_id in enumerate(IDS):
+        samples = (number + 4 * n + np.arange(4)) % 2**15
+        yield frame_id, samples.astype("<i2").tobytes()
+
+
+def status(temperature: float = 45.0, ok: int = 0xFFF, run: int = 1):
+    words = (round(temperature * 10), ok, run, 0)
+    return STATUS, b"".join(word.to_bytes(2, "little") for word in words)
+
+
+def at(second: float) -> int:
+    return START_NS + round(second * NS_PER_S)
+
+
+def run(assembler, first: int, stop: int, step: int = 6, late_s: float = 0.0):
+    """Instants as they pass, in batches, each arriving when its last sample is there."""
+    blocks = []
+    for start in range(first, stop, step):
+        frames = itertools.chain.from_iterable(instant(n) for n in range(start, start + step))
+        blocks += assembler.take(frames, at((start + step) / RATE_HZ + late_s))
+    return blocks
+
+
+def assert_true_samples(blocks) -> None:
+    """Every column is one instant's: no two instants are ever mixed."""
+    for block in blocks:
+        first = block.counts[0].astype(int)
+        for c, samples in enumerate(block.counts):
+            np.testing.assert_array_equal(samples, (first + c) % 2**15)
+
+
+def assert_never_joined_over_a_loss(blocks) -> None:
+    """Where the index goes on by one, so does the plant."""
+    axis = np.concatenate([np.arange(b.first_index, b.stop_index) for b in blocks])
+    plant = np.concatenate([b.counts[0] for b in blocks]).astype(int)
+    steps = np.diff(plant) % 2**15
+    assert (steps[np.diff(axis) == 1] == 1).all()
+
+
+def test_frames_are_counted(assembler):
+    blocks = assembler.take([status()], at(0.0)) + run(assembler, 0, 3000)
+    assert [b.n_samples for b in blocks] == [6] * 500
+    assert blocks[-1].stop_index == 3000
+    assert all(b.ok == (True,) * 12 and b.slow == (45.0,) for b in blocks[:190])
+    assert_true_samples(blocks)
+
+
+@pytest.mark.parametrize("n_lost", [1, 2, 7, 100, 600, 5000])
+def test_a_loss_is_found_by_the_clock_flagged_and_counted(n_lost, assembler):
+    blocks = run(assembler, 0, 1200)
+    blocks += run(assembler, 1200 + n_lost, 6000 + n_lost)
+    assert_true_samples(blocks)
+    assert_never_joined_over_a_loss(blocks)
+    rejected = [r for b in blocks for r in b.rejected]
+    assert {r.reason for r in rejected} == {"uncounted_loss"}
+    assert blocks[-1].stop_index == 6000 + n_lost
+    n_stored = sum(b.n_samples for b in blocks)
+    assert n_stored + sum(r.n_samples for r in rejected) == 6000 + n_lost
+    assert len(blocks) > 600
+
+
+def test_late_frames_are_no_loss(assembler):
+    random = np.random.default_rng(4)
+    blocks = []
+    for start in range(0, 30_000, 30):
+        blocks += run(assembler, start, start + 30, 30, float(random.exponential(0.003)))
+    blocks += run(assembler, 30_000, 30_600, 600, 0.0)
+    assert blocks[-1].stop_index == 30_600
+    assert all(b.rejected == () for b in blocks)
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_a_set_with_a_frame_missing_is_dropped_whole_and_counted(lost, assembler):
+    frames = [list(instant(n)) for n in range(30)]
+    for n in (5, 6, 20):
+        del frames[n][lost]
+    blocks = assembler.take(itertools.chain.from_iterable(frames), at(0.05))
+    assert_true_samples(blocks)
+    assert [(b.first_index, b.stop_index) for b in blocks] == [(0, 5), (7, 20), (21, 30)]
+    assert [sum(r.n_samples for r in b.rejected) for b in blocks] == [0, 2, 1]
+    assert {r.reason for b in blocks for r in b.rejected} == {"incomplete_frames"}
+
+
+def test_random_single_losses_never_mix_two_instants(assembler):
+    random = np.random.default_rng(5)
+    blocks, n_lost = [], 0
+    for start in range(0, 24_000, 6):
+        frames = [f for n in range(start, start + 6) for f in instant(n)]
+        if random.random() < 0.1:
+            del frames[int(random.integers(0, len(frames)))]
+            n_lost += 1
+        blocks += assembler.take(frames, at((start + 6) / RATE_HZ))
+    assert n_lost > 350
+    assert_true_samples(blocks)
+    assert_never_joined_over_a_loss(blocks)
+    n_stored = sum(b.n_samples for b in blocks)
+    assert n_stored + sum(r.n_samples for b in blocks for r in b.rejected) == blocks[-1].stop_index
+    assert blocks[-1].stop_index == pytest.approx(24_000, abs=6)
+
+
+def test_a_duplicate_and_a_frame_out_of_turn_spoil_their_set_only(assembler):
+    a, b, c = (list(instant(n)) for n in range(3))
+    frames = [*a, b[0], b[1], b[1], b[2], *c]
+    blocks = assembler.take(frames, at(0.0))
+    assert_true_samples(blocks)
+    assert blocks[0].first_index == 0
+    assert blocks[-1].counts[0][-1] == 2
+
+
+def test_status_without_counter_holds_from_its_arrival_for_a_while_and_no_longer(assembler):
+    blocks = assembler.take([status(45.0)], at(0.0))
+    blocks += run(assembler, 0, 600)
+    blocks += assembler.take([status(50.0, ok=0xFFE)], at(1.0))
+    blocks += run(assembler, 600, 3000)
+    by_start = {b.first_index: b for b in blocks}
+    assert by_start[0].slow == (45.0,)
+    assert by_start[594].ok[0]
+    assert by_start[600].slow == (50.0,)
+    assert by_start[600].ok == (False, *[True] * 11)
+    assert by_start[1794].slow == (50.0,)
+    assert np.isnan(by_start[1800].slow[0])
+    assert not any(by_start[1800].ok)
+
+
+def test_a_told_restart_begins_a_new_epoch_at_zero(assembler):
+    blocks = assembler.take([status(run=1)], at(0.0)) + run(assembler, 0, 600)
+    blocks += assembler.take([status(run=2)], at(1.0)) + run(assembler, 600, 1200)
+    assert {b.epoch for b in blocks} == {1, 2}
+    second = [b for b in blocks if b.epoch == 2]
+    assert (second[0].first_index, second[-1].stop_index) == (0, 600)
+    assert second[0].slow == (45.0,)
+
+
+def test_a_reconnection_is_a_loss_of_the_time_it_took(assembler):
+    blocks = run(assembler, 0, 600)
+    blocks += run(assembler, 600 + 36_000, 600 + 36_000 + 1800)
+    assert_never_joined_over_a_loss(blocks)
+    assert blocks[-1].stop_index == 600 + 36_000 + 1800
+
+
+def test_an_epoch_without_counter_beside_counters_is_refused(
+    settings, counts_calibration, tmp_path
+):
+    dbc = tmp_path / "mixed.dbc"
+    text = DBC.replace('"V" N\nBO_ 545', '"V" N\n SG_ c : 0|8@1+ (1,0) [0|0] "" N\nBO_ 545')
+    dbc.write_text(text.replace("SG_ s0 : 0|16", "SG_ s0 : 8|8"))
+    assert "SG_ c" in dbc.read_text()
+    changed = CanSettings(
+        **{
+            **vars(settings),
+            "dbc": dbc,
+            "channels": (CanChannel("c0", "um", ("M1.s1",)),),
+            "counters": ("M1.s2",),
+        }
+    )
+    with pytest.raises(ConfigError, match=r"unsigned integer|no counter"):
+        compile_plan(changed, counts_calibration(n_channels=1, n_slow=1))
