@@ -11,6 +11,7 @@ from core.baseline.cell_table import CellTable
 from core.baseline.surface import Surface
 from core.condition.cells import CellGrid
 from core.condition.film_conditions import FilmConditions
+from core.stiffness_history import DIRECTIONS
 
 
 class Watched(StrEnum):
@@ -27,6 +28,10 @@ class TimeScatter:
 
     time_scale_h: float
     std: float
+
+    def __post_init__(self) -> None:
+        if not (self.time_scale_h > 0.0 and self.std > 0.0):
+            raise ValueError(f"time_scale_h = {self.time_scale_h:g}, std = {self.std:g}")
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,18 @@ class QuantityBaseline:
     reading_h: float
     time_scatter: tuple[TimeScatter, ...]
     rejected_share: float
+
+    def __post_init__(self) -> None:
+        if self.direction not in DIRECTIONS:
+            raise ValueError(f"direction = {self.direction!r}: not one of {DIRECTIONS}")
+        if not (self.scatter > 0.0 and self.u_random >= 0.0 and self.reading_h > 0.0):
+            raise ValueError(
+                f"scatter = {self.scatter:g}, u_random = {self.u_random:g},"
+                f" reading_h = {self.reading_h:g}"
+            )
+        times_h = [time.time_scale_h for time in self.time_scatter]
+        if times_h != sorted(set(times_h)):
+            raise ValueError(f"time_scatter: {times_h} must increase")
 
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray

@@ -1,7 +1,7 @@
 """What a baseline knows of every cell that it has seen."""
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -11,12 +11,12 @@ from core.arrays import FloatArray
 from core.condition.cells import Cell, CellArray
 
 
-class Support(IntEnum):
+class Support(StrEnum):
     """Whether readings in a cell can be judged."""
 
-    NONE = 0
-    BORROWED = 1
-    OWN = 2
+    NONE = "none"
+    BORROWED = "borrowed"
+    OWN = "own"
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,25 @@ class CellStatistics:
     surface_std: float
     support: Support
 
+    def __post_init__(self) -> None:
+        if min(self.n_readings, self.n_days) < 0:
+            raise ValueError(f"n_readings = {self.n_readings}, n_days = {self.n_days}: below 0")
+        if not (self.scatter > 0.0 and self.surface_std >= 0.0):
+            raise ValueError(f"scatter = {self.scatter:g}, surface_std = {self.surface_std:g}")
+
 
 @dataclass(frozen=True)
 class CellTable:
     """All cells with readings."""
 
     cells: tuple[CellStatistics, ...]
+
+    def __post_init__(self) -> None:
+        names = [cell.cell for cell in self.cells]
+        if len(set(names)) < len(names):
+            raise ValueError("cells: one of them is there twice")
+        if len({len(name) for name in names}) > 1:
+            raise ValueError("cells: not all have as many axes")
 
     def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
         """(n,) place of each cell in the table; -1 if it has not been seen, or has no support."""

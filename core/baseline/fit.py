@@ -83,7 +83,8 @@ def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
             robust = bisquare(standardised / std)
     clustering = _clustering(groups.day, (y - design @ coefficients) / std, trust * robust)
     precision = trust * robust / (std**2 * clustering)
-    coefficients, covariance = _solve(design, y, precision, prior)
+    coefficients, factor = _solve(design, y, precision, prior)
+    covariance = cho_solve((factor, True), np.eye(prior.shape[0]))
     surface = Surface(shape, offset, tuple(coefficients.tolist()))
     return Fit(surface, covariance, robust, std, clustering)
 
@@ -123,10 +124,10 @@ def _trust(groups: Groups) -> FloatArray:
 def _solve(
     design: FloatArray, y: FloatArray, precision: FloatArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Coefficients, and lower Cholesky factor of their precision."""
     weighted = design * precision[:, np.newaxis]
-    factor = cho_factor(design.T @ weighted + prior, lower=True)
-    covariance = cho_solve(factor, np.eye(prior.shape[0]))
-    return cho_solve(factor, weighted.T @ y), covariance
+    factor, _ = cho_factor(design.T @ weighted + prior, lower=True)
+    return cho_solve((factor, True), weighted.T @ y), factor
 
 
 def _clustering(day: npt.NDArray[np.int64], standardised: FloatArray, weight: FloatArray) -> float:

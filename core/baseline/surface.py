@@ -21,6 +21,10 @@ class KnotAxis:
     width: float
     n_intervals: int
 
+    def __post_init__(self) -> None:
+        if not (self.width > 0.0 and self.n_intervals >= 1):
+            raise ValueError(f"width = {self.width:g}, n_intervals = {self.n_intervals}")
+
     @property
     def n_splines(self) -> int:
         """Cubic B-splines that are not zero somewhere on the axis."""
@@ -111,6 +115,12 @@ class Surface:
     shape: SurfaceShape
     offset: float
     coefficients: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.coefficients) != self.shape.n_coefficients:
+            raise ValueError(
+                f"coefficients: {len(self.coefficients)}, expected {self.shape.n_coefficients}"
+            )
 
     @cached_property
     def _coefficients(self) -> FloatArray:

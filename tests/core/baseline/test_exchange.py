@@ -1,0 +1,81 @@
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.baseline.baseline import BearingBaseline, Origin, Watched
+from core.baseline.exchange import from_json, to_json
+from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
+from core.stiffness_history import StiffnessHistory
+
+
+@pytest.fixture(scope="module")
+def baseline(film_life: Callable[..., StiffnessHistory]) -> BearingBaseline:
+    history = film_life(4, days=60)
+    origin = Origin("U1", "LJB", "transfer_order1", 3, "Ada", 1_700_000_000_123_456_789, "overhaul")
+    settled = np.ones(len(history), np.bool_)
+    return learn(history, settled, origin, BaselineSettings(), (Watched.STIFFNESS,))
+
+
+def test_a_baseline_comes_back_as_it_was(baseline: BearingBaseline) -> None:
+    assert from_json(to_json(baseline)) == baseline
+
+
+def change(content: Any, path: list[str | int], value: object) -> None:
+    for step in path[:-1]:
+        content = content[step]
+    if value is KeyError:
+        del content[path[-1]]
+    else:
+        content[path[-1]] = value
+
+
+FIRST = ["baseline", "quantities", 0]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "says"),
+    [
+        (["format"], "spectrum", "expected 'padwatch-baseline'"),
+        (["format_version"], 2, "expected 'padwatch-baseline' version 1"),
+        (["baseline", "origin", "author"], KeyError, "baseline.origin: expected .* author"),
+        (["baseline", "origin", "auther"], "Ada", "baseline.origin: expected"),
+        (["baseline", "origin", "version"], "3", "baseline.origin.version: '3'"),
+        (["baseline", "origin", "version"], True, "baseline.origin.version: True"),
+        ([*FIRST, "direction"], "z", r"quantities\[0\]: direction = 'z'"),
+        ([*FIRST, "quantity"], "colour", r"quantities\[0\].quantity: 'colour' is not one of"),
+        ([*FIRST, "scatter"], -1.0, r"quantities\[0\]: scatter = -1"),
+        ([*FIRST, "surface", "coefficients"], [1.0], "coefficients: 1, expected"),
+        ([*FIRST, "surface", "coefficients", 0], None, r"coefficients\[0\]: None"),
+        ([*FIRST, "surface", "shape", "temperature", "width"], 0.0, "temperature: width = 0"),
+        ([*FIRST, "grid", "eccentricity_width"], -0.05, "grid: eccentricity_width = -0.05"),
+        ([*FIRST, "table", "cells", 0, "support"], "some", r"cells\[0\].support: 'some'"),
+        ([*FIRST, "table", "cells", 0, "cell"], [99, 99, 99], "not all have as many axes"),
+        ([*FIRST, "time_scatter", 0, "time_scale_h"], 1e9, "must increase"),
+    ],
+)
+def test_a_baseline_that_was_tampered_with_is_refused(
+    baseline: BearingBaseline, path: list[str | int], value: object, says: str
+) -> None:
+    content = json.loads(to_json(baseline))
+    change(content, path, value)
+    with pytest.raises(ValueError, match=says):
+        from_json(json.dumps(content))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{", "null", '{"format": 1, "format": 2}', '{"a": NaN}', "[" * 100_000],
+)
+def test_what_is_no_baseline_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r".+"):
+        from_json(text)
+
+
+def test_a_huge_number_is_refused(baseline: BearingBaseline) -> None:
+    text = to_json(baseline).replace('"scatter": ', '"scatter": 1e999, "x": ', 1)
+    with pytest.raises(ValueError, match=r".+"):
+        from_json(text)

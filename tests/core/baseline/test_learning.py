@@ -1,0 +1,206 @@
+"""Laws that a baseline obeys whatever it learns from."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.cell_table import Support, lies_between
+from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
+from core.condition.cells import CellGrid
+from core.condition.film_conditions import FilmConditions
+from core.stiffness_history import StiffnessHistory
+
+ORIGIN = Origin("U1", "UJB", "dynamic", 1, "Ada", 1_700_000_000_000_000_000, "commissioning")
+FilmLife = Callable[..., StiffnessHistory]
+
+
+def learned(
+    history: StiffnessHistory, settings: BaselineSettings | None = None
+) -> QuantityBaseline:
+    settled = np.ones(len(history), np.bool_)
+    settings = settings or BaselineSettings()
+    baseline = learn(history, settled, ORIGIN, settings, (Watched.STIFFNESS,))
+    found = baseline.of(Watched.STIFFNESS, "x")
+    assert found is not None
+    return found
+
+
+def deviation(baseline: QuantityBaseline, history: StiffnessHistory) -> np.ndarray:
+    conditions = FilmConditions.of(history)
+    return baseline.compare(conditions, history.ln_k[0], history.u_random[0]).deviation
+
+
+def with_ln_k(history: StiffnessHistory, ln_k: np.ndarray) -> StiffnessHistory:
+    return replace(history, ln_k=ln_k)
+
+
+@pytest.fixture(scope="module")
+def healthy(film_life: FilmLife) -> StiffnessHistory:
+    return film_life(1)
+
+
+def test_what_never_changes_is_its_own_baseline(healthy: StiffnessHistory) -> None:
+    constant = learned(with_ln_k(healthy, np.full_like(healthy.ln_k, 20.0)))
+    heights = constant.surface.at(FilmConditions.of(healthy))
+    assert np.allclose(heights, 20.0, rtol=0.0, atol=1e-9)
+    assert {cell.location for cell in constant.table.cells} == {20.0}
+
+
+def test_a_stiffer_bracket_setting_moves_baseline_and_deviation_alike(
+    healthy: StiffnessHistory,
+) -> None:
+    moved = with_ln_k(healthy, healthy.ln_k + 0.5)
+    before, after = learned(healthy), learned(moved)
+    same = deviation(before, healthy)
+    np.testing.assert_allclose(deviation(before, moved) - same, np.where(np.isnan(same), same, 0.5))
+    np.testing.assert_allclose(deviation(after, moved), same, atol=1e-6)
+
+
+def test_the_order_of_the_days_does_not_change_what_is_normal(healthy: StiffnessHistory) -> None:
+    day = healthy.time_ns // 86_400_000_000_000
+    days = np.unique(day)
+    target = dict(zip(days, np.random.default_rng(3).permutation(days), strict=True))
+    shift = np.array([target[d] - d for d in day]) * 86_400_000_000_000
+    order = np.argsort(healthy.time_ns + shift)
+    shuffled = StiffnessHistory(
+        **{
+            name: (column + shift if name == "time_ns" else column)[..., order]
+            for name, column in vars(healthy).items()
+        }
+    )
+    before, after = learned(healthy), learned(shuffled)
+    for one, other in zip(before.table.cells, after.table.cells, strict=True):
+        assert (one.cell, one.n_days, one.n_readings) == (
+            other.cell,
+            other.n_days,
+            other.n_readings,
+        )
+        assert (one.location, one.scatter) == pytest.approx(
+            (other.location, other.scatter), rel=0.02
+        )
+    shift = deviation(after, healthy) - deviation(before, healthy)
+    assert np.nanquantile(np.abs(shift), 0.95) < 1e-3  # alike days are weighed as one, and are not
+
+
+def test_the_surface_is_as_near_the_truth_as_it_says(film_life: FilmLife) -> None:
+    errors = []
+    for seed in range(6):
+        history = film_life(seed)
+        baseline = learned(history)
+        conditions = FilmConditions.of(history)
+        e, oil_c = conditions.eccentricity_ratio, conditions.oil_temperature_c
+        truth = np.log(0.5e9) + 4.0 * (e - 0.4) - 0.02 * (oil_c - 45.0)
+        found = baseline.compare(conditions, truth, history.u_random[0])
+        counted = found.place >= 0
+        errors.append(found.deviation[counted] / found.surface_std[counted])
+    assert 0.4 < np.std(np.concatenate(errors)) < 1.3
+
+
+def test_nothing_is_compared_outside_the_learned_support(healthy: StiffnessHistory) -> None:
+    baseline = learned(healthy)
+    far = FilmConditions(np.array([0.95, 0.4, 0.4]), np.array([45.0, 5.0, 45.0]), np.zeros(3))
+    found = baseline.compare(far, np.full(3, 20.0), np.full(3, 0.01))
+    assert found.place[:2].tolist() == [-1, -1]
+    assert found.place[2] >= 0
+    assert np.isnan(found.deviation[:2]).all()
+
+
+def test_a_cell_needs_readings_on_several_days(healthy: StiffnessHistory) -> None:
+    settings = BaselineSettings(min_days=5, min_readings=30)
+    for cell in learned(healthy, settings).table.cells:
+        if cell.support is Support.OWN:
+            assert cell.n_days >= 5
+            assert cell.n_readings >= 30
+        if cell.n_readings < settings.borrowing_readings:
+            assert cell.support is Support.NONE
+
+
+def test_a_cell_between_others_borrows_and_one_outside_does_not() -> None:
+    own = frozenset({(1, 5), (3, 5)})
+    assert lies_between((2, 5), own)
+    assert not lies_between((4, 5), own)
+    assert not lies_between((2, 6), own)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2])
+def test_wrong_readings_hardly_move_a_baseline(healthy: StiffnessHistory, share: float) -> None:
+    random = np.random.default_rng(7)
+    is_wrong = random.random(healthy.ln_k.shape) < share
+    wrong = np.where(
+        is_wrong, healthy.ln_k + random.uniform(0.5, 3.0, is_wrong.shape), healthy.ln_k
+    )
+    clean, spoiled = learned(healthy), learned(with_ln_k(healthy, wrong))
+    both = deviation(clean, healthy) - deviation(spoiled, healthy)
+    assert np.nanquantile(np.abs(both), 0.95) < 0.02
+    assert np.nanmedian(both) < 0.01
+
+
+def test_a_fault_in_the_last_quarter_of_learning_is_not_learned(film_life: FilmLife) -> None:
+    def fall(hours: np.ndarray) -> np.ndarray:
+        return np.where(hours > 90 * 24, np.log(0.8), 0.0)
+
+    clean, spoiled = learned(film_life(2)), learned(film_life(2, change=fall))
+    shift = deviation(spoiled, film_life(2)) - deviation(clean, film_life(2))
+    assert np.nanmedian(np.abs(shift)) < 0.01
+    assert spoiled.rejected_share > 0.15
+
+
+def test_a_few_days_are_no_baseline(film_life: FilmLife) -> None:
+    history = film_life(1, days=15)
+    assert (
+        learn(history, np.ones(len(history), np.bool_), ORIGIN, BaselineSettings()).quantities == ()
+    )
+
+
+def test_readings_that_had_not_settled_are_not_learned(healthy: StiffnessHistory) -> None:
+    unsettled = np.zeros(len(healthy), np.bool_)
+    assert learn(healthy, unsettled, ORIGIN, BaselineSettings()).quantities == ()
+
+
+def test_alike_readings_are_known_to_stray_further(film_life: FilmLife) -> None:
+    alone = learned(film_life(3, lasting_std=1e-6, noise_std=0.01))
+    alike = learned(film_life(3, lasting_std=0.01, noise_std=1e-6))
+    assert alike.scatter == pytest.approx(alone.scatter, rel=0.5)
+    assert alike.time_scatter[1].std > 2.0 * alone.time_scatter[1].std
+
+
+def test_an_attitude_that_matters_is_learned(healthy: StiffnessHistory) -> None:
+    attitude_deg = np.random.default_rng(5).uniform(-180.0, 180.0, len(healthy))
+    turned = replace(
+        healthy,
+        attitude_deg=attitude_deg,
+        ln_k=healthy.ln_k + 0.4 * healthy.eccentricity_ratio * np.cos(np.radians(attitude_deg)),
+    )
+    blind = learned(turned)
+    seeing = learned(turned, BaselineSettings(CellGrid(attitude_width_deg=90.0)))
+    assert seeing.scatter < 0.5 * blind.scatter
+    assert seeing.scatter == pytest.approx(learned(healthy).scatter, rel=0.2)
+
+
+def test_all_quantities_of_a_bearing_are_learned(healthy: StiffnessHistory) -> None:
+    baseline = learn(healthy, np.ones(len(healthy), np.bool_), ORIGIN, BaselineSettings())
+    assert isinstance(baseline, BearingBaseline)
+    assert [(q.quantity.value, q.direction) for q in baseline.quantities] == [
+        (name, direction) for name in ("stiffness", "shaft", "bearing") for direction in "xy"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("min_days", 0),
+        ("bend_std", float("nan")),
+        ("max_surface_std", -1.0),
+        ("time_scales_h", (4.0, 2.0)),
+        ("time_scales_h", ()),
+        ("reading_h", float("inf")),
+    ],
+)
+def test_impossible_settings_are_refused_with_key_and_value(key: str, value: object) -> None:
+    with pytest.raises(ValueError, match=key) as refusal:
+        BaselineSettings(**{key: value})
+    assert (f"{value:g}" if isinstance(value, float | int) else str(value)) in str(refusal.value)
