@@ -1,5 +1,6 @@
 """HDF5 files: datasets of one dimension, in this very file."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from acquisition.importing.times import TimeArray
 
 UNIT_ATTRIBUTES = ("unit", "units")
 PER_COUNT_ATTRIBUTE = "unit_per_count"
+
+_MAX_CHUNK_BYTES = 2**26
+"""HDF5 unpacks whole chunks, however few of their values are asked for."""
 
 
 class Hdf5Table(SeriesTable):
@@ -54,6 +58,12 @@ class _Hdf5File:
             raise ConfigError(f"{str(place)[:200]!r} is no dataset")
         if dataset.is_virtual or dataset.external:
             raise ConfigError(f"dataset {str(place)[:200]!r} has its values in another file")
+        n_bytes = math.prod(dataset.chunks or ()) * dataset.dtype.itemsize
+        if n_bytes > _MAX_CHUNK_BYTES:
+            raise ConfigError(
+                f"dataset {str(place)[:200]!r} has chunks of {n_bytes} bytes; up to"
+                f" {_MAX_CHUNK_BYTES} can be read"
+            )
         if len(dataset.shape or ()) != 1 or dataset.dtype.kind not in "iuf":
             raise ConfigError(
                 f"dataset {str(place)[:200]!r} has shape {dataset.shape} of {dataset.dtype};"

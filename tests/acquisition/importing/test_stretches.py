@@ -47,7 +47,7 @@ def test_stamps_too_coarse_for_the_rate_are_refused() -> None:
         found_index(stamps(np.arange(20_000), 900.0, 10**6), rate_hz=900.0)
 
 
-@pytest.mark.parametrize("ppm", [-500, 50, 500])
+@pytest.mark.parametrize("ppm", [-300, 50, 300])
 def test_a_clock_that_runs_a_little_wrong_makes_no_gaps(ppm: float) -> None:
     index = np.arange(200_000)
     _, found = found_index(stamps(index, 600.0 * (1 + ppm * 1e-6)))
