@@ -7,6 +7,7 @@ from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.errors import LinkError
 from acquisition.modbus.profile import RingHeader, encode_header
 from acquisition.modbus.slot import encode_slot
 from core.blocks import Rejection
@@ -334,3 +335,33 @@ async def test_slow_values_belong_to_their_samples_whenever_the_reader_looks(
         blocks = await read_until(stream, 200)
     assert [block.slow["slow0"].value for block in blocks] == [46.0, 47.0, 48.0]
     assert all(block.slow["slow1"].value is None for block in blocks)
+
+
+@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
+async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_new(
+    device, server, source_at
+):
+    source = source_at(server.port)
+    old_header = device.memory.read(0, 16)
+    device.restart()
+    async with source.connect() as stream:
+        device.produce(3)
+        blocks = [await anext(stream)]
+        new_header = device.memory.read(0, 16)
+        n_looks = 0
+
+        def show_old_header_once(address, _):
+            nonlocal n_looks
+            if address == 0:
+                n_looks += 1
+                device.memory.write(0, old_header if n_looks == 1 else new_header)
+
+        device.memory.before_read = show_old_header_once
+        with pytest.raises(LinkError, match="epoch or layout change"):
+            await anext(stream)
+    device.memory.before_read = None
+    device.produce(1)
+    async with source.connect() as stream:
+        blocks.append(await anext(stream))
+    assert blocks[1].first_index == blocks[0].stop_index
+    assert blocks[1].epoch == blocks[0].epoch

@@ -1,0 +1,102 @@
+"""A 16-bit counter and the host's clock give an index that never wraps and gaps that are exact."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.modbus.counted_samples import WRAP, CountedSamples, Place
+from acquisition.modbus.uncounted_samples import UncountedSamples
+
+RATE_HZ = 600.0
+
+
+def counted(removes: bool = True) -> CountedSamples:
+    return CountedSamples(RATE_HZ, removes=removes, epoch=7)
+
+
+def test_consecutive_counts_are_consecutive_samples_across_the_wrap() -> None:
+    samples = counted()
+    places = [samples.place((WRAP - 3 + n) % WRAP, n / RATE_HZ) for n in range(6)]
+
+    assert places == [Place(7, WRAP - 3 + n) for n in range(6)]
+
+
+@given(
+    st.integers(0, WRAP - 1),
+    st.lists(st.tuples(st.integers(0, 20 * WRAP), st.floats(0.0, 0.3)), min_size=1, max_size=20),
+)
+def test_gaps_are_exact_however_often_the_counter_has_wrapped(first: int, steps) -> None:
+    """The host sees each sample late by up to 0.3 s; old samples were thrown away before."""
+    samples, index = counted(), first
+    samples.place(first % WRAP, 0.0)
+    for gap, late_s in steps:
+        index += 1 + gap
+        now_s = (index - first) / RATE_HZ + late_s
+        assert samples.place(index % WRAP, now_s) == Place(7, index)
+
+
+def test_a_device_that_counts_anew_begins_an_epoch() -> None:
+    samples = counted()
+    samples.place(30_000, 0.0)
+
+    assert samples.place(0, 0.1) == Place(8, 0)
+    assert samples.place(1, 0.1) == Place(8, 1)
+
+
+def test_after_a_long_absence_a_counter_that_time_does_not_explain_is_a_new_epoch() -> None:
+    samples = counted()
+    samples.place(1000, 0.0)
+    passed_s = 10 * WRAP / RATE_HZ
+
+    assert samples.place(1000 + 20_000, passed_s) == Place(8, 21_000)
+
+
+@pytest.mark.parametrize(("passed_s", "is_ambiguous"), [(1.0, False), (54.0, True), (1e6, True)])
+def test_what_waits_in_a_queue_is_doubted_after_half_a_wrap(passed_s, is_ambiguous) -> None:
+    samples = counted()
+    assert not samples.is_ambiguous(passed_s)
+    samples.place(0, 0.0)
+    assert samples.is_ambiguous(passed_s) is is_ambiguous
+
+
+def test_samples_that_a_queue_shows_again_are_not_taken_twice() -> None:
+    samples = counted(removes=False)
+    for n in range(100, 120):
+        samples.place(n, 0.0)
+
+    shown_again = [samples.place(n, 0.01) for n in range(110, 123)]
+
+    assert shown_again == [None] * 10 + [Place(7, n) for n in (120, 121, 122)]
+
+
+def uncounted() -> UncountedSamples:
+    return UncountedSamples(RATE_HZ, tolerance_s=0.1, epoch=7)
+
+
+def deliver(samples: UncountedSamples, n: int) -> list[Place]:
+    return [samples.place() for _ in range(n)]
+
+
+def test_without_a_counter_samples_are_counted_here() -> None:
+    assert deliver(uncounted(), 3) == [Place(7, 0), Place(7, 1), Place(7, 2)]
+
+
+def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it() -> None:
+    samples = uncounted()
+    for second in range(1, 30):
+        deliver(samples, 600)
+        assert not samples.has_lost(second + 0.02 * (second % 3))
+    deliver(samples, 600 - 72)
+
+    assert samples.has_lost(30.0)
+    samples.begin()
+    assert samples.place() == Place(8, 0)
+    assert not samples.has_lost(31.0)
+
+
+@pytest.mark.parametrize("drift", [-500e-6, 500e-6])
+def test_a_poor_crystal_is_no_loss(drift: float) -> None:
+    samples = uncounted()
+    for second in range(1, 3600):
+        deliver(samples, 600)
+        assert not samples.has_lost(second * (1.0 + drift))

@@ -1,0 +1,304 @@
+"""Samples from queues: each one once, losses exact, restarts and repetitions told."""
+
+import itertools
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+
+from acquisition.daq.fifo_device import FifoDevice
+from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.fifo_source import FifoSettings, FifoSource
+from acquisition.modbus.transport import TcpTransport
+from acquisition.registers.cells import MapError
+from acquisition.registers.fifo_layout import FifoKind, FifoLayout
+from core.blocks import SampleBlock
+
+STEP = 50
+INTERLEAVED = FifoLayout(addresses=(1000,), n_channels=2)
+PER_CHANNEL = FifoLayout(addresses=(1000, 1100), n_channels=2, kind=FifoKind.PER_CHANNEL)
+KEPT = FifoLayout(addresses=(1000,), n_channels=2, removes=False)
+UNCOUNTED = FifoLayout(addresses=(1000,), n_channels=2, has_counter=False)
+
+
+class Plant:
+    """A device with queues on a stepped clock, and a source that reads them."""
+
+    def __init__(self, feed, calibration, clock, layout: FifoLayout, server, **device) -> None:
+        self.clock, self.server = clock, server
+        self.source: FifoSource
+        self._rate_hz = calibration.rate_hz
+
+    def run(self, n_steps: int = 1) -> None:
+        self.device.produce(n_steps)
+        self.clock.step(n_steps * self.device.step_s)
+
+
+@pytest.fixture
+def plant(counting_feed, counts_calibration, stepped_clock) -> Callable:
+    @asynccontextmanager
+    async def build(
+        layout: FifoLayout = INTERLEAVED, settings=None, step: int = STEP, **device
+    ) -> AsyncIterator[Plant]:
+        own = FifoDevice(
+            counting_feed(), layout, **({"step_samples": step, "depth_samples": 4000} | device)
+        )
+        async with ModbusTcpServer(own) as server:
+            plant = Plant(None, counts_calibration(), stepped_clock, layout, server)
+            plant.device = own
+            transport = TcpTransport(host="127.0.0.1", port=server.port)
+            plant.source = FifoSource(
+                FifoSettings(transport=transport, **({"poll_period_s": 1e-6} | (settings or {}))),
+                layout,
+                counts_calibration(),
+                stepped_clock,
+            )
+            yield plant
+
+    return build
+
+
+async def up_to(stream, stop_index: int, epoch: int | None = None) -> list[SampleBlock]:
+    blocks = [await anext(stream)]
+    while blocks[-1].stop_index < stop_index or epoch not in (None, blocks[-1].epoch):
+        blocks.append(await anext(stream))
+    return blocks
+
+
+def assert_right(blocks: list[SampleBlock], offset: int = 0) -> None:
+    """Channel 0 is the sample's number, channel 1 one ahead."""
+    for block in blocks:
+        number = np.arange(block.first_index, block.stop_index) + offset
+        np.testing.assert_array_equal(block.samples[0], number % 2**15)
+        np.testing.assert_array_equal(block.samples[1], (number + 1) % 2**15)
+
+
+def gaps(blocks: list[SampleBlock]) -> list[tuple[int, int]]:
+    return [
+        (before.stop_index, after.first_index - before.stop_index)
+        for before, after in itertools.pairwise(blocks)
+        if after.first_index != before.stop_index
+    ]
+
+
+@pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL], ids=["interleaved", "per_channel"])
+async def test_the_counter_wraps_without_a_gap(plant, layout) -> None:
+    async with plant(layout, first_counter=65_400) as p, p.source.connect() as stream:
+        p.run(40)
+        blocks = await up_to(stream, 65_400 + 40 * STEP)
+
+    assert blocks[0].first_index == 65_400
+    assert gaps(blocks) == []
+    assert_right(blocks, offset=-65_400)
+
+
+@pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL], ids=["interleaved", "per_channel"])
+async def test_a_thousand_losses_are_counted_exactly(plant, layout) -> None:
+    rng = np.random.default_rng(8)
+    async with plant(layout, step=5) as p, p.source.connect() as stream:
+        blocks = [await anext(stream)] if False else []
+        lost = 0
+        for _ in range(100):
+            for _ in range(10):
+                n_dropped = int(rng.integers(1, 4))
+                p.device.spoil("drop", n_dropped)
+                lost += 5 * n_dropped
+                p.run(n_dropped + 2)
+            newest = p.device._position * 5
+            blocks += await up_to(stream, newest - 55)
+        n_taken = sum(b.n_samples for b in blocks)
+
+    assert sum(n for _, n in gaps(blocks)) + n_taken == blocks[-1].stop_index
+    assert len(gaps(blocks)) >= 990
+    assert all(n % 5 == 0 for _, n in gaps(blocks))
+    assert_right(blocks)
+
+
+async def test_a_loss_longer_than_the_counter_is_exact_by_the_clock(plant) -> None:
+    async with plant() as p:
+        async with p.source.connect() as stream:
+            p.run(1)
+            before = (await up_to(stream, 100))[-1]
+        p.run(3 * 65_536 // STEP)
+        async with p.source.connect() as stream:
+            p.run(2)
+            after = await anext(stream)
+
+    assert after.epoch == before.epoch
+    assert after.first_index > 3 * 65_536
+    assert_right([after])
+
+
+async def test_a_restart_is_a_new_epoch(plant) -> None:
+    async with plant(first_counter=20_000) as p, p.source.connect() as stream:
+        p.run(4)
+        before = await up_to(stream, 20_000 + 5 * STEP)
+        p.server.inject("reset_counter")
+        p.run(4)
+        after = await up_to(stream, 4 * STEP, before[0].epoch + 1)
+
+    assert {b.epoch for b in after} == {before[0].epoch + 1}
+    assert after[0].first_index == 0
+
+
+async def test_an_overflow_is_an_exact_gap(plant) -> None:
+    async with plant(depth_samples=200) as p, p.source.connect() as stream:
+        first = await anext(stream)
+        p.run(10)
+        rest = await up_to(stream, 550)
+
+    assert p.device.n_lost == 300
+    assert gaps([first, *rest]) == [(50, 300)]
+    assert_right([first, *rest])
+
+
+async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(plant) -> None:
+    async with plant(KEPT, step=5) as p, p.source.connect() as stream:
+        blocks = []
+        for n in range(40):
+            p.run(1)
+            if n % 10 == 9:
+                blocks += await up_to(stream, 50 * (n // 10 + 1) - 50) if n > 9 else []
+        n_taken = sum(b.n_samples for b in blocks)
+
+    assert (
+        n_taken + sum(n for _, n in gaps(blocks)) == blocks[-1].stop_index - blocks[0].first_index
+    )
+    assert_right(blocks)
+
+
+async def test_times_are_even_and_rise_with_the_index(plant) -> None:
+    async with plant() as p, p.source.connect() as stream:
+        blocks = []
+        for n in range(1, 400):
+            p.run(1)
+            blocks += await up_to(stream, n * STEP)
+
+    starts = np.array([b.start_ns for b in blocks])
+    expected = np.array([b.first_index for b in blocks]) / 600.0 * 1e9
+    assert np.all(np.diff(starts) > 0)
+    assert np.ptp(starts - expected) < 5e6
+    assert blocks[-1].clock.offset_s is None
+
+
+async def test_without_a_counter_a_loss_ends_the_epoch(plant) -> None:
+    async with plant(UNCOUNTED) as p, p.source.connect() as stream:
+        p.run(1)
+        first = await anext(stream)
+        for _ in range(30):
+            p.run(1)
+            last = await anext(stream)
+        p.device.spoil("drop", 5)
+        p.run(6)
+        p.run(1)
+        after = await up_to(stream, STEP, first.epoch + 1)
+
+    assert last.epoch == first.epoch
+    assert after[-1].epoch == first.epoch + 1
+    for block in after[-1:]:
+        assert np.diff(block.samples[0]).tolist() == [1.0] * (block.n_samples - 1)
+
+
+async def test_without_a_counter_what_waited_for_a_reader_is_thrown_away(plant) -> None:
+    async with plant(UNCOUNTED) as p:
+        async with p.source.connect() as stream:
+            p.run(1)
+            first = await anext(stream)
+        p.run(20)
+        async with p.source.connect() as stream:
+            p.run(2)
+            after = await anext(stream)
+
+    assert after.epoch == first.epoch + 1
+    assert after.samples[0, 0] >= 22 * STEP
+
+
+async def test_a_device_that_gives_nothing_new_is_not_connected(plant) -> None:
+    async with plant(settings={"poll_period_s": 0.5}) as p:
+        async with p.source.connect() as stream:
+            await anext(stream)
+            with pytest.raises(LinkError, match="data stand still"):
+                await anext(stream)
+        p.run(2)
+        async with p.source.connect() as stream:
+            assert (await anext(stream)).first_index == STEP
+
+
+async def test_a_link_slower_than_the_device_is_told(plant, monkeypatch) -> None:
+    async with plant(depth_samples=100_000) as p, p.source.connect() as stream:
+        answer = p.device.read_fifo
+
+        def slowly(address: int):
+            p.run(1)
+            return answer(address)
+
+        monkeypatch.setattr(p.device, "read_fifo", slowly)
+        with pytest.raises(LinkError, match="too slow for 600 samples per second"):
+            await up_to(stream, 10**9)
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "said"),
+    [
+        ("exception_3", ConfigError, "illegal value"),
+        ("busy", LinkError, "busy"),
+        ("cut", LinkError, "closed"),
+    ],
+)
+async def test_a_refused_reading_is_never_repeated(plant, fault, error, said) -> None:
+    async with plant() as p, p.source.connect() as stream:
+        await anext(stream)
+        n_before = p.server.function_codes[0x18]
+        p.server.inject(fault)
+        with pytest.raises(error, match=said):
+            await anext(stream)
+        assert p.server.function_codes[0x18] == n_before + 1
+        assert set(p.server.function_codes) == {0x18}
+
+
+async def test_a_reading_that_holds_no_whole_records_is_refused(plant) -> None:
+    three = FifoLayout(addresses=(1000,), n_channels=3)
+    async with plant(three) as p:
+        with pytest.raises(ConfigError, match="FIFO of 3 channels for 2"):
+            FifoSource(p.source._settings, three, p.source._calibration, p.clock)
+        p.source._layout = FifoLayout(addresses=(1000,), n_channels=2)
+        p.device._layout = FifoLayout(addresses=(1000,), n_channels=2, has_counter=False)
+        p.device.produce(1)
+        with pytest.raises(LinkError, match="no whole records"):
+            async with p.source.connect() as stream:
+                await anext(stream)
+
+
+async def test_a_queue_that_is_not_there_can_never_work(plant) -> None:
+    async with plant() as p:
+        p.source._layout = FifoLayout(addresses=(2000,), n_channels=2)
+        with pytest.raises(ConfigError, match="illegal address"):
+            async with p.source.connect() as stream:
+                await anext(stream)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"addresses": (0,), "n_channels": 31}, "32 registers; a FIFO read has at most 31"),
+        ({"addresses": (0, 1), "n_channels": 2}, "must be 1, got 2"),
+        ({"addresses": (0,), "n_channels": 2, "kind": FifoKind.PER_CHANNEL}, "must be 2, got 1"),
+        ({"addresses": (5, 5), "n_channels": 2, "kind": FifoKind.PER_CHANNEL}, "names a queue"),
+        ({"addresses": (70_000,), "n_channels": 2}, "0 to 65535"),
+        ({"addresses": (0,), "n_channels": 2, "has_counter": False, "removes": False}, "are new"),
+        (
+            {
+                "addresses": (0, 1),
+                "n_channels": 2,
+                "has_counter": False,
+                "kind": FifoKind.PER_CHANNEL,
+            },
+            "belong together",
+        ),
+    ],
+)
+def test_a_queue_that_cannot_be_followed_is_refused_at_once(settings, said: str) -> None:
+    with pytest.raises(MapError, match=said):
+        FifoLayout(**settings)
