@@ -23,6 +23,9 @@ QUICK_ANALYSIS = """
 segment_samples = 4096
 overlap = 0.5
 n_segments = 6
+
+[alarms]
+link_lost_after_s = 2.0
 """
 """The first result after seven seconds, then one every 3.4; the plant's own are 14 and 12."""
 
@@ -53,8 +56,8 @@ class Plant:
         self.url = ""
 
     def start_daq(self) -> None:
-        self._daq = self._start("daq", str(self._plant_file()), "--until-input-ends")
-        self._daq_port = json.loads(read_line(self._daq))["U1"]
+        self._daq = self._start("daq", str(self._plant_file()), "--control")
+        self._daq_port = json.loads(read_line(self._daq))["U1"]["port"]
 
     def stop_daq(self) -> None:
         stop(self._daq)

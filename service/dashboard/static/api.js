@@ -15,20 +15,30 @@ export class Refused extends Error {
 
 /** Fetch JSON from `/api/v1`; `path` is a list of segments, `query` a list of pairs. */
 export async function ask(path, query = [], signal = undefined) {
-  const url = `/api/v1/${path.map(encodeURIComponent).join("/")}`;
   const search = new URLSearchParams(query).toString();
-  const response = await answer(search ? `${url}?${search}` : url, signal);
+  return given(await answer(search ? `${urlOf(path)}?${search}` : urlOf(path), signal));
+}
+
+/** Ask `/api/v1` to do something; `body` is sent as JSON. */
+export async function tell(path, body) {
+  const headers = { Accept: "application/json", "Content-Type": "application/json" };
+  return given(await answer(urlOf(path), undefined, { method: "POST", headers, body: JSON.stringify(body) }));
+}
+
+const urlOf = (path) => `/api/v1/${path.map(encodeURIComponent).join("/")}`;
+
+async function given(response) {
   const body = await decoded(response);
   if (!response.ok) throw new Refused(response.status, sentenceOf(response, body));
   if (body === null) throw new NotReachable("The answer does not come from padwatch.");
   return body;
 }
 
-async function answer(url, signal) {
+async function answer(url, signal, how = { headers: { Accept: "application/json" } }) {
   const limit = AbortSignal.timeout(TIMEOUT_MS);
   const either = signal ? AbortSignal.any([signal, limit]) : limit;
   try {
-    return await fetch(url, { signal: either, cache: "no-store", headers: { Accept: "application/json" } });
+    return await fetch(url, { ...how, signal: either, cache: "no-store" });
   } catch (failure) {
     if (signal?.aborted) throw failure;
     throw new NotReachable(limit.aborted ? `No answer within ${TIMEOUT_MS / 1000} s.` : "No connection.");

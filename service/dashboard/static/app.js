@@ -1,11 +1,14 @@
 /** The page as a whole: polls the overview, follows the address, redraws every second. */
 
+import { countWords } from "./alarm_words.js";
 import { NotReachable, ask } from "./api.js";
 import { formatAge, formatTime, formatZone } from "./format.js";
-import { setText } from "./dom.js";
+import { setAttribute, setText } from "./dom.js";
 import { SILENCE, failedNow, heardNow, moment, viewAt } from "./live.js";
 import { poll } from "./poll.js";
-import { routeOf } from "./route.js";
+import { ALARMS_ADDRESS, routeOf } from "./route.js";
+import { mark } from "./parts/mark.js";
+import { alarmsPage } from "./pages/alarms.js";
 import { bearingPage } from "./pages/bearing.js";
 import { overviewPage } from "./pages/overview.js";
 
@@ -14,6 +17,9 @@ const REDRAW_PERIOD_MS = 1000;
 
 const main = document.getElementById("main");
 const banner = document.getElementById("banner");
+const alarmLink = document.getElementById("alarms");
+const alarms = mark();
+alarmLink.append(alarms.node);
 let live = SILENCE;
 let page = null;
 
@@ -38,6 +44,7 @@ function drawBar(view) {
   setText(document.getElementById("clock"), `${formatTime(Date.now())} ${formatZone(Date.now())}`);
   setText(document.getElementById("service"), serviceSentence(view));
   document.getElementById("replay").hidden = view.origin !== "replay";
+  alarms.draw(...countWords(view.alarms));
   banner.hidden = view.failure === null;
   setText(document.getElementById("failure"), view.failure ?? "");
   setText(document.getElementById("failure-age"), view.failure === null ? "" : failureAge(view));
@@ -59,10 +66,13 @@ function failureAge(view) {
 }
 
 function openPage() {
+  const onAlarms = location.hash === ALARMS_ADDRESS;
   const route = routeOf(location.hash);
   page?.close();
   main.replaceChildren();
-  page = route ? bearingPage(main, route.unit, route.bearing) : overviewPage(main);
+  if (onAlarms) page = alarmsPage(main);
+  else page = route ? bearingPage(main, route.unit, route.bearing) : overviewPage(main);
+  setAttribute(alarmLink, "aria-current", onAlarms ? "page" : null);
   window.scrollTo(0, 0);
   draw();
 }

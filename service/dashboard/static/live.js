@@ -43,6 +43,8 @@ export function viewAt(live, now) {
     plant: live.overview?.plant.name ?? null,
     origin: live.overview?.plant.origin ?? null,
     storeError: live.overview?.store.error ?? null,
+    captureError: live.overview?.captures.error ?? null,
+    alarms: current ? live.overview.alarms : null,
     refreshS: live.overview?.refresh_s ?? null,
     serviceTimeMs: live.overview ? Date.parse(live.overview.time) + silenceS * 1000 : null,
     units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, silenceS, current)),

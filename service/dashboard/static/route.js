@@ -1,4 +1,6 @@
-/** Addresses within the page: `#/` and `#/units/U1/bearings/UJB`. */
+/** Addresses within the page: `#/`, `#/alarms` and `#/units/U1/bearings/UJB`. */
+
+export const ALARMS_ADDRESS = "#/alarms";
 
 /** Address of a bearing's page. */
 export function bearingAddress(unit, bearing) {

@@ -221,6 +221,19 @@ async def test_a_link_that_is_lost_for_long_is_an_alarm_of_its_own(plant: Any) -
     assert changes(plant, "U2:link:link_lost") == []
 
 
+async def test_a_device_that_refuses_is_an_alarm_with_what_it_said(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    refused = [[LinkError("10.0.0.7:502: Connection refused")] for _ in range(60)]
+
+    await play(plant, scripted, [block(0), LinkError("reset by peer")], *refused, [block(1)])
+
+    raised, returned, *_ = events(plant, alarm=LINK)
+    assert (raised.change, raised.reason) == ("raised", "10.0.0.7:502: Connection refused")
+    assert returned.change == "returned"
+    assert 10.0 <= (raised.time_ns - T0) / 1e9 <= 10.6  # of the clock that passes while one waits
+
+
 async def test_a_unit_that_never_answers_is_an_alarm_too(plant: Any) -> None:
     for seconds in (0.0, 5.0, 11.0):
         plant.clock.elapsed_s = seconds

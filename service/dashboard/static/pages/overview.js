@@ -34,8 +34,9 @@ const LOOK_WORDS = { bad: "bad", uncertain: "uncertain", absent: "without full r
 function tallyView(node) {
   const words = element("span");
   const store = mark();
+  const captures = mark();
   const marks = Object.fromEntries(Object.keys(LOOK_WORDS).map((look) => [look, mark()]));
-  node.append(words, ...Object.values(marks).map((one) => one.node), store.node);
+  node.append(words, ...Object.values(marks).map((one) => one.node), store.node, captures.node);
   return {
     draw(view) {
       const qualities = view.units.flatMap((unit) => unit.bearings.map(qualityOf));
@@ -43,6 +44,8 @@ function tallyView(node) {
       const n = (look) => looks.filter((one) => one === look).length;
       store.node.hidden = view.storeError === null;
       store.draw("bad", `Results are not being stored: ${view.storeError}`);
+      captures.node.hidden = view.captureError === null;
+      captures.draw("uncertain", `Samples around alarms are not kept: ${view.captureError}`);
       setText(words, tallyWords(view, looks.length));
       for (const [look, one] of Object.entries(marks)) {
         one.node.hidden = n(look) === 0;

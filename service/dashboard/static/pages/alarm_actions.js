@@ -1,0 +1,82 @@
+/** What somebody may do to one alarm: acknowledge it, shelve it, bring it back. */
+
+import { tell } from "../api.js";
+import { element, setText } from "../dom.js";
+
+const DURATIONS = [
+  ["900", "15 min"],
+  ["3600", "1 h"],
+  ["28800", "8 h"],
+  ["86400", "24 h"],
+];
+
+/** Returns `{ node, draw(alarm) }`; `again` asks for the list afresh. */
+export function alarmActions(actor, again) {
+  let alarm = null;
+  const failure = element("span", { class: "action-failure", role: "alert" });
+
+  async function act(action, body = {}) {
+    const name = actor.name();
+    if (name === null) {
+      setText(failure, "Give your name first.");
+      return false;
+    }
+    try {
+      await tell(["alarms", alarm.id, action], { actor: name, ...body });
+      setText(failure, "");
+      return true;
+    } catch (error) {
+      setText(failure, error.message);
+      return false;
+    } finally {
+      again();
+    }
+  }
+
+  const acknowledge = button("Acknowledge", () => act("acknowledge", { occurrence: alarm.occurrence }));
+  const reset = button("Reset", () => act("reset"));
+  const unshelve = button("Unshelve", () => act("unshelve"));
+  const back = button("Return to service", () => act("return-to-service"));
+  const form = shelfForm((body) => act("shelve", body));
+  const shelve = button("Shelve…", () => form.open());
+  return {
+    node: element("span", { class: "actions" }, acknowledge, reset, shelve, unshelve, back, form.node, failure),
+    draw(now) {
+      alarm = now;
+      acknowledge.hidden = now.is_acknowledged;
+      reset.hidden = !now.is_latched || !now.is_acknowledged;
+      unshelve.hidden = now.shelf === null;
+      shelve.hidden = now.shelf !== null || !form.node.hidden;
+      back.hidden = now.outage === null;
+    },
+  };
+}
+
+function shelfForm(submit) {
+  const reason = element("input", { required: "", maxlength: "500", "aria-label": "Why it is shelved", placeholder: "why" });
+  const choices = DURATIONS.map(([value, words]) => element("option", { value }, words));
+  const duration = element("select", { "aria-label": "For how long" }, ...choices);
+  const close = button("Cancel", () => (node.hidden = true));
+  const send = element("button", { type: "submit" }, "Shelve");
+  const node = element("form", { class: "shelf-form", hidden: "" }, reason, duration, send, close);
+  node.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    if (await submit({ reason: reason.value.trim(), duration_s: Number(duration.value) })) {
+      node.hidden = true;
+      reason.value = "";
+    }
+  });
+  return {
+    node,
+    open() {
+      node.hidden = false;
+      reason.focus();
+    },
+  };
+}
+
+function button(words, onClick) {
+  const node = element("button", { type: "button" }, words);
+  node.addEventListener("click", onClick);
+  return node;
+}

@@ -1,0 +1,53 @@
+/** The newest events of all alarms, one line each. */
+
+import { alarmReasonWords, changeWords, kindWords, placeWords, valueWords } from "../alarm_words.js";
+import { element, setText } from "../dom.js";
+import { formatTime } from "../format.js";
+
+const HEADS = ["Time", "Where", "What", "Change", "Value", "By", "Reason"];
+
+/** Returns `{ node, draw(events), fail(sentence) }`. */
+export function historyTable() {
+  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
+  const body = element("tbody", { role: "rowgroup" });
+  const sentence = element("p", { class: "sentence" }, "Nothing has happened yet.");
+  const table = element(
+    "table",
+    { role: "table", "aria-label": "History", hidden: "" },
+    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads)),
+    body,
+  );
+  let newest = null;
+  return {
+    node: element("section", { class: "panel alarm-list" }, element("h2", {}, "History"), sentence, table),
+    draw(events) {
+      table.hidden = events.length === 0;
+      sentence.hidden = events.length > 0;
+      setText(sentence, "Nothing has happened yet.");
+      if (events[0]?.id === newest) return; // events never change
+      newest = events[0]?.id ?? null;
+      body.replaceChildren(...events.map(eventRow));
+    },
+    fail(words) {
+      sentence.hidden = false;
+      setText(sentence, `The history cannot be read: ${words}`);
+    },
+  };
+}
+
+function eventRow(event) {
+  const cells = [
+    formatTime(Date.parse(event.time)),
+    placeWords(event),
+    kindWords(event.kind),
+    changeWords(event.change) + (event.change === "raised" && event.level === "danger" ? " as danger" : ""),
+    valueWords(event),
+    event.actor,
+    event.actor ? event.reason : alarmReasonWords(event.reason),
+  ];
+  return element(
+    "tr",
+    { role: "row", "data-event": String(event.id) },
+    ...cells.map((words, index) => element("td", { role: "cell", "data-head": HEADS[index] }, words)),
+  );
+}

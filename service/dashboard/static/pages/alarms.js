@@ -1,0 +1,94 @@
+/** The alarm list: what is wrong and seen, what somebody has taken off the list, and the history. */
+
+import { conditionWords, isHidden } from "../alarm_words.js";
+import { ask } from "../api.js";
+import { element, setText } from "../dom.js";
+import { formatAge } from "../format.js";
+import { CURRENT_LIMIT_S, moment, secondsBetween } from "../live.js";
+import { mark } from "../parts/mark.js";
+import { poll } from "../poll.js";
+import { actorField } from "./alarm_actor.js";
+import { historyTable } from "./alarm_history.js";
+import { alarmTable } from "./alarm_table.js";
+
+const LIST_PERIOD_S = 2;
+const HISTORY_PERIOD_S = 5;
+const N_EVENTS = "50";
+
+/** Returns `{ draw(view), close() }`. */
+export function alarmsPage(main) {
+  document.title = "padwatch: alarms";
+  const state = mark();
+  const actor = actorField();
+  const again = () => lists.again();
+  const listed = alarmTable("On the list", "Nothing is on the list.", actor, again);
+  const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);
+  const unjudged = unjudgedView();
+  const history = historyTable();
+  const head = element("div", { class: "alarms-head" }, element("h1", {}, "Alarms"), state.node, actor.node);
+  main.append(head, listed.node, unjudged.node, hidden.node, history.node);
+  let heard = null;
+  let failure = null;
+
+  function draw() {
+    const silenceS = heard ? secondsBetween(heard, moment()) : null;
+    const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
+    state.node.hidden = current && failure === null;
+    state.draw("bad", silenceWords(silenceS, failure));
+    for (const table of [listed, hidden]) table.setCurrent(current);
+  }
+
+  async function askList(signal) {
+    try {
+      const found = await ask(["alarms"], [], signal);
+      [heard, failure] = [moment(), null];
+      listed.draw(found.alarms.filter((alarm) => !isHidden(alarm)));
+      hidden.draw(found.alarms.filter(isHidden));
+      unjudged.draw(found.unjudged);
+    } catch (error) {
+      if (signal.aborted) return;
+      failure = error.message;
+    }
+    draw();
+  }
+
+  async function askHistory(signal) {
+    try {
+      history.draw((await ask(["alarms", "events"], [["limit", N_EVENTS]], signal)).events);
+    } catch (error) {
+      if (!signal.aborted) history.fail(error.message);
+    }
+  }
+
+  const lists = poll(askList, () => LIST_PERIOD_S);
+  const histories = poll(askHistory, () => HISTORY_PERIOD_S);
+  return {
+    draw,
+    close() {
+      lists.stop();
+      histories.stop();
+    },
+  };
+}
+
+function silenceWords(silenceS, failure) {
+  if (silenceS === null) return failure ?? "Waiting for the list.";
+  return `This list is ${formatAge(silenceS)} old: what has happened since is not known. ${failure ?? ""}`;
+}
+
+/** Alarms that are not active as far as was known last, but whose condition is not known now. */
+function unjudgedView() {
+  const title = element("summary", {});
+  const list = element("ul", {});
+  const node = element("details", { class: "panel unjudged", hidden: "" }, title, list);
+  return {
+    node,
+    draw(alarms) {
+      node.hidden = alarms.length === 0;
+      setText(title, `${alarms.length} not active when last judged, and cannot be judged now`);
+      const wanted = alarms.map((alarm) => `${alarm.id}: ${conditionWords(alarm)}`);
+      while (list.childElementCount > wanted.length) list.lastChild.remove();
+      wanted.forEach((words, n) => setText(list.children[n] ?? list.appendChild(element("li")), words));
+    },
+  };
+}
