@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from acquisition.calibration import UnitCalibration
-from acquisition.can.dbc import DbcSignal, load_dbc
+from acquisition.can.dbc import DbcSignal, load_dbc, parse_dbc
 from acquisition.can.layout import FrameLayout, ScalarReader, scalar_reader
 from acquisition.can.plan import (
     EPOCH,
@@ -50,7 +50,9 @@ class _Compiler:
     def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
         self._settings = settings
         self._calibration = calibration
-        self._table = SignalTable(load_dbc(settings.dbc))
+        text = settings.dbc_text
+        messages = load_dbc(settings.dbc) if text is None else parse_dbc(text, settings.dbc)
+        self._table = SignalTable(messages)
         self._waves: list[Place] = []
         self._wave_signals: list[list[DbcSignal]] = []
         self._channels: list[list[DbcSignal]] = []

@@ -97,7 +97,12 @@ def frame_key(frame_id: int, extended: bool) -> int:
 
 
 def load_dbc(path: Path) -> dict[str, DbcMessage]:
-    """Read a DBC file.
+    """Read a DBC file; see `parse_dbc`."""
+    return parse_dbc(_text(path), path)
+
+
+def parse_dbc(text: str, path: Path) -> dict[str, DbcMessage]:
+    """Read the text of a DBC file.
 
     Returns
     -------
@@ -110,7 +115,7 @@ def load_dbc(path: Path) -> dict[str, DbcMessage]:
         If the file cannot be read, is no DBC, has overlapping signals, or two messages with one id.
     """
     try:
-        database = load_string(_text(path), database_format="dbc")
+        database = load_string(text, database_format="dbc")
     except (DatabaseError, ValueError, KeyError) as exc:
         raise ConfigError(f"{path}: not a DBC file that can be used: {exc}") from exc
     if not isinstance(database, Database) or not database.messages:

@@ -69,6 +69,10 @@ class CanSettings:
 
     Parameters
     ----------
+    dbc
+        The DBC file.
+    dbc_text
+        What would stand in it, where it is no file but follows from a profile.
     counters
         Signals that say to which sample a message belongs, at most one for each message. All
         messages of the waveform channels have one, or none has; without, frames are counted.
@@ -98,6 +102,7 @@ class CanSettings:
 
     link: CanLinkSettings
     dbc: Path
+    dbc_text: str | None = None
     channels: tuple[CanChannel, ...]
     slow: tuple[CanSlowChannel, ...] = ()
     counters: tuple[str, ...] = ()

@@ -38,10 +38,11 @@ class CanBusServer(CanDaqServer):
         *,
         interface: str = "virtual",
         channel: str = "padwatch",
-        unpaced: bool = False,
+        on_demand: bool = False,
+        patient: bool = False,
         **options: Any,
     ) -> None:
-        super().__init__(device, clock, unpaced)
+        super().__init__(device, clock, on_demand, patient)
         self._interface = interface
         self._channel = channel
         self._options = options

@@ -7,6 +7,7 @@ from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, C
 from acquisition.daq.can_shape import CanShape, Field, Kind, MessageShape, dbc_name
 
 _NODE = "DAQ"
+_NAME = "the simulated CAN DAQ's own DBC"
 _CLASSIC_FORMAT, _FD_FORMAT = 0, 14
 _HEADER = f"""VERSION ""
 
@@ -40,9 +41,9 @@ def daq_dbc(shape: CanShape) -> str:
 
 
 def daq_settings(
-    shape: CanShape, link: CanLinkSettings, dbc: Path, units: tuple[str, ...], **others: Any
+    shape: CanShape, link: CanLinkSettings, units: tuple[str, ...], **others: Any
 ) -> CanSettings:
-    """Settings of a source that reads the simulated DAQ.
+    """Settings of a source that reads the simulated DAQ; its DBC need not lie in a file.
 
     Parameters
     ----------
@@ -54,7 +55,8 @@ def daq_settings(
     where = {field.name: m.name for m in shape.messages for field in m.fields}
     return CanSettings(
         link=link,
-        dbc=dbc,
+        dbc=Path(_NAME),
+        dbc_text=daq_dbc(shape),
         channels=tuple(
             CanChannel(c.id, unit, tuple(f"{where[n]}.{n}" for n in shape.sample_names(c.id)))
             for c, unit in zip(shape.channels, units, strict=True)

@@ -71,6 +71,11 @@ class CanDevice:
         """Whether a block waits to be sent."""
         return bool(self._waiting)
 
+    @property
+    def is_full(self) -> bool:
+        """Whether the next block pushes the oldest one out."""
+        return len(self._waiting) == self._waiting.maxlen
+
     def next_frames(self) -> list[WireFrame]:
         """Take the oldest block that waits.
 

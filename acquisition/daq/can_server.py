@@ -20,8 +20,11 @@ class CanDaqServer:
     clock
         Paces the device, which catches up after any delay; without one the device stands until
         its ``produce`` is called and `wake` after it.
-    unpaced
-        Produce as fast as the reader takes, instead; nothing is lost while one listens.
+    on_demand
+        Without a clock: produce as fast as the reader takes; nothing is lost while one listens.
+    patient
+        With a clock: wait while nobody listens, or while the reader is behind, so that nothing is
+        lost; else the oldest blocks are.
     as_line
         How frames are written as text, if they are.
     """
@@ -30,16 +33,19 @@ class CanDaqServer:
         self,
         device: CanDevice,
         clock: Clock | None,
-        unpaced: bool,
+        on_demand: bool,
+        patient: bool,
         as_line: Callable[[WireFrame], bytes] | None = None,
     ) -> None:
         self.device = device
         self._clock = clock
-        self._unpaced = unpaced
+        self._on_demand = on_demand
+        self._patient = patient
         self._origin_s: float | None = None
         self._faults = FrameFaults(as_line)
         self._tasks: list[asyncio.Task[None]] = []
         self._awake = asyncio.Event()
+        self._taken = asyncio.Event()
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
@@ -66,7 +72,7 @@ class CanDaqServer:
     async def __aenter__(self) -> Self:
         await self._plug_in()
         self._tasks = [asyncio.create_task(self._serve(), name="can daq server")]
-        if self._clock is not None and not self._unpaced:
+        if self._clock is not None:
             pace = self._pace(self._clock)
             self._tasks.append(asyncio.create_task(pace, name="can daq server pace"))
         return self
@@ -120,18 +126,32 @@ class CanDaqServer:
         while self.device.has_frames or not self.device.ended:
             await self._listened_to()
             if not self.device.has_frames:
-                if self._unpaced:
+                if self._on_demand:
                     self.device.produce()
                     continue
                 self._awake.clear()
                 await self._awake.wait()
                 continue
             await self._send(self._faults.applied(self.device.next_frames()))
+            self._taken.set()
 
     async def _pace(self, clock: Clock) -> None:
         if self._origin_s is None:
+            await self._wait_for_reader()
             self._origin_s = clock.monotonic_s()
         while not self.device.ended:
+            before_s = clock.monotonic_s()
+            await self._wait_for_reader()
+            self._origin_s += clock.monotonic_s() - before_s
             due_s = self._origin_s + self.device.elapsed_ns / NS_PER_S
             await clock.sleep(max(0.0, due_s - clock.monotonic_s()))
             self.produce()
+
+    async def _wait_for_reader(self) -> None:
+        """Let a recording wait until somebody takes it; a machine waits for nobody."""
+        if not self._patient:
+            return
+        await self._listened_to()
+        while self.device.is_full:
+            self._taken.clear()
+            await self._taken.wait()

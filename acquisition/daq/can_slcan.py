@@ -51,8 +51,10 @@ class _SlcanServer(CanDaqServer):
         How often each command letter has come; frames to be sent have ``t``, ``T``, ``r``, ….
     """
 
-    def __init__(self, device: CanDevice, clock: Clock | None, unpaced: bool) -> None:
-        super().__init__(device, clock, unpaced, as_line=slcan_line)
+    def __init__(
+        self, device: CanDevice, clock: Clock | None, on_demand: bool, patient: bool
+    ) -> None:
+        super().__init__(device, clock, on_demand, patient, as_line=slcan_line)
         self.commands: Counter[str] = Counter()
         self._open = asyncio.Event()
         self._bus_off = False
@@ -107,11 +109,12 @@ class SlcanTcpServer(_SlcanServer):
         device: CanDevice,
         clock: Clock | None = None,
         *,
-        unpaced: bool = False,
         host: str = "127.0.0.1",
         port: int = 0,
+        on_demand: bool = False,
+        patient: bool = False,
     ) -> None:
-        super().__init__(device, clock, unpaced)
+        super().__init__(device, clock, on_demand, patient)
         self._host = host
         self._port = port
         self._writer: asyncio.StreamWriter | None = None
@@ -176,10 +179,11 @@ class SlcanPtyServer(_SlcanServer):
         device: CanDevice,
         clock: Clock | None = None,
         *,
-        unpaced: bool = False,
         link: Path | None = None,
+        on_demand: bool = False,
+        patient: bool = False,
     ) -> None:
-        super().__init__(device, clock, unpaced)
+        super().__init__(device, clock, on_demand, patient)
         self._link = link
         self._master = self._slave = -1
         self._path = ""

@@ -1,7 +1,6 @@
 """A simulated CAN DAQ and padwatch's source for it, in any shape."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from acquisition.can.settings import CanLinkSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_dbc import daq_settings
 from acquisition.daq.can_shape import CanShape, DaqSignal
 from acquisition.raw import FeedEndedError, RawBlock
 from core.blocks import SampleBlock
@@ -95,20 +94,18 @@ def shape_of() -> Callable[..., CanShape]:
 
 
 @pytest.fixture
-def source_of(tmp_path, counts_calibration) -> Callable[..., CanSource]:
+def source_of(counts_calibration) -> Callable[..., CanSource]:
     """Builds sources that read a DAQ of a shape at an endpoint; other settings as keywords."""
 
     def build(
         shape: CanShape, endpoint, clock=None, options=None, opener=None, **settings
     ) -> CanSource:
-        dbc = Path(tmp_path) / "daq.dbc"
-        dbc.write_text(daq_dbc(shape), encoding="utf-8")
         link = CanLinkSettings(**endpoint, fd=shape.fd, options=options or {})
         n_channels, n_slow = len(shape.channels), len(shape.slow)
         calibration = counts_calibration(n_channels=n_channels, n_slow=n_slow)
         units = ("um",) * n_channels
         return CanSource(
-            daq_settings(shape, link, dbc, units, **settings),
+            daq_settings(shape, link, units, **settings),
             calibration,
             clock or SystemClock(),
             *([opener] if opener else []),

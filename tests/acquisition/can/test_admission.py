@@ -13,7 +13,7 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
 from acquisition.daq.can_bus import _message
-from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_dbc import daq_settings
 from acquisition.daq.can_faults import FrameFaults
 from acquisition.daq.can_frames import FrameEncoder
 
@@ -31,11 +31,9 @@ def refused() -> Counter:
 
 
 @pytest.fixture
-def gate(tmp_path, shape, counts_calibration, refused) -> FrameGate:
-    dbc = tmp_path / "daq.dbc"
-    dbc.write_text(daq_dbc(shape), encoding="utf-8")
+def gate(shape, counts_calibration, refused) -> FrameGate:
     link = CanLinkSettings(interface="virtual", channel="none")
-    settings = daq_settings(shape, link, dbc, ("um",) * 4)
+    settings = daq_settings(shape, link, ("um",) * 4)
     return FrameGate(compile_plan(settings, counts_calibration(n_channels=4)), refused)
 
 

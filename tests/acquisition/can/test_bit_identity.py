@@ -50,7 +50,7 @@ async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
     direct = straight(eventful_feed(floats=floats, seed=seed), counts_calibration(n_channels=4))
     shape = shape_of(fd=fd, floats=floats)
     device = CanDevice(eventful_feed(floats=floats, seed=seed), shape)
-    async with SlcanTcpServer(device, unpaced=True) as server:
+    async with SlcanTcpServer(device, on_demand=True) as server:
         source = source_of(shape, server.endpoint, when_full="wait")
         wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
         await server.run()
@@ -66,7 +66,7 @@ async def test_a_pseudo_terminal_carries_the_same(
 ):
     direct = straight(eventful_feed(), counts_calibration(n_channels=4))
     shape = shape_of(fd=fd, extended=True, base_id=0x18FF0100)
-    async with SlcanPtyServer(CanDevice(eventful_feed(), shape), unpaced=True) as server:
+    async with SlcanPtyServer(CanDevice(eventful_feed(), shape), on_demand=True) as server:
         source = source_of(shape, server.endpoint, options=NO_WAIT, when_full="wait")
         wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
     assert fingerprint(wired) == fingerprint(direct)

@@ -10,7 +10,7 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
 from acquisition.daq.can_bus import _message
-from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_dbc import daq_settings
 from acquisition.daq.can_frames import FrameEncoder, shortened
 from core.blocks import Rejection
 
@@ -75,14 +75,12 @@ class LossyBus:
 
 
 @pytest.fixture
-def assembler_of(tmp_path, counts_calibration):
+def assembler_of(counts_calibration):
     def build(shape, **settings):
-        dbc = tmp_path / "daq.dbc"
-        dbc.write_text(daq_dbc(shape), encoding="utf-8")
         n_channels, n_slow = len(shape.channels), len(shape.slow)
         link = CanLinkSettings(interface="virtual", channel="none", fd=shape.fd)
         plan = compile_plan(
-            daq_settings(shape, link, dbc, ("um",) * n_channels, **settings),
+            daq_settings(shape, link, ("um",) * n_channels, **settings),
             counts_calibration(n_channels=n_channels, n_slow=n_slow),
         )
         assembler = Assembler(plan, n_channels, n_slow, 600.0, 5.0)

@@ -1,13 +1,11 @@
 """CAN sources on a counting plant, behind a real slcan adapter on a TCP port."""
 
-import tempfile
 from contextlib import AsyncExitStack
-from pathlib import Path
 
 from acquisition.can.settings import CanLinkSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.daq.can_dbc import daq_dbc, daq_settings
+from acquisition.daq.can_dbc import daq_settings
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_shape import CanShape, DaqSignal
 from acquisition.daq.can_slcan import SlcanTcpServer
@@ -35,24 +33,20 @@ class CanRig:
         self._device = CanDevice(feed, self._shape)
         self._server = SlcanTcpServer(self._device)
         self._calibration = calibration
-        self._folder = tempfile.TemporaryDirectory()
         self._plug = AsyncExitStack()
         self.step_samples = self._device.block_samples
         self.source: SampleSource
 
     async def __aenter__(self) -> "CanRig":
         await self.plug_in()
-        dbc = Path(self._folder.name) / "daq.dbc"
-        dbc.write_text(daq_dbc(self._shape), encoding="utf-8")
         link = CanLinkSettings(**self._server.endpoint, fd=self.fd)
         units = ("um",) * len(self._calibration.channels)
-        settings = daq_settings(self._shape, link, dbc, units)
+        settings = daq_settings(self._shape, link, units)
         self.source = CanSource(settings, self._calibration, SystemClock())
         return self
 
     async def __aexit__(self, *_: object) -> None:
         await self.pull()
-        self._folder.cleanup()
 
     async def plug_in(self) -> None:
         await self._plug.enter_async_context(self._server)
