@@ -51,6 +51,8 @@ class Operation:
         Which limits are passed, lower and upper; None where it is not known.
     was_at_speed
         Whether it was at rated speed (or stood still) last, while it is between the two.
+    at_speed_from_ns, at_speed_to_ns
+        First and newest reading of the stretch at rated speed; None if it is not, or not known.
     """
 
     state: OperatingState = OperatingState.UNKNOWN
@@ -59,12 +61,19 @@ class Operation:
     speed_passed: tuple[bool, bool] | None = None
     power_passed: tuple[bool, bool] | None = None
     was_at_speed: bool | None = None
+    at_speed_from_ns: int | None = None
+    at_speed_to_ns: int | None = None
 
     def is_settled(self, limits: OperatingLimits) -> bool:
-        """Whether a steady state has lasted for the settling time."""
-        if self.state not in STEADY or self.since_ns is None or self.last_ns is None:
+        """Whether a steady state has lasted for the settling time, after the warm-up."""
+        if self.state not in STEADY or self.since_ns is None:
             return False
-        return self.last_ns - self.since_ns >= limits.settling_ns
+        if self.last_ns is None or self.at_speed_from_ns is None:
+            return False
+        return (
+            self.last_ns - self.since_ns >= limits.settling_ns
+            and self.last_ns - self.at_speed_from_ns >= limits.warm_up_ns
+        )
 
 
 NEVER_SEEN = Operation()
@@ -93,6 +102,7 @@ def advance(operation: Operation, reading: OperatingReading, limits: OperatingLi
     was_at_speed = operation.was_at_speed if speed == BETWEEN else _extreme(speed)
     state = _state(speed, power, was_at_speed)
     lasts = state == operation.state and operation.since_ns is not None
+    at_speed_from_ns, at_speed_to_ns = _at_speed(operation, reading.time_ns, speed, limits)
     return Operation(
         state=state,
         since_ns=operation.since_ns if lasts else reading.time_ns,
@@ -100,6 +110,8 @@ def advance(operation: Operation, reading: OperatingReading, limits: OperatingLi
         speed_passed=speed,
         power_passed=power,
         was_at_speed=was_at_speed,
+        at_speed_from_ns=at_speed_from_ns,
+        at_speed_to_ns=at_speed_to_ns,
     )
 
 
@@ -120,6 +132,22 @@ def _passed(
         for index, (low, middle, high) in enumerate(bands)
     )
     return lower, upper
+
+
+def _at_speed(
+    operation: Operation,
+    now_ns: int,
+    speed: tuple[bool, bool] | None,
+    limits: OperatingLimits,
+) -> tuple[int | None, int | None]:
+    """First and newest reading at speed; a few readings without a speed do not end the stretch."""
+    from_ns, to_ns = operation.at_speed_from_ns, operation.at_speed_to_ns
+    if speed is None:
+        return from_ns, to_ns
+    if not speed[1]:
+        return None, None
+    lasts = to_ns is not None and now_ns - to_ns <= limits.longest_gap_ns
+    return (from_ns if lasts else now_ns), now_ns
 
 
 def _extreme(speed: tuple[bool, bool] | None) -> bool | None:

@@ -52,7 +52,8 @@ def operation_history(
     state[is_known & (speed == 0)] = OperatingState.STANDSTILL
     loaded = is_known & (speed == 2) & ~np.isnan(power_mw)
     state[loaded] = OperatingState.SPEED_NO_LOAD + power[loaded]
-    return OperationHistory(state, _settled(time_ns, state, starts, limits))
+    is_warm = _warm(time_ns, is_known, speed == 2, limits)
+    return OperationHistory(state, is_warm & _settled(time_ns, state, starts, limits))
 
 
 def _starts(time_ns: TimeArray, limits: OperatingLimits) -> _Ints:
@@ -91,3 +92,17 @@ def _settled(
     since = _last(is_new, np.zeros(time_ns.size, np.int64))
     is_steady = np.isin(state, [int(s) for s in STEADY])
     return is_steady & (time_ns - time_ns[since] >= limits.settling_ns)
+
+
+def _warm(
+    time_ns: TimeArray, is_known: _Bools, is_at_speed: _Bools, limits: OperatingLimits
+) -> _Bools:
+    """Whether the unit has been at speed for the time of a warm-up; False where not known."""
+    rows = np.flatnonzero(is_known)
+    known_ns, at_speed = time_ns[rows], is_at_speed[rows]
+    starts = np.ones(rows.size, np.bool_)
+    starts[1:] = (np.diff(known_ns) > limits.longest_gap_ns) | ~at_speed[:-1]
+    since = _last(starts, np.zeros(rows.size, np.int64))
+    warm = np.zeros(time_ns.size, np.bool_)
+    warm[rows] = at_speed & (known_ns - known_ns[since] >= limits.warm_up_ns)
+    return warm

@@ -93,7 +93,7 @@ def film_life() -> FilmLife:
         film += np.log(0.5e9) + 4.0 * (e - 0.4) - 0.02 * (oil_c - 45.0)
         film += 0.0 if change is None else change(hours)
         ln_gain = 0.0 if gain is None else gain(hours)
-        shaft = np.log(60.0) + _wander(random, hours, 0.05, 20.0) - 0.7 * (film - np.log(0.5e9))
+        shaft = np.log(60.0) + _wander(random, hours, 0.03, 5.0) - 0.7 * (film - np.log(0.5e9))
         bearing = shaft + film - np.log(1.18e9) + ln_gain
         one, pair = np.ones(hours.size), np.ones((2, hours.size))
         columns = {

@@ -11,7 +11,7 @@ from core.condition.operating_state import (
 )
 from core.condition.operation_history import operation_history
 
-LIMITS = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
+LIMITS = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0, warm_up_s=1200.0)
 MINUTE_NS = 60_000_000_000
 
 
@@ -50,6 +50,18 @@ def test_power_that_hovers_at_a_limit_does_not_change_the_state() -> None:
 def test_a_state_settles_only_after_its_time() -> None:
     settled = [o.is_settled(LIMITS) for o in run([92.3] * 40, [200.0] * 40)]
     assert settled == [False] * 30 + [True] * 10
+
+
+def test_a_warm_up_lasts_on_through_changes_of_load() -> None:
+    limits = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
+    operation, settled = NEVER_SEEN, []
+    for minute in range(0, 8 * 60, 10):
+        speed_rpm = float("nan") if minute == 100 else 92.3
+        power_mw = 200.0 if minute < 200 else 320.0
+        reading = OperatingReading(minute * MINUTE_NS, speed_rpm, power_mw)
+        operation = advance(operation, reading, limits)
+        settled.append(operation.is_settled(limits))
+    assert settled == [False] * 36 + [True] * 12
 
 
 def test_a_shaft_that_turns_in_between_after_a_gap_is_unknown() -> None:

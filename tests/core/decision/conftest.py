@@ -37,7 +37,7 @@ class Watch:
 
 
 def settled(history: StiffnessHistory) -> npt.NDArray[np.bool_]:
-    limits = OperatingLimits(92.3, 330.0)
+    limits = OperatingLimits(92.3, 330.0, warm_up_s=3600.0)
     states = operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits)
     return states.is_settled
 
