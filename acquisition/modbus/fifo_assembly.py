@@ -11,6 +11,8 @@ from acquisition.modbus.uncounted_samples import UncountedSamples
 from acquisition.registers.fifo_layout import FifoPiece
 from core.arrays import CountArray
 
+_MOST_EPOCHS = 2
+
 _MOST_APART = 1024
 """Samples by which the queues of two channels may differ, since they are read one by one."""
 
@@ -32,8 +34,17 @@ class PlacedSamples:
 def place_records(
     piece: FifoPiece, samples: CountedSamples | UncountedSamples, now_s: float
 ) -> list[PlacedSamples]:
-    """Place the records of an interleaved queue; those that came before are left out."""
-    return list(_joined(_places(piece, samples, now_s), piece.counts))
+    """Place the records of an interleaved queue; those that came before are left out.
+
+    Raises
+    ------
+    FrameError
+        If what should be a counter counts nothing: no device restarts twice within a reading.
+    """
+    places = list(_places(piece, samples, now_s))
+    if len({place.epoch for place in places if place is not None}) > _MOST_EPOCHS:
+        raise FrameError("FIFO: what should be its counter does not count")
+    return list(_joined(places, piece.counts))
 
 
 def _places(

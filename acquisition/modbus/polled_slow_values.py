@@ -69,6 +69,7 @@ class PolledSlowValues:
         self._task = task = asyncio.create_task(self._run(), name="poll slow values")
         try:
             await self._asked.wait()
+            self._raise_a_bug()
             yield
         finally:
             task.cancel()
@@ -99,7 +100,6 @@ class PolledSlowValues:
                 await self._poll()
             except AcquisitionError as error:
                 self.trouble = str(error)
-                self._asked.set()
                 wait_s = max(self._settings.poll_period_s, _MIN_RETRY_S)
                 is_config = isinstance(error, ConfigError)
                 await self._clock.sleep(max(wait_s, _CONFIG_RETRY_S) if is_config else wait_s)
@@ -122,6 +122,7 @@ class PolledSlowValues:
                     self._asked.set()
                     await self._clock.sleep(self._settings.poll_period_s)
         finally:
+            self._asked.set()
             link.close()
 
     def _readings(self, reading: MapReading) -> Mapping[str, Reading]:

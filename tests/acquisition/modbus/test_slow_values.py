@@ -1,0 +1,201 @@
+"""Slow values of another device join waveforms, and losing that device loses no waveform."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+
+from acquisition.calibration import SlowCalibration, UnitCalibration
+from acquisition.clock import SystemClock
+from acquisition.daq.map_device import MapDevice
+from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.errors import ConfigError
+from acquisition.joined_source import JoinedSource, only_slow, without_slow
+from acquisition.modbus.polled_slow_values import PolledSlowValues
+from acquisition.modbus.polled_source import PolledSettings
+from acquisition.modbus.transport import TcpTransport
+from acquisition.raw import RawBlock
+from acquisition.registers.cells import Cell, NumberType
+from acquisition.registers.register_map import MapValue, RegisterMap
+from core.blocks import SampleBlock
+from core.quality import GOOD, Level, Reading, Reason
+
+OIL = SlowCalibration("oil", 0.0, 100.0)
+POWER = SlowCalibration("power", 0.0, 1000.0)
+REGISTERS = RegisterMap(values=(MapValue(id="oil", cell=Cell(address=0, type=NumberType.FLOAT32)),))
+
+
+class Oil:
+    """A feed of one temperature."""
+
+    def __init__(self) -> None:
+        self.value, self._n = 45.0, 0
+
+    def advance(self, n_samples: int) -> RawBlock:
+        first, self._n = self._n, self._n + n_samples
+        counts = np.zeros((0, n_samples), dtype=np.int16)
+        return RawBlock(0, first, 0, 1.0, counts, (), (self.value,))
+
+
+class Waves:
+    """A source that gives a block whenever it is asked."""
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        blocks = self._blocks()
+        yield blocks
+        await blocks.aclose()
+
+    async def _blocks(self):
+        n = 0
+        while True:
+            yield SampleBlock(
+                "U1", 1, n, n, 1.0, np.zeros((1, 1), np.float32), (GOOD,), {"power": Reading(600.0)}
+            )
+            n += 1
+            await asyncio.sleep(0)
+
+
+@pytest.fixture
+def plant() -> Callable:
+    @asynccontextmanager
+    async def build(clock=None, **settings):
+        feed = Oil()
+        device = MapDevice(feed, REGISTERS, (), UnitCalibration("U1", 1.0, (), (OIL,)))
+        server = ModbusTcpServer(device)
+        async with server:
+            transport = TcpTransport(host="127.0.0.1", port=server.port)
+            slow = PolledSlowValues(
+                PolledSettings(transport=transport, **({"poll_period_s": 0.001} | settings)),
+                REGISTERS,
+                (OIL,),
+                clock or SystemClock(),
+            )
+            yield JoinedSource(Waves(), slow), slow, feed, device, server
+
+    return build
+
+
+async def until(stream, condition) -> SampleBlock:
+    async with asyncio.timeout(10.0):
+        async for block in stream:
+            if condition(block.slow["oil"]):
+                return block
+    raise AssertionError
+
+
+async def test_the_first_block_already_has_the_values_of_the_other_device(plant) -> None:
+    async with plant() as (source, *_), source.connect() as stream:
+        block = await anext(stream)
+
+    assert block.slow == {"power": Reading(600.0), "oil": Reading(45.0)}
+
+
+async def test_a_new_value_reaches_the_blocks(plant) -> None:
+    async with plant() as (source, _, feed, device, _), source.connect() as stream:
+        await anext(stream)
+        feed.value = 55.0
+        device.produce(2)
+        block = await until(stream, lambda oil: oil.value == 55.0)
+
+    assert block.slow["power"].value == 600.0
+
+
+async def test_a_value_outside_its_limits_is_missing(plant) -> None:
+    async with plant() as (source, _, feed, device, _), source.connect() as stream:
+        feed.value = 500.0
+        device.produce(2)
+        block = await until(stream, lambda oil: oil.value is None)
+
+    assert block.slow["oil"].quality.reason is Reason.OUT_OF_RANGE
+
+
+async def test_a_device_that_was_never_there_costs_no_waveform(plant) -> None:
+    async with plant() as (source, slow, _, _, server):
+        await server.__aexit__(None, None, None)
+        async with source.connect() as stream:
+            block = await anext(stream)
+        assert "refused" in slow.trouble
+        await server.__aenter__()
+
+    assert block.channel_quality == (GOOD,)
+    assert block.slow["oil"].quality.reason is Reason.NOT_CONNECTED
+
+
+async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, stepped_clock) -> None:
+    class Clock:
+        """Stands still for the poller while time is stepped."""
+
+        now_ns, monotonic_s = stepped_clock.now_ns, stepped_clock.monotonic_s
+
+        async def sleep(self, duration_s: float) -> None:
+            await asyncio.sleep(min(duration_s, 0.001))
+
+    async with (
+        plant(Clock(), stale_after_s=5.0) as (source, _, feed, device, server),
+        source.connect() as stream,
+    ):
+        await anext(stream)
+        await server.__aexit__(None, None, None)
+        await until(stream, lambda oil: oil.value == 45.0)
+        stepped_clock.step(6.0)
+        lost = await until(stream, lambda oil: oil.value is None)
+        await server.__aenter__()
+        feed.value = 46.0
+        device.produce(2)
+        back = await until(stream, lambda oil: oil.value is not None)
+
+    assert lost.slow["oil"].quality.level is Level.BAD
+    assert lost.slow["oil"].quality.reason in (Reason.NOT_CONNECTED, Reason.STALE)
+    assert back.slow["oil"].value == 46.0
+
+
+async def test_a_device_whose_values_stand_still_has_none(plant, stepped_clock) -> None:
+    class Clock:
+        now_ns, monotonic_s = stepped_clock.now_ns, stepped_clock.monotonic_s
+
+        async def sleep(self, duration_s: float) -> None:
+            stepped_clock.step(min(duration_s, 1.0))
+            await asyncio.sleep(0.001)
+
+    async with (
+        plant(Clock(), poll_period_s=1.0, stale_after_s=5.0) as (source, slow, *_),
+        source.connect() as stream,
+    ):
+        block = await until(stream, lambda oil: oil.value is None)
+
+    assert block.slow["oil"].quality.reason in (Reason.NOT_CONNECTED, Reason.STALE)
+    assert "stand still" in slow.trouble or "refused" in slow.trouble
+
+
+async def test_leaving_leaves_no_task_behind(plant) -> None:
+    async with plant() as (source, *_):
+        before = asyncio.all_tasks()
+        async with source.connect() as stream:
+            await anext(stream)
+        assert {t for t in asyncio.all_tasks() - before if "poll slow" in t.get_name()} == set()
+
+
+async def test_a_bug_in_the_background_is_not_swallowed(plant, monkeypatch) -> None:
+    async with plant() as (source, slow, *_):
+        monkeypatch.setattr(slow, "_readings", lambda _: 1 // 0)
+        with pytest.raises(ZeroDivisionError):
+            async with source.connect():
+                pass
+
+
+def test_a_calibration_is_divided_between_the_two_devices(counts_calibration) -> None:
+    whole = counts_calibration(n_slow=3)
+    ids = frozenset({"slow1"})
+
+    assert [c.id for c in only_slow(whole, ids).slow] == ["slow1"]
+    assert only_slow(whole, ids).channels == ()
+    assert [c.id for c in without_slow(whole, ids).slow] == ["slow0", "slow2"]
+
+
+def test_a_map_without_the_value_is_refused() -> None:
+    settings = PolledSettings(transport=TcpTransport(host="127.0.0.1"))
+    with pytest.raises(ConfigError, match="no value for 'power'"):
+        PolledSlowValues(settings, REGISTERS, (OIL, POWER), SystemClock())
