@@ -30,6 +30,7 @@ check: install
 
 bench: install
 	$(BIN)/python benchmarks/ingest.py
+	$(BIN)/python benchmarks/alarms.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/analysis.py
 
 accuracy: install

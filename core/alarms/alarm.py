@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from functools import cached_property
 
 from core.alarms.delays import RESTED, DelayTimer
 
@@ -52,7 +53,7 @@ class AlarmIdentity:
     subject: str
     kind: AlarmKind
 
-    @property
+    @cached_property
     def id(self) -> str:
         """All of it in one word, fit for a URL."""
         return f"{self.unit}:{self.subject}:{self.kind}"
@@ -183,7 +184,7 @@ class Alarm:
             return AlarmState.NORMAL if self.is_acknowledged else returned
         return AlarmState.ACKNOWLEDGED if self.is_acknowledged else AlarmState.UNACKNOWLEDGED
 
-    @property
+    @cached_property
     def is_resting(self) -> bool:
         """Whether it would not be changed by one more condition that is known and within limits."""
         return (

@@ -1,12 +1,13 @@
 """Conditions that are not a value above a limit: a channel, a device's clock, a link."""
 
-from core.alarms.alarm import WITHIN, AlarmLevel, Condition, unknown
-from core.alarms.limits import Limits, judge
+from core.alarms.alarm import WITHIN, AlarmLevel, Condition
 from core.device_clock import DeviceClock, StampFault
-from core.quality import Level, Quality, Reading, Reason
+from core.quality import Level, Quality, Reading, Reason, missing
 
 COVERAGE = 1.96
 """Standard uncertainties on each side of a value that hold the truth with 95 %."""
+
+NO_CLOCK, NO_DRIFT = missing(Reason.NOT_MEASURED), missing(Reason.WAITING_FOR_DATA)
 
 SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK)
 """What only a whole segment shows of a channel."""
@@ -36,23 +37,18 @@ def slow_channel_condition(reading: Reading) -> Condition:
     return WITHIN
 
 
-def offset_condition(
-    clock: DeviceClock | None, limits: Limits, held: AlarmLevel | None
-) -> Condition:
-    """Whether a device's time stamps agree with the host's clock."""
+def offset_reading(clock: DeviceClock | None) -> Reading:
+    """How far a device's time stamps are off the host's clock, s, either way."""
     if clock is None or clock.offset_s is None:
-        return unknown(Reason.NOT_MEASURED)
-    return judge(Reading(abs(clock.offset_s)), limits, held)
+        return NO_CLOCK
+    return Reading(abs(clock.offset_s))
 
 
-def drift_condition(
-    clock: DeviceClock | None, limits: Limits, held: AlarmLevel | None
-) -> Condition:
-    """Whether a device samples as fast as it says, as far as that can be told yet."""
+def drift_reading(clock: DeviceClock | None) -> Reading:
+    """How much a device surely samples faster or slower than it says, parts per million."""
     if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
-        return unknown(Reason.WAITING_FOR_DATA)
-    surely_ppm = max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm)
-    return judge(Reading(surely_ppm), limits, held)
+        return NO_DRIFT
+    return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
 
 
 def stamp_condition(fault: StampFault | None) -> Condition:

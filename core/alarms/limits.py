@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from core.alarms.alarm import AlarmLevel, Condition, unknown
 from core.quality import Reading, Reason
@@ -45,6 +46,11 @@ class Limits:
             raise ValueError(
                 f"deadband {self.deadband:g} must be 0 or more, and below {given[0]:g}"
             )
+
+    @cached_property
+    def lowest(self) -> float:
+        """The limit that is passed first."""
+        return min(limit for limit in (self.alert, self.danger) if limit is not None)
 
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
         """The worst level whose limit a value is above, or not yet clearly below again."""

@@ -7,9 +7,9 @@ from core.alarms.alarm import Alarm, AlarmKind, AlarmRule, Condition, unknown
 from core.alarms.conditions import (
     SENSOR_FAULTS,
     channel_condition,
-    drift_condition,
+    drift_reading,
     link_condition,
-    offset_condition,
+    offset_reading,
     slow_channel_condition,
     stamp_condition,
 )
@@ -182,11 +182,9 @@ class UnitAlarms:
     def _take_clock(self, block: SampleBlock, host_ns: int) -> None:
         offset, drift, stamps = self._watched.offset, self._watched.drift, self._watched.stamps
         if offset is not None:
-            held = self._alarms[offset.id].condition.level
-            self._apply(offset, offset_condition(block.clock, offset.limits, held), host_ns)
+            self._compare(offset, offset_reading(block.clock), host_ns)
         if drift is not None:
-            held = self._alarms[drift.id].condition.level
-            self._apply(drift, drift_condition(block.clock, drift.limits, held), host_ns)
+            self._compare(drift, drift_reading(block.clock), host_ns)
         if stamps is not None:
             self._apply(stamps, stamp_condition(block.stamp_fault), host_ns)
 
@@ -195,7 +193,9 @@ class UnitAlarms:
             self._apply(self._watched.link, link_condition(*self._link), host_ns)
 
     def _compare(self, watch: LimitWatch, reading: Reading, now_ns: int) -> None:
-        alarm = self._alarms[watch.id]
+        alarm, value = self._alarms[watch.id], reading.value
+        if alarm.is_resting and value is not None and value <= watch.limits.lowest:
+            return  # as nearly always
         self._apply(watch, judge(reading, watch.limits, alarm.condition.level), now_ns)
 
     def _apply(self, watch: Watch, condition: Condition, now_ns: int) -> None:

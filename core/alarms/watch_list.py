@@ -1,6 +1,7 @@
 """Which alarms a unit has, and what each of them looks at."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from core.alarms.alarm import AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.limits import Limits
@@ -25,7 +26,7 @@ class Watch:
     rule: AlarmRule
     source: str
 
-    @property
+    @cached_property
     def id(self) -> str:
         """Of the alarm."""
         return self.identity.id

@@ -56,7 +56,12 @@ const DECIMALS = { "µm 0-pk": 1, "°C": 1, s: 2, ppm: 0 };
 export const kindWords = (kind) => KINDS[kind] ?? kind.replaceAll("_", " ");
 export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
 export const changeWords = (change) => CHANGES[change] ?? change.replaceAll("_", " ");
-export const alarmReasonWords = (reason) => (reason === "ok" ? "" : (REASONS[reason] ?? reasonWords(reason)));
+
+/** A reason in words; what is no code, such as the words of an error, stays as it is. */
+export function alarmReasonWords(reason) {
+  if (reason === "ok") return "";
+  return REASONS[reason] ?? (/^[a-z0-9_]+$/.test(reason) ? reasonWords(reason) : reason);
+}
 
 /** Whether something has taken an alarm off the list. */
 export const isHidden = ({ state }) => ["shelved", "suppressed", "out_of_service"].includes(state);

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from core.alarms.alarm import AlarmLevel
 from core.alarms.conditions import (
     channel_condition,
-    drift_condition,
+    drift_reading,
     link_condition,
-    offset_condition,
+    offset_reading,
     slow_channel_condition,
     stamp_condition,
 )
@@ -103,18 +103,17 @@ def test_a_channel_is_judged_by_its_samples_and_by_its_segments() -> None:
 
 
 def test_a_clock_is_judged_by_what_is_known_of_it() -> None:
-    limits = Limits(200.0)
     unclear = DeviceClock(None, None, None)
     fast = DeviceClock(offset_s=-3.0, drift_ppm=-250.0, u_drift_ppm=10.0)
     maybe = DeviceClock(offset_s=0.0, drift_ppm=250.0, u_drift_ppm=50.0)
 
-    assert not offset_condition(None, Limits(2.0), None).is_known
-    assert not offset_condition(unclear, Limits(2.0), None).is_known
-    assert offset_condition(fast, Limits(2.0), None).value == 3.0
-    assert offset_condition(fast, Limits(2.0), None).level is ALERT
-    assert not drift_condition(unclear, limits, None).is_known
-    assert drift_condition(fast, limits, None).level is ALERT
-    assert drift_condition(maybe, limits, None).level is None  # may well be 152 ppm
+    assert offset_reading(None).value is None
+    assert offset_reading(unclear).value is None
+    assert offset_reading(fast).value == 3.0
+    assert drift_reading(None).value is None
+    assert drift_reading(unclear).quality.reason is Reason.WAITING_FOR_DATA
+    assert drift_reading(fast).value == pytest.approx(230.4)
+    assert drift_reading(maybe).value == pytest.approx(152.0)  # more is not sure
     assert stamp_condition(StampFault.JUMPED).reason == "stamp_jumped"
     assert stamp_condition(None).level is None
 

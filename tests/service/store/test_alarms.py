@@ -18,6 +18,7 @@ from core.alarms.alarm import (
     Condition,
     unknown,
 )
+from core.alarms.delays import RESTED
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
@@ -44,10 +45,8 @@ def then(news: AlarmNews, condition: Condition, now_ns: int) -> AlarmNews:
 def as_stored(alarm: Alarm) -> Alarm:
     """All of an alarm but its timers, which a restart forgets."""
     condition = replace(alarm.condition, suppressed_by=alarm.suppressed_by)
-    return replace(Alarm(alarm.identity), **{**vars(alarm), "condition": condition, "timers": X})
+    return replace(alarm, condition=condition, timers=(RESTED, RESTED))
 
-
-X = Alarm(identity()).timers
 
 ACTIONS = [
     lambda alarm: Acknowledge("A. Name", alarm.occurrence, "seen, Ünïcode 'quoted'"),

@@ -20,7 +20,7 @@ export function alarmsPage(main) {
   document.title = "padwatch: alarms";
   const state = mark();
   const actor = actorField();
-  const again = () => lists.again();
+  const again = () => [lists, histories].forEach((each) => each.again());
   const listed = alarmTable("On the list", "Nothing is on the list.", actor, again);
   const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);
   const unjudged = unjudgedView();
