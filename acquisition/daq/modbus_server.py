@@ -11,6 +11,9 @@ from acquisition.clock import Clock
 from acquisition.daq.answers import ReadableDevice, answer
 from acquisition.daq.reply_faults import REPLY_FAULTS, ReplyFault
 
+_ROUNDING = 1e-6
+"""Of a step: a clock that wakes a rounding error too early must not be asked to sleep for it."""
+
 
 class ModbusDevice(ReadableDevice, Protocol):
     """A device that a server can pace and spoil."""
@@ -186,7 +189,7 @@ class ModbusServer(ABC):
         if self._origin_s is None:
             self._origin_s = clock.monotonic_s()
         while not self._served.ended:
-            n_passed = int((clock.monotonic_s() - self._origin_s) / step_s)
+            n_passed = int((clock.monotonic_s() - self._origin_s) / step_s + _ROUNDING)
             self._served.produce(n_passed - self._n_paced)
             self._n_paced = max(n_passed, self._n_paced)
             await clock.sleep(self._origin_s + (n_passed + 1) * step_s - clock.monotonic_s())

@@ -15,7 +15,6 @@ class SlotFeed:
         self._feed = feed
         self._samples_per_slot = samples_per_slot
         self._grid = BlockGrid(samples_per_slot)
-        self._position = 0
         self._ahead: RawBlock | None = None
 
     def peek(self) -> RawBlock | None:
@@ -38,10 +37,8 @@ class SlotFeed:
         return slot.first_index // self._samples_per_slot
 
     def _next(self) -> RawBlock:
+        """Return the next whole slot; a piece no longer than a slot completes one at most."""
         while True:
-            n_missing = self._samples_per_slot - self._position % self._samples_per_slot
-            raw = self._feed.advance(n_missing)
-            self._position = raw.stop_index
-            for block in self._grid.put(raw):
+            for block in self._grid.put(self._feed.advance(self._samples_per_slot)):
                 if block.n_samples == self._samples_per_slot:
                     return block

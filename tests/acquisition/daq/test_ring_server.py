@@ -6,8 +6,8 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import LinkError
 from acquisition.modbus.profile import decode_header
 
