@@ -40,12 +40,12 @@ class CanBusServer(CanDaqServer):
         channel: str = "padwatch",
         on_demand: bool = False,
         patient: bool = False,
-        **options: Any,
+        options: Mapping[str, str | int | float | bool] | None = None,
     ) -> None:
         super().__init__(device, clock, on_demand, patient)
         self._interface = interface
         self._channel = channel
-        self._options = options
+        self._options: dict[str, Any] = dict(options or {})
         self._bus: can.BusABC | None = None
 
     @property

@@ -1,0 +1,92 @@
+"""A multiplexed message is several messages that share an id."""
+
+import numpy as np
+import pytest
+
+from acquisition.can.assembly import Assembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
+from acquisition.errors import ConfigError
+from core.blocks import Rejection
+
+START_NS = 1_767_225_600_000_000_000
+LINK = CanLinkSettings(interface="virtual", channel="none")
+DBC = """VERSION ""
+BU_: N
+BO_ 300 M: 8 N
+ SG_ which M : 0|4@1+ (1,0) [0|0] "" N
+ SG_ count : 4|12@1+ (1,0) [0|0] "" N
+ SG_ a m0 : 16|16@1- (1,0) [0|0] "V" N
+ SG_ b m0 : 32|16@1- (1,0) [0|0] "V" N
+ SG_ c m1 : 16|16@1- (1,0) [0|0] "V" N
+ SG_ d m1 : 39|16@0- (1,0) [0|0] "V" N
+ SG_ e m2 : 16|16@1- (1,0) [0|0] "V" N
+"""
+
+
+def frame(which: int, count: int, *words: int):
+    head = (which | count % 4096 << 4).to_bytes(2, "little")
+    body = b"".join((w % 2**15).to_bytes(2, "little") for w in words)
+    return 300, (head + body).ljust(8, b"\0")
+
+
+def instant(number: int):
+    d = (number + 3) % 2**15
+    swapped = (d & 0xFF) << 8 | d >> 8
+    return [
+        frame(0, number, number, number + 1),
+        frame(1, number, number + 2, swapped) if swapped < 2**15 else _raw(number, d),
+        frame(7, number, 99),
+    ]
+
+
+def _raw(number: int, d: int):
+    key, data = frame(1, number, number + 2, 0)
+    return key, data[:4] + d.to_bytes(2, "big") + data[6:]
+
+
+@pytest.fixture
+def dbc(tmp_path):
+    path = tmp_path / "multiplexed.dbc"
+    path.write_text(DBC)
+    return path
+
+
+def settings(dbc, **others) -> CanSettings:
+    channels = tuple(CanChannel(n, "um", (f"M.{n}",)) for n in "abcd")
+    return CanSettings(**{"link": LINK, "dbc": dbc, "channels": channels, **others})
+
+
+@pytest.mark.parametrize("counters", [("M.count",), ()], ids=["counted", "uncounted"])
+def test_the_parts_of_an_instant_are_put_together(counters, dbc, counts_calibration):
+    plan = compile_plan(settings(dbc, counters=counters), counts_calibration(4, n_slow=0))
+    assembler = Assembler(plan, 4, 0, 600.0, 5.0)
+    blocks = []
+    for first in range(0, 9000, 30):
+        frames = [f for n in range(first, first + 30) for f in instant(n)]
+        blocks += assembler.take(frames, START_NS + round((first + 30) / 600 * 1e9))
+    samples = np.concatenate([block.counts for block in blocks], axis=1)
+    expected = (np.arange(9000) + np.arange(4)[:, np.newaxis]) % 2**15
+    np.testing.assert_array_equal(samples, expected)
+    assert blocks[-1].stop_index == 9000
+
+
+def test_a_lost_part_drops_the_instant(dbc, counts_calibration):
+    plan = compile_plan(settings(dbc, counters=("M.count",)), counts_calibration(4, n_slow=0))
+    assembler = Assembler(plan, 4, 0, 600.0, 5.0)
+    frames = [f for n in range(10) for f in (instant(n)[:1] if n == 4 else instant(n))]
+    blocks = assembler.take(frames, START_NS)
+    assert [(b.first_index, b.stop_index) for b in blocks] == [(0, 4), (5, 10)]
+    assert blocks[1].rejected == (Rejection("incomplete_frames", 1),)
+
+
+def test_one_channel_cannot_have_samples_of_two_parts(dbc, counts_calibration):
+    wrong = settings(dbc, channels=(CanChannel("a", "um", ("M.a", "M.c")),))
+    with pytest.raises(ConfigError, match="must all be in one message"):
+        compile_plan(wrong, counts_calibration(1, n_slow=0))
+
+
+def test_a_common_signal_cannot_be_a_channel(dbc, counts_calibration):
+    wrong = settings(dbc, channels=(CanChannel("a", "um", ("M.count",)),))
+    with pytest.raises(ConfigError, match="in every frame of a multiplexed message"):
+        compile_plan(wrong, counts_calibration(1, n_slow=0))
