@@ -1,0 +1,122 @@
+"""How a life is measured: what differs between the truth and the readings of one bearing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.simulated.life.operation import Operation
+from acquisition.simulated.life.wander import wander
+from core.arrays import ComplexArray, FloatArray
+from core.stiffness_history import CodeArray, Evidence
+
+U_RANDOM_AT_REFERENCE = 0.005
+REFERENCE_FORCE_N = 20.0e3
+"""Scatter of `dynamic` over 5 min under this hydraulic force (benchmarks/accuracy.py)."""
+
+U_RANDOM_KNOWN = 0.1
+"""How well a reading knows its own random uncertainty, relative."""
+
+ALIKE = ((4.0 * 3600.0, 0.004), (8.0 * 86_400.0, 0.003))
+"""Time and relative rms of what else strays, alike from reading to reading: chains, excitation."""
+
+GAIN_HALF_WIDTH = 0.05
+"""Class of probes and accelerometers (Brito et al., section 2.2.1)."""
+
+GAP_DRIFT = ((30.0 * 86_400.0, 2.0), (6.0 * 3600.0, 0.8), (600.0, 0.3))
+"""Time and rms in µm of what a displacement from four probes strays by."""
+
+REFERENCE_UM_RMS = 3.0
+GAP_GAIN_HALF_WIDTH = 0.02
+
+OIL_OFFSET_C_RMS = 0.4
+OIL_WANDER = (86_400.0, 0.1)
+OIL_RESOLUTION_C = 0.1
+
+SHAFT_NOISE_UM, BEARING_NOISE_UM = 0.15, 0.02
+RUNOUT_UM_PK = 1.0
+"""Left over at 1× after the slow-roll vector is taken off."""
+
+NO_LOAD_SILENCE, LOADED_SILENCE = 0.08, 0.002
+"""Share of readings that excitation does not suffice for."""
+
+OUTAGES_PER_YEAR, OUTAGE_H = 3.0, (1.0, 10.0)
+"""Transducer out of order, per direction."""
+
+YEAR_S = 365.25 * 86_400.0
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """What the transducers of one bearing add and multiply.
+
+    Parameters
+    ----------
+    probe_gain, accelerometer_gain : (2,)
+        True sensitivity over the one told, before any damage.
+    ln_k_error : (2, n)
+        Of stiffness, alike over hours and days.
+    position_error_um : (2, n)
+    oil_error_c : (n,)
+    runout_um_pk : (2,)
+        Phasors.
+    evidence : (2, n)
+        Members of `Evidence`.
+    """
+
+    probe_gain: FloatArray
+    gap_gain: FloatArray
+    accelerometer_gain: FloatArray
+    ln_k_error: FloatArray
+    position_error_um: FloatArray
+    oil_error_c: FloatArray
+    runout_um_pk: ComplexArray
+    evidence: CodeArray
+
+
+def u_random(force_n: FloatArray) -> FloatArray:
+    """Random relative uncertainty of stiffness under a broadband force: it falls as 1/F, (n,)."""
+    return U_RANDOM_AT_REFERENCE * REFERENCE_FORCE_N / force_n
+
+
+def draw_chain(random: np.random.Generator, operation: Operation) -> Chain:
+    """Draw how one bearing is measured."""
+    n, step_s = len(operation), operation.step_s
+
+    def strays(parts: tuple[tuple[float, float], ...]) -> FloatArray:
+        return np.stack([sum((wander(random, n, step_s, *p) for p in parts), 0.0) for _ in "xy"])
+
+    position_error_um = strays(GAP_DRIFT) + REFERENCE_UM_RMS * random.standard_normal((2, 1))
+    phase = np.exp(2j * np.pi * random.uniform(size=2))
+    return Chain(
+        probe_gain=_gains(random, GAIN_HALF_WIDTH),
+        gap_gain=_gains(random, GAP_GAIN_HALF_WIDTH),
+        accelerometer_gain=_gains(random, GAIN_HALF_WIDTH),
+        ln_k_error=strays(ALIKE),
+        position_error_um=position_error_um,
+        oil_error_c=OIL_OFFSET_C_RMS * random.standard_normal()
+        + wander(random, n, step_s, *OIL_WANDER),
+        runout_um_pk=RUNOUT_UM_PK * random.uniform(size=2) * phase,
+        evidence=np.stack([_evidence(random, operation) for _ in "xy"]),
+    )
+
+
+def _gains(random: np.random.Generator, half_width: float) -> FloatArray:
+    return 1.0 + half_width * random.uniform(-1.0, 1.0, 2)
+
+
+def _evidence(random: np.random.Generator, operation: Operation) -> CodeArray:
+    n = len(operation)
+    silence = np.where(operation.load < 0.05, NO_LOAD_SILENCE, LOADED_SILENCE)
+    evidence = np.full(n, Evidence.MEASURED, np.int8)
+    evidence[random.random(n) < silence] = Evidence.INSUFFICIENT_EXCITATION
+    evidence[_is_out_of_order(random, n, operation.step_s)] = Evidence.BAD_QUALITY
+    evidence[~operation.is_at_speed] = Evidence.BAD_QUALITY
+    return evidence
+
+
+def _is_out_of_order(random: np.random.Generator, n: int, step_s: float) -> npt.NDArray[np.bool_]:
+    is_out = np.zeros(n, np.bool_)
+    for first in random.integers(0, n, random.poisson(OUTAGES_PER_YEAR * n * step_s / YEAR_S)):
+        is_out[first : first + int(3600.0 * random.uniform(*OUTAGE_H) / step_s)] = True
+    return is_out
