@@ -56,6 +56,22 @@ def operation_history(
     return OperationHistory(state, is_warm & _settled(time_ns, state, starts, limits))
 
 
+def operation_of_states(
+    time_ns: TimeArray, state: CodeArray, limits: OperatingLimits
+) -> OperationHistory:
+    """Settling where states are told, as in files of readings, and not followed.
+
+    Parameters
+    ----------
+    state : (n,)
+        Members of `OperatingState`.
+    """
+    starts = _starts(time_ns, limits)
+    is_steady = np.isin(state, [int(s) for s in STEADY])
+    is_warm = _warm(time_ns, state != OperatingState.UNKNOWN, is_steady, limits)
+    return OperationHistory(state, is_warm & _settled(time_ns, state, starts, limits))
+
+
 def _starts(time_ns: TimeArray, limits: OperatingLimits) -> _Ints:
     """(n,) row of the first reading after the last gap that is not bridged."""
     is_first = np.ones(time_ns.size, np.bool_)
