@@ -69,7 +69,7 @@ def _part(raw: RawBlock, start: int, stop: int) -> RawBlock:
         first_index=raw.first_index + start,
         start_ns=start_ns // _STAMP_NS * _STAMP_NS,
         counts=raw.counts[:, start:stop],
-        slow=tuple(np.float32(raw.slow).tolist()),
+        slow=tuple(np.array(raw.slow, dtype=np.float32).tolist()),
         rejected=() if start else raw.rejected,
     )
 

@@ -19,9 +19,11 @@ from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.runner import Runner, WatchedUnit
+from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.wiring.captures import captures_of
+from service.wiring.sources import vector_rows
 from service.wiring.stores import open_store
 
 STALE_HOPS = 2.5
@@ -121,7 +123,9 @@ async def _run(
     recorder = Recorder(store, live, clock)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
     captures = captures_of(plant, performance.origin, clock)
-    alarms = await alarm_engine(plant, performance.origin, store, recorder.put, clock, captures)
+    alarms = await alarm_engine(
+        plant, performance.origin, store, recorder.put, clock, captures, vector_rows(plant)
+    )
     runner = Runner(units, live, recorder, clock, alarms)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
@@ -170,7 +174,12 @@ async def _run(
 
 def _refresh_s(plant: PlantFile) -> float:
     """Seconds from one result to the next, of the slowest unit."""
-    return analysis_of(plant.analysis).hop_samples / min(unit.rate_hz for unit in plant.unit)
+    hop_samples = analysis_of(plant.analysis).hop_samples
+    return max(
+        (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)
+        / unit.rate_hz
+        for unit in plant.unit
+    )
 
 
 def _stop_on_signals() -> asyncio.Event:

@@ -6,7 +6,7 @@ import traceback
 
 import typer
 
-from service.cli import config, reference
+from service.cli import config, probe, recording, reference
 from service.cli.daq import daq
 from service.cli.demo import demo
 from service.cli.logs import set_up_logging
@@ -28,6 +28,8 @@ app.command()(reanalyse)
 app.command()(validate)
 app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")
+app.add_typer(recording.app, name="recording")
+app.add_typer(probe.app, name="probe")
 
 
 @app.callback()

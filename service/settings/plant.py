@@ -8,6 +8,7 @@ from pydantic import Field, StringConstraints, model_validator
 from core.units import hz_from_rpm
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
 MIN_SEGMENT_TURNS = 8
@@ -162,7 +163,8 @@ class PlantFile(Settings):
     def _check(self) -> Self:
         refuse_twice(("unit", n, "id", unit.id) for n, unit in enumerate(self.unit))
         for unit in self.unit:
-            self._check_analysis(unit)
+            if not isinstance(unit.source, ModbusVectorSettings):
+                self._check_analysis(unit)
         return self
 
     def _check_analysis(self, unit: UnitSettings) -> None:

@@ -6,6 +6,11 @@ from pydantic import Field
 
 from service.settings.base import Settings
 from service.settings.modbus_link import ModbusLinkSettings
+from service.settings.modbus_sources import (
+    ModbusFifoSettings,
+    ModbusPolledSettings,
+    ModbusVectorSettings,
+)
 
 
 class ModbusRingSettings(ModbusLinkSettings):
@@ -34,4 +39,11 @@ class SimulatedSettings(Settings):
     """This source's kind."""
 
 
-SourceSettings = Annotated[ModbusRingSettings | SimulatedSettings, Field(discriminator="kind")]
+SourceSettings = Annotated[
+    ModbusRingSettings
+    | ModbusFifoSettings
+    | ModbusPolledSettings
+    | ModbusVectorSettings
+    | SimulatedSettings,
+    Field(discriminator="kind"),
+]

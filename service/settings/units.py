@@ -14,7 +14,9 @@ from service.settings.bearings import (
     BearingSettings,
 )
 from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer
+from service.settings.modbus_sources import SlowDeviceSettings
 from service.settings.simulation import SimulationSettings
+from service.settings.source_fit import require_slow_fit, require_source_fit
 from service.settings.sources import SimulatedSettings, SourceSettings
 
 
@@ -30,8 +32,9 @@ class UnitSettings(Settings):
     rated_speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
     """Rated running speed in r/min, 20 to 1500; example: 92.3."""
 
-    rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
-    """Samples per second and channel; example: 600.0."""
+    rate_hz: Annotated[float, Field(ge=1e-5, le=100_000.0)] = 600.0
+    """Samples per second and channel, at least 20 for waveforms; where registers are polled, one
+    over their poll_period_s. Example: 600.0."""
 
     block_samples: Annotated[int, Field(ge=1, le=10_000)] = BLOCK_SAMPLES
     """Samples of each channel that share one verdict on the channel and one set of slow values; a
@@ -56,7 +59,12 @@ class UnitSettings(Settings):
     """Slow channel (MW) of the active power."""
 
     source: SourceSettings
-    """Where the samples come from: kind "modbus_ring" or "simulated"."""
+    """Where the samples come from, by kind: "modbus_ring" (a streaming DAQ), "modbus_fifo"
+    (queues), "modbus_polled" (registers), "modbus_vector" (a rack that gives amplitudes) or
+    "simulated"."""
+
+    slow_source: SlowDeviceSettings | None = None
+    """A second device that slow channels are polled from, where the first has none."""
 
     channel: Annotated[tuple[ChannelSettings, ...], Field(min_length=1, max_length=32)]
     """Waveform channels in wire order, at most 32."""
@@ -88,6 +96,9 @@ class UnitSettings(Settings):
         self._check_slow(self.speed_channel, "r/min", "speed_channel")
         self._check_slow(self.power_channel, "MW", "power_channel")
         self._check_simulation()
+        slow_ids = [channel.id for channel in self.slow_channel]
+        require_source_fit(self.source, self.rate_hz, [c.id for c in self.channel], slow_ids)
+        require_slow_fit(self.slow_source, slow_ids)
         return self
 
     def _check_channels(self, number: int, bearing: BearingSettings) -> None:

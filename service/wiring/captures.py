@@ -9,6 +9,7 @@ from service.capture.captures import Captures
 from service.capture.file import MakeWriter
 from service.capture.span import CaptureSettings
 from service.origin import Origin
+from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.wiring.recordings import recording_writer
@@ -22,7 +23,9 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
     """Captures of all units of a live plant; what is replayed is a recording already."""
     found = plant.capture
     kept = origin is Origin.LIVE and found.samples == "kept"
-    units = plant.unit if kept else ()
+    # a rack that gives vectors has no samples to keep
+    waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
+    units = waveforms if kept else []
     settings = CaptureSettings(
         pre_s=found.pre_s,
         post_s=found.post_s,

@@ -37,8 +37,8 @@ def daq_of(unit: UnitSettings, feed: RawFeed, clock: Clock | None, *, recorded: 
             if source.host is not None:
                 return ModbusRingServer(device, clock, source.host, source.port, **waiting)
             return RtuRingServer(device, clock, _line(source.device), **waiting)
-        case sources.SimulatedSettings():
-            raise LookupError(f'the source of unit {unit.id} is of kind "simulated": no DAQ')
+        case _:
+            raise LookupError(f"there is no simulated DAQ for unit {unit.id}'s {source.kind}")
 
 
 def _line(device: str | None) -> Path | None:

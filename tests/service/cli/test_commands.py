@@ -69,7 +69,7 @@ def test_a_database_of_another_program_is_one_line_and_exit_1(
 ) -> None:
     text, _ = changed('data_folder = "var/demo"', f'data_folder = "{tmp_path}"')
     path = tmp_path / "plant.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text.replace("port = 0", "port = 502"), encoding="utf-8")
     (tmp_path / "padwatch.sqlite3").write_bytes(b"not a database at all, but some text" * 100)
 
     result = padwatch("run", str(path), "--port", "0")
@@ -92,7 +92,9 @@ def test_the_schema_says_what_every_key_means() -> None:
     schema = json.loads(padwatch("config", "schema").stdout)
 
     assert schema["type"] == "object"
-    assert set(schema["properties"]) == {"plant", "service", "analysis", "unit"}
+    assert set(schema["properties"]) == {
+        *("plant", "service", "analysis", "alarms", "capture", "unit")
+    }
     keys = list(_keys(schema))
     assert len(keys) > 60
     assert [name for name, key in keys if len(key.get("description", "")) < 10] == []

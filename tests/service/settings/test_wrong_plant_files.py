@@ -50,7 +50,7 @@ UJB = "unit[1].bearing[1]."
             'kind = "modbus_ring"',
             'kind = "opc"',
             f"{UNIT_1}source.kind = 'opc'",
-            "'modbus_ring' or 'simulated'",
+            "must be 'modbus_ring' or 'modbus_fifo' or 'modbus_polled'",
         ),
         ('id = "U1"', 'id = "U/1"', f"{UNIT_1}id = 'U/1'", "match"),
         ('id = "U2"', 'id = "U1"', "unit[2].id = 'U1'", "used twice"),
