@@ -18,7 +18,12 @@ from acquisition.simulated.life.order1 import order1_um_pk
 from acquisition.simulated.life.readings import ln_stiffness, readings
 from acquisition.simulated.life.schedule import draw_operation
 from acquisition.simulated.life.shaft_position import draw_positions_um
-from acquisition.simulated.life.thermal import ThermalCourse, draw_water_c, thermal_course
+from acquisition.simulated.life.thermal import (
+    ThermalCourse,
+    draw_closing_share,
+    draw_water_c,
+    thermal_course,
+)
 from core.arrays import ComplexArray, FloatArray
 from core.rotor_parameters import RotorParameters
 
@@ -77,7 +82,7 @@ def live(
         _bearing_life(
             bearing,
             draw_setting(setting, bearing),
-            rows_of(thermal_course(bearing, operation, water_c, oil_offset_c), turns),
+            rows_of(_thermal(setting, bearing, operation, water_c, oil_offset_c), turns),
             rows_of(draw_chain(chain, operation), turns),
             positions_um[bearing.id][:, turns],
             turning,
@@ -120,6 +125,17 @@ def _oil_offset_c(operation: Operation, changes: tuple[ConditionChange, ...]) ->
     for change in changes:
         offset_c += change.oil_offset_c * change.holds(operation.time_ns)
     return offset_c
+
+
+def _thermal(
+    random: np.random.Generator,
+    bearing: LifeBearing,
+    operation: Operation,
+    water_c: FloatArray,
+    oil_offset_c: FloatArray,
+) -> ThermalCourse:
+    closing_share = draw_closing_share(random, operation)
+    return thermal_course(bearing, operation, water_c, closing_share, oil_offset_c)
 
 
 def _bearing_life(

@@ -14,11 +14,13 @@ import numpy as np
 from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.life_bearing import LifeBearing
 from acquisition.simulated.life.operation import Operation
-from acquisition.simulated.life.wander import change_rows, held, wander
+from acquisition.simulated.life.wander import change_rows, held, lagged, wander
 from core.arrays import FloatArray
 
 LEVEL_MEAN = 0.33
-LEVEL_RMS = 0.15
+LEVEL_RMS = 0.14
+LEVEL_LEAST, LEVEL_MOST = 0.07, 0.58
+LEVEL_TIME_S = 1200.0
 LEVEL_INTERVAL_S = 9.0 * 86_400.0
 COMMON_SHARE = 0.6
 """Correlation of the levels of the three bearings of one shaft."""
@@ -28,7 +30,7 @@ LOAD_PULL = 0.05
 SLOW_RMS, SLOW_TIME_S = 0.02, 4.0 * 86_400.0
 FAST_RMS, FAST_TIME_S = 0.01, 2.0 * 3600.0
 ACROSS_RMS, ACROSS_TIME_S = 0.012, 20.0 * 86_400.0
-LEAST, MOST = 0.03, 0.68
+LEAST, MOST = 0.02, 0.66
 """Eccentricity ratios within which a healthy shaft stays."""
 
 
@@ -47,13 +49,19 @@ def draw_positions_um(
     for bearing in bearings:
         own = random.standard_normal(n)
         mixed = math.sqrt(COMMON_SHARE) * common + math.sqrt(1.0 - COMMON_SHARE) * own
-        along = held(LEVEL_MEAN + LEVEL_RMS * mixed, which)
-        along = _changed(along, operation, changes) + _unrest(random, operation)
-        along = np.clip(along, LEAST, MOST)
+        level = _changed(held(_folded(LEVEL_MEAN + LEVEL_RMS * mixed), which), operation, changes)
+        level = lagged(level, np.full(n, LEVEL_TIME_S), step_s, float(level[0]))
+        along = np.clip(level + _unrest(random, operation), LEAST, MOST)
         across = wander(random, n, step_s, ACROSS_TIME_S, ACROSS_RMS)
         angle_rad = line_rad + math.radians(12.0) * random.standard_normal()
         placed[bearing.id] = bearing.told_clearance_um * _turned(along, across, angle_rad)
     return placed
+
+
+def _folded(level: FloatArray) -> FloatArray:
+    """Levels reflected at both limits, so that none piles up there."""
+    width = LEVEL_MOST - LEVEL_LEAST
+    return LEVEL_LEAST + np.abs((level - LEVEL_LEAST + width) % (2.0 * width) - width)
 
 
 def _unrest(random: np.random.Generator, operation: Operation) -> FloatArray:

@@ -24,6 +24,9 @@ WATER_SEASON_C = 5.0
 WARMEST_DAY = 45.0
 YEAR_S = 365.25 * 86_400.0
 
+CLOSING_RMS, CLOSING_TIME_S = 0.008, 6.0 * 86_400.0
+"""Of 165 µm it is 1.3 µm: what a kelvin's tenth between shaft and housing does."""
+
 
 @dataclass(frozen=True, eq=False)
 class ThermalCourse:
@@ -51,10 +54,17 @@ def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArra
     return np.asarray(WATER_MEAN_C + season + weather)
 
 
+def draw_closing_share(random: np.random.Generator, operation: Operation) -> FloatArray:
+    """Draw how much of the usual closing there is: air and water reach shaft and housing apart."""
+    n, step_s = len(operation), operation.step_s
+    return 1.0 + wander(random, n, step_s, CLOSING_TIME_S, CLOSING_RMS)
+
+
 def thermal_course(
     bearing: LifeBearing,
     operation: Operation,
     water_c: FloatArray,
+    closing_share: FloatArray | float = 1.0,
     oil_offset_c: FloatArray | float = 0.0,
     initial_oil_c: float | None = None,
 ) -> ThermalCourse:
@@ -64,6 +74,8 @@ def thermal_course(
     ----------
     water_c : (n,)
         Of the cooling water.
+    closing_share : (n,) or one number
+        Of the usual difference between shaft and housing.
     oil_offset_c : (n,) or one number
         Warmer oil than usual while running, for a want of cooling.
     initial_oil_c
@@ -75,7 +87,7 @@ def thermal_course(
     rise_c = bearing.oil_rise_c + bearing.oil_rise_at_load_c * loaded + oil_offset_c
     targets = (
         (water_c + np.where(turns, rise_c, STANDING_OIL_C), bearing.oil_time_s),
-        (np.where(turns, bearing.closing_um, 0.0), bearing.closing_time_s),
+        (np.where(turns, closing_share * bearing.closing_um, 0.0), bearing.closing_time_s),
         (bearing.opening_um * loaded**2, bearing.opening_time_s),
     )
     cold_c = float(water_c[0]) + STANDING_OIL_C if initial_oil_c is None else initial_oil_c
