@@ -61,6 +61,8 @@ class UnitRules:
 
     Parameters
     ----------
+    slow_channel
+        Of slow channels that a limit needs; another device may deliver them, and later.
     bearings
         By bearing; one that is not there has no limits.
     clock, link
@@ -68,6 +70,7 @@ class UnitRules:
     """
 
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
+    slow_channel: AlarmRule = field(default_factory=lambda: rule_of(5.0, 10.0))
     bearings: dict[str, BearingRules] = field(default_factory=dict)
     clock: ClockRules | None = field(default_factory=ClockRules)
     link: AlarmRule | None = field(default_factory=lambda: rule_of(10.0, 0.0))

@@ -173,11 +173,16 @@ class UnitAlarms:
         if block.channel_quality == self._resting_with:
             return
         for watch in self._watched.channels:
-            quality = worst(block.channel_quality[row] for row in self._rows_of[watch.source])
-            condition = channel_condition(quality, self._segment_faults.get(watch.source))
-            self._apply(watch, condition, block.stop_ns)
+            self._apply(watch, self._channel_condition(watch.source, block), block.stop_ns)
         resting = all(self._alarms[watch.id].is_resting for watch in self._watched.channels)
         self._resting_with = block.channel_quality if resting else None
+
+    def _channel_condition(self, channel: str, block: SampleBlock) -> Condition:
+        rows = self._rows_of[channel]
+        if not rows:
+            return unknown(Reason.NOT_MEASURED)
+        quality = worst(block.channel_quality[row] for row in rows)
+        return channel_condition(quality, self._segment_faults.get(channel))
 
     def _take_clock(self, block: SampleBlock, host_ns: int) -> None:
         offset, drift, stamps = self._watched.offset, self._watched.drift, self._watched.stamps

@@ -83,8 +83,8 @@ def watch_list(unit: Unit, rules: UnitRules) -> WatchList:
     temperatures = tuple(_temperatures(unit, rules))
     sources = dict.fromkeys(watch.source for watch in temperatures)
     return WatchList(
-        channels=tuple(_channel(unit, channel.id, rules) for channel in unit.channels),
-        slow_channels=tuple(_channel(unit, source, rules) for source in sources),
+        channels=tuple(_channel(unit, channel.id, rules.channel) for channel in unit.channels),
+        slow_channels=tuple(_channel(unit, source, rules.slow_channel) for source in sources),
         amplitudes={bearing.id: _amplitudes(unit, bearing.id, rules) for bearing in unit.bearings},
         temperatures=temperatures,
         offset=_offset(unit, rules.clock),
@@ -98,8 +98,8 @@ def _identity(unit: Unit, subject: str, kind: AlarmKind) -> AlarmIdentity:
     return AlarmIdentity(unit.id, subject, kind)
 
 
-def _channel(unit: Unit, channel: str, rules: UnitRules) -> Watch:
-    return Watch(_identity(unit, channel, AlarmKind.CHANNEL_NOT_OK), rules.channel, channel)
+def _channel(unit: Unit, channel: str, rule: AlarmRule) -> Watch:
+    return Watch(_identity(unit, channel, AlarmKind.CHANNEL_NOT_OK), rule, channel)
 
 
 def _limit(unit: Unit, subject: str, kind: AlarmKind, rule: LimitRule, source: str) -> LimitWatch:

@@ -19,6 +19,7 @@ def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitR
     is_live = origin is Origin.LIVE
     return UnitRules(
         channel=rule_of(alarms.channel_on_delay_s, alarms.channel_off_delay_s),
+        slow_channel=rule_of(alarms.slow_channel_on_delay_s, alarms.channel_off_delay_s),
         bearings={bearing.id: _bearing(bearing) for bearing in unit.bearing},
         clock=_clock(alarms) if is_live and alarms.clock == "judged" else None,
         link=rule_of(alarms.link_lost_after_s, 0.0) if is_live else None,

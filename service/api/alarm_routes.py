@@ -18,15 +18,12 @@ from core.alarms.operation import (
 )
 from core.units import ns_from_s
 from service.api.alarm_models import (
-    AcknowledgeModel,
-    ActorModel,
     AlarmEventsModel,
     AlarmKindName,
     AlarmListModel,
     AlarmModel,
-    OutageModel,
-    ShelveModel,
 )
+from service.api.alarm_requests import AcknowledgeModel, ActorModel, OutageModel, ShelveModel
 from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model
 from service.api.bearing_routes import Moment
 from service.api.context import Context
@@ -68,7 +65,7 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get("", summary="All alarms that are not normal")
     async def alarms() -> AlarmListModel:
-        """The alarm list, and what cannot be judged now; a bare list of what is wrong and seen."""
+        """The alarm list, most urgent first, and what cannot be judged now."""
         return alarm_list_model(context.alarms, context.origin, context.clock.now_ns())
 
     @router.get("/events", summary="History of all alarms", responses=EVENT_PROBLEMS)

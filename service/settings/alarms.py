@@ -85,6 +85,9 @@ class AlarmSettings(Settings):
     channel_on_delay_s: DelayS = 0.5
     """For how long a channel must be bad, seconds of the samples' time."""
 
+    slow_channel_on_delay_s: DelayS = 5.0
+    """For how long a slow channel that a limit needs must be bad, s of the samples' time."""
+
     channel_off_delay_s: DelayS = 10.0
     """For how long it must be good again for the alarm to return, s."""
 

@@ -29,6 +29,7 @@ UNIT = Unit(
 )
 RULES = UnitRules(
     channel=rule_of(0.0, 0.0),
+    slow_channel=rule_of(0.0, 0.0),
     bearings={
         "UJB": BearingRules(
             shaft_order1=LimitRule(Limits(60.0, 90.0), rule_of(0.0, 0.0)),
@@ -173,6 +174,8 @@ def test_a_channel_whose_rows_are_amplitude_and_phase_fails_with_either() -> Non
     news = alarms.take(block(0, phase_lost), [], 0)
 
     assert told(news) == [("U1:sx:channel_not_ok", "raised")]
+    spare = alarms.alarm("U1:spare:channel_not_ok")  # no row is about it
+    assert (spare.condition.is_known, spare.condition.reason) == (False, "not_measured")
 
 
 def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms: UnitAlarms) -> None:

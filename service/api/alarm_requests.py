@@ -1,0 +1,82 @@
+"""What people ask of alarms."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator, ConfigDict, Field, StringConstraints
+
+from service.api.models import ApiModel
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be printable characters on one line")
+    return text
+
+
+Actor = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=80),
+    AfterValidator(_printable),
+    Field(examples=["A. Name"]),
+]
+
+Words = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=500),
+    AfterValidator(_printable),
+    Field(examples=["probe is being changed"]),
+]
+
+Comment = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, max_length=500),
+    AfterValidator(_printable),
+    Field(examples=["seen, shift engineer told"]),
+]
+
+
+class _Request(ApiModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+
+
+class ActorModel(_Request):
+    """Who does something to an alarm. There is no login yet: the name is believed."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+
+class AcknowledgeModel(_Request):
+    """That somebody has seen an occurrence of an alarm."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    occurrence: Annotated[int, Field(ge=1, le=2**62, examples=[3])]
+    """Which occurrence was seen: one that has come since is not acknowledged."""
+
+    comment: Comment = ""
+    """What to remember, at most 500 printable characters."""
+
+
+class ShelveModel(_Request):
+    """That somebody takes an alarm off the list for a while."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    reason: Words
+    """Why, 1 to 500 printable characters."""
+
+    duration_s: Annotated[float, Field(ge=1.0, le=31_536_000.0, examples=[3600.0])]
+    """For how long, s; at most what the plant file allows."""
+
+
+class OutageModel(_Request):
+    """That somebody takes an alarm off the list until further notice."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    reason: Words
+    """Why, 1 to 500 printable characters."""
