@@ -65,7 +65,7 @@ async def test_each_wrong_daq_is_named_with_what_is_wrong_and_shows_no_number(
         no_ring = await stack.enter_async_context(ring(counting_feed))
         no_ring.device.memory.write(0, b"\x12\x34")
         newer = await stack.enter_async_context(ring(counting_feed))
-        newer.device.memory.write(1, b"\x00\x02")
+        newer.device.memory.write(1, b"\x00\x03")
         small = await stack.enter_async_context(ring(counting_feed, n_channels=8))
         standing = await stack.enter_async_context(ring(counting_feed))
         ports = {
@@ -89,10 +89,10 @@ async def test_each_wrong_daq_is_named_with_what_is_wrong_and_shows_no_number(
         reasons = {unit["id"]: unit["source"]["reason"] for unit in units}
         for name, said in {
             "absent": "Connection refused",
-            "silent": "No response received",
+            "silent": "no answer within 0.5 s",
             "web": "wrong reply",
             "no_ring": "magic is 0x1234",
-            "newer": "version is 2",
+            "newer": "version is 3",
             "small": "n_channels is 8, expected 12",
             "standing": "its data stand still",
         }.items():
@@ -100,8 +100,8 @@ async def test_each_wrong_daq_is_named_with_what_is_wrong_and_shows_no_number(
             latest = await program.get(f"/api/v1/units/{name}/bearings/UJB/latest")
             assert latest["quality"] == {"level": "bad", "reason": "not_connected"}
             assert {reading["value"] for reading in latest["readings"].values()} == {None}
-        for name in ("absent", "silent", "web", "standing"):
-            assert f"127.0.0.1:{ports[name]}" in reasons[name]
+        for name, port in ports.items():
+            assert f"127.0.0.1:{port}" in reasons[name]
         assert (await program.get("/readyz"))["status"] == "ok"
         assert await program.end() == 0
     assert "Traceback" not in program.errors

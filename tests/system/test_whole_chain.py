@@ -13,6 +13,7 @@ from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.scenario import (
     BearingScenario,
     HydraulicNoise,
@@ -89,7 +90,7 @@ async def twenty_minutes_over_modbus(
     monitor = UnitMonitor(machine, AnalysisSettings(n_segments=n_hops))
     newest: dict[str, Assessment] = {}
     async with ModbusRingServer(device) as server:
-        settings = ModbusRingSettings(host="127.0.0.1", port=server.port)
+        settings = ModbusRingSettings(transport=TcpTransport(host="127.0.0.1", port=server.port))
         source = ModbusRingSource(settings, calibration, UnpacedClock(device))
         async with source.connect() as blocks:
             async for block in blocks:
