@@ -1,0 +1,161 @@
+"""The simulated CAN DAQ: its pace, its end, its faults on command."""
+
+import asyncio
+
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.daq.can_bus import CanBusServer
+from acquisition.daq.can_device import CanDevice
+from acquisition.daq.can_shape import CanShape, DaqSignal
+from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.errors import ConfigError, LinkError
+from acquisition.raw import FeedEndedError
+
+SHAPE = CanShape(
+    channels=(DaqSignal("a", "V"), DaqSignal("b", "V")),
+    slow=(DaqSignal("s", "MW"), DaqSignal("t", "MW")),
+)
+
+
+class EndingFeed:
+    """A counting feed that ends."""
+
+    def __init__(self, feed, n_blocks: int) -> None:
+        self._feed, self._n_blocks = feed, n_blocks
+
+    def advance(self, n_samples: int):
+        if self._n_blocks == 0:
+            raise FeedEndedError
+        self._n_blocks -= 1
+        return self._feed.advance(n_samples)
+
+
+class Terminal:
+    """Whoever has an slcan adapter in hand."""
+
+    def __init__(self, endpoint) -> None:
+        self._port = int(endpoint["channel"].rpartition(":")[2])
+
+    async def __aenter__(self) -> "Terminal":
+        self.reader, self.writer = await asyncio.open_connection("127.0.0.1", self._port)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.writer.close()
+
+    async def ask(self, command: bytes) -> bytes:
+        self.writer.write(command)
+        return await self.reader.read(1)
+
+
+@pytest.fixture
+def device(counting_feed) -> CanDevice:
+    return CanDevice(counting_feed(), SHAPE)
+
+
+async def test_an_adapter_answers_commands_and_refuses_to_send(device):
+    device.next_frames()
+    async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as terminal:
+        answers = [await terminal.ask(c + b"\r") for c in (b"C", b"S6", b"Y2", b"L", b"t1230")]
+        assert answers == [b"\r", b"\r", b"\r", b"\r", b"\a"]
+        assert dict(server.commands) == {"C": 1, "S": 1, "Y": 1, "L": 1, "t": 1}
+
+
+async def test_frames_flow_from_open_to_close(device):
+    async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as terminal:
+        assert await terminal.ask(b"L\r") == b"\r"
+        first = await terminal.reader.readuntil(b"\r")
+        assert first == b"t10080000000007000000\r"
+        assert await terminal.reader.readuntil(b"\r") == b"t10180000320003000000\r"
+
+
+async def test_a_second_reader_takes_the_place_of_the_first(device):
+    async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as first:
+        await first.ask(b"L\r")
+        async with Terminal(server.endpoint) as second:
+            while await first.reader.read(10_000):
+                pass
+            assert await second.ask(b"L\r") == b"\r"
+
+
+@pytest.mark.parametrize("server_kind", [SlcanTcpServer, SlcanPtyServer, CanBusServer])
+async def test_an_unknown_fault_is_refused_with_those_there_are(server_kind, device):
+    async with server_kind(device) as server:
+        with pytest.raises(LookupError, match=r"no fault 'melt'; there are .*drop.*freeze"):
+            server.inject("melt")
+
+
+async def test_a_bus_without_text_has_no_faults_of_text_and_cannot_be_cut(device):
+    async with CanBusServer(device) as server:
+        with pytest.raises(LookupError, match="long_line"):
+            server.inject("long_line")
+        with pytest.raises(LinkError, match="no connection that could be cut"):
+            server.inject("cut")
+
+
+async def test_a_served_recording_ends_when_all_of_it_is_taken(counting_feed):
+    device = CanDevice(EndingFeed(counting_feed(), 200), SHAPE)
+    async with (
+        SlcanTcpServer(device, on_demand=True) as server,
+        Terminal(server.endpoint) as terminal,
+    ):
+        await terminal.ask(b"L\r")
+        running = asyncio.create_task(server.run())
+        text = b""
+        while text.count(b"t100") < 200:
+            text += await terminal.reader.read(65536)
+        await running
+    assert device.ledger.n_samples("U1") == 200 * 50
+
+
+async def test_a_device_that_nobody_reads_stays_bounded(device):
+    device.produce(10_000)
+    n_waiting = 0
+    while device.has_frames:
+        frames = device.next_frames()
+        n_waiting += 1
+    assert n_waiting == 64
+    assert device.ledger.n_samples("U1") == 10_001 * 50
+    assert int.from_bytes(frames[0].data[:4], "little") == 10_000 * 50
+
+
+async def test_a_patient_daq_loses_nothing_while_nobody_listens(counting_feed, stepped_clock):
+    device = CanDevice(EndingFeed(counting_feed(), 300), SHAPE)
+    async with SlcanTcpServer(device, stepped_clock, patient=True) as server:
+        for _ in range(100):
+            await asyncio.sleep(0)
+        assert stepped_clock.monotonic_s() == 0.0
+        async with Terminal(server.endpoint) as terminal:
+            await terminal.ask(b"L\r")
+            text = b""
+            while text.count(b"t100") < 300:
+                text += await terminal.reader.read(65536)
+            await server.run()
+    heads = [line for line in text.split(b"\r") if line.startswith(b"t100")]
+    first = [int.from_bytes(bytes.fromhex(h[5:13].decode()), "little") for h in heads]
+    assert first == [50 * n for n in range(300)]
+    assert stepped_clock.monotonic_s() >= 299 * 50 / 600.0
+
+
+async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
+    device = CanDevice(EndingFeed(counting_feed(), 3), SHAPE)
+    async with SlcanTcpServer(device, SystemClock()) as server:
+        while not device.ended:
+            await asyncio.sleep(0.01)
+        assert server.commands == {}
+
+
+def test_a_feed_with_other_channels_is_refused(counting_feed):
+    with pytest.raises(ConfigError, match=r"\(3, 2, False\) in the feed, \(2, 2, False\)"):
+        CanDevice(counting_feed(n_channels=3), SHAPE)
+
+
+async def test_a_link_to_a_terminal_stays_when_its_number_changes(tmp_path, device):
+    link = tmp_path / "adapter"
+    async with SlcanPtyServer(device, link=link) as server:
+        assert server.endpoint == {"interface": "slcan", "channel": str(link)}
+        assert link.exists()
+        server.inject("cut")
+        assert link.exists()
+    assert not link.is_symlink()
