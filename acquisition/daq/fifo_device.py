@@ -126,14 +126,11 @@ class FifoDevice:
         if address not in self._layout.addresses:
             return None
         queue = self._queues[self._layout.addresses.index(address)]
-        self._look(queue)
-        most = self._layout.most_samples
-        if not self._layout.removes:
-            return self._encode(_last_run(list(queue)[-most:], self._layout.kind))
-        run = _first_run(list(islice(queue, most)), self._layout.kind)
-        for _ in run:
-            queue.popleft()
-        return self._encode(run)
+        all_were_read = not any(self._queues) or not self._layout.removes
+        data = self._encode(self._reading(queue))
+        if all_were_read:  # and so the answer is empty, or as before: now time may pass
+            self._look()
+        return data
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
         """Answer functions 3 and 4 of the registers beside the queues."""
@@ -182,12 +179,20 @@ class FifoDevice:
             own = sample if self._layout.kind is FifoKind.INTERLEAVED else sample[n : n + 1]
             queue.append((counter, own))
 
-    def _look(self, queue: deque[_Record]) -> None:
-        if queue and self._layout.removes:
-            return
+    def _reading(self, queue: deque[_Record]) -> list[_Record]:
+        most = self._layout.most_samples
+        if not self._layout.removes:
+            return _last_run(list(queue)[-most:], self._layout.kind)
+        run = _first_run(list(islice(queue, most)), self._layout.kind)
+        for _ in run:
+            queue.popleft()
+        return run
+
+    def _look(self) -> None:
+        """Note that a reader has found nothing new."""
         self._n_looks += self.ended
         if self.on_demand:
-            self.produce(_ON_DEMAND_STEPS)
+            self.produce(_ON_DEMAND_STEPS if self._layout.removes else 1)
 
     def _encode(self, records: list[_Record]) -> bytes:
         if self._layout.kind is FifoKind.INTERLEAVED:

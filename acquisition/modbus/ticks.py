@@ -29,7 +29,7 @@ class Ticks:
         self.epoch = 0
 
     async def next(self) -> int:
-        """Wait for the next tick and return its number.
+        """Wait for the next tick, the first of all excepted, and return its number.
 
         A tick whose time has passed is never returned, so that polls do not pile up; the jump in
         the number is what was missed.
@@ -37,6 +37,8 @@ class Ticks:
         if self._origin_s is None:
             self._origin_s = self._clock.monotonic_s()
             self.epoch = self._clock.now_ns() // 1_000_000_000
+            self._last = 0
+            return 0
         tick = max(self._last + 1, math.ceil(self._now() - _EARLY))
         wait_s = self._origin_s + tick * self._period_s - self._clock.monotonic_s()
         await self._clock.sleep(max(wait_s, 0.0))

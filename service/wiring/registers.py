@@ -1,5 +1,7 @@
 """Sources that are read from registers and queues, and the monitor of a vector rack."""
 
+from dataclasses import replace
+
 from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
 from acquisition.joined_source import JoinedSource, only_slow, without_slow
@@ -35,9 +37,15 @@ def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
 def polled_source(
     source: ModbusPolledSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
 ) -> SampleSource:
-    """Registers as a source; the unit's rate is that of the polls."""
+    """Registers as a source; goes with a monitor of the unit :func:`at_poll_rate`."""
     rows = [channel.id for channel in unit.channels]
+    calibration = replace(calibration, rate_hz=source.rate_hz)
     return PolledSource(polled_settings(source), source.registers, rows, calibration, clock)
+
+
+def at_poll_rate(source: ModbusPolledSettings | ModbusVectorSettings, unit: Unit) -> Unit:
+    """The unit as its polled source shows it: a sample is a poll."""
+    return replace(unit, rate_hz=source.rate_hz)
 
 
 def vector_source(
@@ -49,7 +57,7 @@ def vector_source(
         polled_settings(source),
         source.registers,
         [row.id for row in source.rows],
-        vector_calibration(calibration, ids, source.rows),
+        vector_calibration(replace(calibration, rate_hz=source.rate_hz), ids, source.rows),
         clock,
     )
 
@@ -58,7 +66,7 @@ def vector_monitor(
     source: ModbusVectorSettings, unit: Unit, settings: AnalysisSettings
 ) -> VectorMonitor:
     """The monitor of a unit with a vector rack."""
-    return VectorMonitor(unit, source.rows, settings, source.averaging)
+    return VectorMonitor(at_poll_rate(source, unit), source.rows, settings, source.averaging)
 
 
 def fifo_source(

@@ -1,0 +1,139 @@
+"""Modbus sources in the plant file are refused at load where they can never work."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from core.vector_rows import VectorPart, VectorRow
+from service.settings.base import MisfitError
+from service.settings.modbus_sources import (
+    ModbusFifoSettings,
+    ModbusPolledSettings,
+    ModbusVectorSettings,
+    SlowDeviceSettings,
+)
+from service.settings.response import FOLDER
+
+DEPLOY = Path(__file__).parents[3] / "deploy"
+SKF = "maps/vector-rack-skf-like.toml"
+IDS = ("ujb_shaft_x", "ujb_shaft_y", "ujb_bearing_x", "ujb_bearing_y")
+WAVES = {"value": [{"channel": id_, "address": 10 * n} for n, id_ in enumerate(IDS)]}
+LINK = {"host": "192.0.2.1"}
+
+
+def load(model, **settings: Any):
+    return model.model_validate(LINK | settings, context={FOLDER: DEPLOY})
+
+
+def misfit(model, **settings: Any) -> str:
+    with pytest.raises(ValidationError) as refusal:
+        load(model, **settings)
+    return str(refusal.value)
+
+
+def polled(**settings: Any) -> ModbusPolledSettings:
+    return load(
+        ModbusPolledSettings,
+        **({"kind": "modbus_polled", "map": WAVES, "poll_period_s": 0.05} | settings),
+    )
+
+
+def vector(**settings: Any) -> ModbusVectorSettings:
+    return load(
+        ModbusVectorSettings,
+        **({"kind": "modbus_vector", "map_file": SKF, "poll_period_s": 5.0} | settings),
+    )
+
+
+def test_a_polled_source_gives_a_value_for_every_channel() -> None:
+    source = polled()
+
+    source.require_fit(IDS, ("speed",))
+    assert source.rate_hz == 20.0
+    assert source.registers.ids == IDS
+    with pytest.raises(MisfitError, match="no value for channel 'ljb_shaft_x'") as refusal:
+        source.require_fit((*IDS, "ljb_shaft_x"), ())
+    assert refusal.value.at == ("source", "map")
+    with pytest.raises(MisfitError, match="no such channel as 'ujb_bearing_y'") as refusal:
+        source.require_fit(IDS[:3], ())
+    assert refusal.value.at == ("source", "map", "value", 3, "channel")
+
+
+def test_a_rack_gives_the_amplitude_of_every_channel() -> None:
+    source = vector()
+
+    source.require_fit(IDS, ("speed",))
+    assert VectorRow("ujb_shaft_x", VectorPart.ORDER1_PHASE) in source.rows
+    assert source.mapped_channels == ("speed",)
+    assert source.averaging.n_polls == 60
+    with pytest.raises(MisfitError, match='quantity = "order1_amplitude"') as refusal:
+        source.require_fit((*IDS, "ljb_shaft_x"), ("speed",))
+    assert refusal.value.at == ("source", "map_file")
+
+
+def test_vectors_and_samples_are_not_taken_for_each_other() -> None:
+    with pytest.raises(MisfitError, match='for kind "modbus_vector"'):
+        polled(map=None, map_file=SKF, poll_period_s=5.0).require_fit(IDS, ("speed",))
+    amplitudes = [
+        {"channel": id_, "address": n, "quantity": "order1_amplitude", "detector": "pk"}
+        for n, id_ in enumerate(IDS)
+    ]
+    plain = {"value": [*amplitudes, *({"channel": i, "address": 90} for i in IDS[:1])]}
+    with pytest.raises(MisfitError, match='need a "quantity"'):
+        vector(map=plain, map_file=None).require_fit(IDS, ())
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"map_file": None}, 'give either a [map] table or "map_file"'),
+        ({"map": WAVES}, 'give either a [map] table or "map_file"'),
+        ({"map_file": "maps/absent.toml"}, "names a map that cannot be used"),
+        ({"poll_period_s": 0.5}, "must be 1 or more, as the register map asks"),
+        ({"poll_period_s": 40.0}, "must be two poll periods or more, 80"),
+        ({"hop_polls": 61}, "must not be above n_polls, 60"),
+        ({"min_polls": 61}, "must not be above n_polls, 60"),
+        ({"device": "/dev/ttyS0"}, "found both"),
+    ],
+)
+def test_a_rack_that_can_never_work_is_refused(settings: dict[str, Any], said: str) -> None:
+    given = {"kind": "modbus_vector", "map_file": SKF, "poll_period_s": 5.0} | settings
+    assert said in misfit(ModbusVectorSettings, **given)
+
+
+def test_a_slow_device_measures_slow_channels_alone() -> None:
+    slow = load(SlowDeviceSettings, map_file="maps/slow-gateway.toml", poll_period_s=1.0)
+    known = ("speed", "active_power", "ujb_oil_temperature", "ljb_oil_temperature")
+
+    slow.require_fit(known)
+    assert slow.mapped_channels == known
+    with pytest.raises(MisfitError, match="no such channel as 'ljb_oil_temperature'") as refusal:
+        slow.require_fit(known[:3])
+    assert refusal.value.at == ("slow_source", "map_file")
+
+
+def fifo(**settings: Any) -> ModbusFifoSettings:
+    return load(ModbusFifoSettings, **({"kind": "modbus_fifo", "addresses": [1000]} | settings))
+
+
+def test_a_queue_of_twelve_channels_fits_into_a_reading() -> None:
+    layout = fifo().fifo_layout(12)
+
+    assert layout.record_registers == 13
+    assert layout.removes
+
+
+@pytest.mark.parametrize(
+    ("settings", "n_channels", "said"),
+    [
+        ({}, 31, "at most 31"),
+        ({"layout": "per_channel"}, 2, "must be 2, got 1"),
+        ({"has_counter": False, "reading": "keeps"}, 2, "which samples are new"),
+    ],
+)
+def test_a_queue_that_cannot_be_followed_is_refused(settings, n_channels: int, said: str) -> None:
+    with pytest.raises(MisfitError, match=said) as refusal:
+        fifo(**settings).fifo_layout(n_channels)
+    assert refusal.value.at[0] == "source"

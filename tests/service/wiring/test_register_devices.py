@@ -1,0 +1,146 @@
+"""The same simulated machine through a rack, through queues and as waveforms tells the same."""
+
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.delivery import Delivery
+from core.assessment import Assessment
+from core.blocks import SampleBlock
+from core.machine import Unit
+from core.monitor import UnitMonitor
+from core.settings import AnalysisSettings
+from service.conversion import calibration_of, machine_of
+from service.settings.loading import load_plant_file
+from service.settings.modbus_sources import (
+    ModbusFifoSettings,
+    ModbusPolledSettings,
+    ModbusVectorSettings,
+)
+from service.settings.units import UnitSettings
+from service.wiring.register_daqs import fifo_device, modbus_server, polled_device, vector_device
+from service.wiring.registers import (
+    at_poll_rate,
+    fifo_source,
+    polled_source,
+    vector_monitor,
+    vector_source,
+)
+from service.wiring.simulations import simulated_feed
+
+DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
+N_SEGMENTS = 6
+
+
+@pytest.fixture(scope="module")
+def settings() -> UnitSettings:
+    return load_plant_file(DEMO).unit[0]
+
+
+@pytest.fixture
+def unit(settings: UnitSettings) -> Unit:
+    return machine_of(settings)
+
+
+def feed_of(settings: UnitSettings, clock):
+    return simulated_feed(settings, clock)
+
+
+def address(n: int) -> dict[str, Any]:
+    return {"address": 100 + 2 * n, "type": "float32"}
+
+
+def vector_map(unit: Unit) -> dict[str, Any]:
+    ids = [channel.id for channel in unit.channels]
+    values: list[dict[str, Any]] = [
+        {"channel": id_, "quantity": "order1_amplitude", "detector": "pp"} for id_ in ids
+    ]
+    values += [{"channel": id_, "quantity": "order1_phase", "phase": "lag"} for id_ in ids]
+    values += [{"channel": id_} for id_ in ("speed", "active_power")]
+    return {"value": [value | address(n) for n, value in enumerate(values)]}
+
+
+@asynccontextmanager
+async def served(device) -> AsyncIterator[dict[str, Any]]:
+    link = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", port=0, addresses=(0,))
+    async with modbus_server(device, link, None, patient=False) as server:
+        yield dict(server.endpoint)
+
+
+def by_waveforms(settings: UnitSettings, unit: Unit, clock) -> Iterator[Assessment]:
+    feed, delivery = feed_of(settings, clock), Delivery(calibration_of(settings))
+    monitor = UnitMonitor(unit, AnalysisSettings())
+    for _ in range(8192 * N_SEGMENTS // 600):
+        for block in delivery.take(feed.advance(600)):
+            yield from monitor.ingest(block)
+
+
+async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock) -> None:
+    expected = {a.bearing: a.readings for a in by_waveforms(settings, unit, stepped_clock)}
+    given = {"kind": "modbus_vector", "poll_period_s": 1.0, "map": vector_map(unit)}
+    given |= {"n_polls": 60, "hop_polls": 60, "timeout_s": 5.0, "host": "127.0.0.1"}
+    plan = ModbusVectorSettings.model_validate(given)
+    feed = feed_of(settings, stepped_clock)
+    device = vector_device(plan, unit, calibration_of(settings), feed, on_demand=True)
+    device.produce(12)
+    found = {}
+    async with served(device) as endpoint:
+        source = vector_source(
+            plan.model_copy(update=endpoint), unit, calibration_of(settings), stepped_clock
+        )
+        monitor = vector_monitor(plan, unit, AnalysisSettings())
+        async with source.connect() as stream:
+            while not found:
+                found = {a.bearing: a.readings for a in monitor.ingest(await anext(stream))}
+
+    compared = 0
+    for bearing, readings in found.items():
+        for name in ("order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"):
+            one, other = readings[name].value, expected[bearing][name].value
+            if one is not None and other is not None:
+                assert one == pytest.approx(other, rel=0.05), (bearing, name)
+                compared += 1
+    assert compared >= 4
+
+
+async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> None:
+    plan = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=(7,), timeout_s=5.0)
+    feed = feed_of(settings, stepped_clock)
+    blocks: list[SampleBlock] = []
+    async with served(fifo_device(plan, unit, feed, on_demand=True)) as endpoint:
+        source = fifo_source(
+            plan.model_copy(update=endpoint), calibration_of(settings), stepped_clock
+        )
+        async with source.connect() as stream:
+            while not blocks or blocks[-1].stop_index < 600:
+                blocks.append(await anext(stream))
+
+    twin, delivery = feed_of(settings, stepped_clock), Delivery(calibration_of(settings))
+    expected = [b for _ in range(14) for b in delivery.take(twin.advance(50))]
+    for block, other in zip(blocks, expected, strict=False):
+        np.testing.assert_array_equal(block.samples, other.samples)
+
+
+async def test_polled_registers_show_the_newest_sample(settings, unit) -> None:
+    ids = [channel.id for channel in unit.channels]
+    values = [{"channel": id_} | address(n) for n, id_ in enumerate(ids)]
+    given = {"kind": "modbus_polled", "poll_period_s": 0.01, "host": "127.0.0.1"}
+    plan = ModbusPolledSettings.model_validate(given | {"map": {"value": values}})
+    clock = SystemClock()
+    calibration = calibration_of(settings)
+    feed = feed_of(settings, clock)
+    device = polled_device(plan, unit, calibration, feed, on_demand=True)
+    async with served(device) as endpoint:
+        source = polled_source(plan.model_copy(update=endpoint), unit, calibration, clock)
+        async with source.connect() as stream:
+            block = await anext(stream)
+
+    assert block.rate_hz == at_poll_rate(plan, unit).rate_hz == 100.0
+    assert block.n_samples == settings.block_samples
+    probe = block.samples[[c.id for c in unit.channels].index("ujb_shaft_x")]
+    assert 1000.0 < probe.mean() < 3000.0
