@@ -177,7 +177,7 @@ def _refresh_s(plant: PlantFile) -> float:
     hop_samples = analysis_of(plant.analysis).hop_samples
     return max(
         (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)
-        / unit.rate_hz
+        / unit.sampling_hz
         for unit in plant.unit
     )
 

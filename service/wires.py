@@ -2,6 +2,7 @@
 
 from enum import StrEnum
 
+from service.settings.can import CanSettings
 from service.settings.plant import PlantFile
 from service.settings.sources import ModbusRingSettings, SourceSettings
 
@@ -13,6 +14,8 @@ class Wire(StrEnum):
 
     MODBUS_TCP = "modbus_tcp"
     MODBUS_RTU = "modbus_rtu"
+    CAN = "can"
+    CAN_FD = "can_fd"
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
@@ -23,6 +26,16 @@ def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
 
 def _source(wire: Wire) -> SourceSettings:
     """Polls follow each other quickly: how long a replay takes is a matter of its speed."""
+    if wire in (Wire.CAN, Wire.CAN_FD):
+        return CanSettings(
+            kind="can",
+            interface="slcan",
+            channel=f"socket://{_LOOPBACK}:0",
+            fd=wire is Wire.CAN_FD,
+            profile="padwatch_int16",
+            stale_after_s=1.0,
+            when_full="wait",
+        )
     where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
     return ModbusRingSettings(
         kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=1.0

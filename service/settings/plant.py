@@ -169,14 +169,14 @@ class PlantFile(Settings):
 
     def _check_analysis(self, unit: UnitSettings) -> None:
         turn_hz = hz_from_rpm(unit.rated_speed_rpm)
-        low, high = MIN_SPECTRUM_ORDERS * turn_hz, unit.rate_hz / 2
+        low, high = MIN_SPECTRUM_ORDERS * turn_hz, unit.sampling_hz / 2
         if not low <= self.analysis.max_frequency_hz < high:
             raise MisfitError(
                 f"for unit {unit.id} must be at least {MIN_SPECTRUM_ORDERS} times the rated speed,"
                 f" {low:g} Hz, and below half the sampling rate, {high:g} Hz",
                 *("analysis", "max_frequency_hz"),
             )
-        n_needed = math.ceil(MIN_SEGMENT_TURNS * unit.rate_hz / turn_hz)
+        n_needed = math.ceil(MIN_SEGMENT_TURNS * unit.sampling_hz / turn_hz)
         if self.analysis.segment_samples < n_needed:
             raise MisfitError(
                 f"for unit {unit.id} must hold {MIN_SEGMENT_TURNS} turns at rated speed,"

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from service.settings.base import MisfitError
+from service.settings.can import CanSettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,
     ModbusPolledSettings,
@@ -11,17 +11,19 @@ from service.settings.modbus_sources import (
 )
 from service.settings.sources import SourceSettings
 
-MIN_WAVEFORM_RATE_HZ = 20.0
-_SAME_RATE = 1e-9
-
 
 def require_source_fit(
-    source: SourceSettings, rate_hz: float, channels: Sequence[str], slow: Sequence[str]
+    source: SourceSettings,
+    beside: SlowDeviceSettings | None,
+    channels: Sequence[str],
+    slow: Sequence[str],
 ) -> None:
-    """Refuse a source that lacks a channel, or samples at another rate than the unit says.
+    """Refuse a source that lacks a channel, or a second device that gives none.
 
     Parameters
     ----------
+    beside
+        The device that slow channels are polled from, if there is one.
     channels, slow
         Ids of the unit's waveform and slow channels.
 
@@ -30,32 +32,13 @@ def require_source_fit(
     MisfitError
         Saying which, and what is needed.
     """
+    if beside is not None:
+        beside.require_fit(slow)
+    own = [id_ for id_ in slow if beside is None or id_ not in beside.mapped_channels]
     match source:
-        case ModbusVectorSettings():
-            source.require_fit(channels, slow)
-            _require_rate(rate_hz, source.rate_hz)
-            return
-        case ModbusPolledSettings():
-            source.require_fit(channels, slow)
-            _require_rate(rate_hz, source.rate_hz)
+        case ModbusVectorSettings() | ModbusPolledSettings():
+            source.require_fit(channels, own)
         case ModbusFifoSettings():
             source.fifo_layout(len(channels))
-    if rate_hz < MIN_WAVEFORM_RATE_HZ:
-        raise MisfitError(f"must be {MIN_WAVEFORM_RATE_HZ:g} or more for waveforms", "rate_hz")
-
-
-def require_slow_fit(source: SlowDeviceSettings | None, slow: Sequence[str]) -> None:
-    """Refuse a device of slow values that gives none of the unit's.
-
-    Raises
-    ------
-    MisfitError
-        Naming those that there are.
-    """
-    if source is not None:
-        source.require_fit(slow)
-
-
-def _require_rate(rate_hz: float, polls_per_s: float) -> None:
-    if abs(rate_hz - polls_per_s) > _SAME_RATE * polls_per_s:
-        raise MisfitError(f"must be one over poll_period_s, {polls_per_s:.12g}", "rate_hz")
+        case CanSettings():
+            source.check_channels(channels, own)

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.settings.base import Settings
+from service.settings.can import CanSettings
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,
@@ -44,6 +45,7 @@ SourceSettings = Annotated[
     | ModbusFifoSettings
     | ModbusPolledSettings
     | ModbusVectorSettings
+    | CanSettings
     | SimulatedSettings,
     Field(discriminator="kind"),
 ]

@@ -14,9 +14,13 @@ from service.settings.bearings import (
     BearingSettings,
 )
 from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer
-from service.settings.modbus_sources import SlowDeviceSettings
+from service.settings.modbus_sources import (
+    ModbusPolledSettings,
+    ModbusVectorSettings,
+    SlowDeviceSettings,
+)
 from service.settings.simulation import SimulationSettings
-from service.settings.source_fit import require_slow_fit, require_source_fit
+from service.settings.source_fit import require_source_fit
 from service.settings.sources import SimulatedSettings, SourceSettings
 
 
@@ -32,9 +36,9 @@ class UnitSettings(Settings):
     rated_speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
     """Rated running speed in r/min, 20 to 1500; example: 92.3."""
 
-    rate_hz: Annotated[float, Field(ge=1e-5, le=100_000.0)] = 600.0
-    """Samples per second and channel, at least 20 for waveforms; where registers are polled, one
-    over their poll_period_s. Example: 600.0."""
+    rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
+    """Samples per second and channel; example: 600.0. Without effect where registers are polled:
+    there it is one over poll_period_s."""
 
     block_samples: Annotated[int, Field(ge=1, le=10_000)] = BLOCK_SAMPLES
     """Samples of each channel that share one verdict on the channel and one set of slow values; a
@@ -61,7 +65,7 @@ class UnitSettings(Settings):
     source: SourceSettings
     """Where the samples come from, by kind: "modbus_ring" (a streaming DAQ), "modbus_fifo"
     (queues), "modbus_polled" (registers), "modbus_vector" (a rack that gives amplitudes) or
-    "simulated"."""
+    "can" or "simulated"."""
 
     slow_source: SlowDeviceSettings | None = None
     """A second device that slow channels are polled from, where the first has none."""
@@ -77,6 +81,13 @@ class UnitSettings(Settings):
 
     simulation: SimulationSettings | None = None
     """The simulated machine behind a simulated DAQ or source; no effect on a real one."""
+
+    @property
+    def sampling_hz(self) -> float:
+        """Samples of each channel in a second: polls, where registers are polled."""
+        if isinstance(self.source, ModbusPolledSettings | ModbusVectorSettings):
+            return self.source.rate_hz
+        return self.rate_hz
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -97,8 +108,8 @@ class UnitSettings(Settings):
         self._check_slow(self.power_channel, "MW", "power_channel")
         self._check_simulation()
         slow_ids = [channel.id for channel in self.slow_channel]
-        require_source_fit(self.source, self.rate_hz, [c.id for c in self.channel], slow_ids)
-        require_slow_fit(self.slow_source, slow_ids)
+        channel_ids = [channel.id for channel in self.channel]
+        require_source_fit(self.source, self.slow_source, channel_ids, slow_ids)
         return self
 
     def _check_channels(self, number: int, bearing: BearingSettings) -> None:

@@ -1,15 +1,21 @@
 """Simulated DAQs in front of any raw feed, where the unit's source looks for them."""
 
-from pathlib import Path
-
 from acquisition.clock import Clock
 from acquisition.daq.port import DaqServer
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer, RtuRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.raw import RawFeed
-from service.settings import sources
+from service.conversion import calibration_of, machine_of
+from service.settings import modbus_sources, sources
+from service.settings.can import CanSettings
 from service.settings.units import UnitSettings
+from service.wiring.can import can_daq_of
+from service.wiring.register_daqs import (
+    fifo_device,
+    modbus_server,
+    polled_device,
+    vector_device,
+)
 
 
 def daq_of(unit: UnitSettings, feed: RawFeed, clock: Clock | None, *, recorded: bool) -> DaqServer:
@@ -29,21 +35,28 @@ def daq_of(unit: UnitSettings, feed: RawFeed, clock: Clock | None, *, recorded: 
     LookupError
         If the unit's source reads no device.
     """
-    source = unit.source
-    waiting = {"on_demand": clock is None, "patient": recorded}
+    source, machine = unit.source, machine_of(unit)
+    on_demand = clock is None
     match source:
         case sources.ModbusRingSettings():
             device = RingDevice(feed, unit.id, _ring_shape(unit, source))
-            if source.host is not None:
-                return ModbusRingServer(device, clock, source.host, source.port, **waiting)
-            return RtuRingServer(device, clock, _line(source.device), **waiting)
-        case _:
-            raise LookupError(f"there is no simulated DAQ for unit {unit.id}'s {source.kind}")
-
-
-def _line(device: str | None) -> Path | None:
-    """Where a pseudo-terminal is to be found; "pty" leaves that to the system."""
-    return None if device in (None, "pty") else Path(device)
+            device.on_demand, device.patient = on_demand, recorded
+            return modbus_server(device, source, clock, patient=recorded)
+        case modbus_sources.ModbusFifoSettings():
+            queue = fifo_device(source, machine, feed, on_demand=on_demand)
+            return modbus_server(queue, source, clock, patient=recorded)
+        case modbus_sources.ModbusPolledSettings():
+            registers = polled_device(
+                source, machine, calibration_of(unit), feed, on_demand=on_demand
+            )
+            return modbus_server(registers, source, clock, patient=recorded)
+        case modbus_sources.ModbusVectorSettings():
+            rack = vector_device(source, machine, calibration_of(unit), feed, on_demand=on_demand)
+            return modbus_server(rack, source, clock, patient=recorded)
+        case CanSettings():
+            return can_daq_of(unit, source, feed, clock, patient=recorded)
+        case sources.SimulatedSettings():
+            raise LookupError(f'the source of unit {unit.id} is of kind "simulated": no DAQ')
 
 
 def _ring_shape(unit: UnitSettings, source: sources.ModbusRingSettings) -> RingDeviceSettings:

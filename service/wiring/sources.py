@@ -2,25 +2,30 @@
 
 from collections.abc import Callable
 
+from acquisition.calibration import UnitCalibration
+from acquisition.can.source import CanSource
 from acquisition.clock import Clock
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.simulated.source import SimulatedSource
 from acquisition.source import SampleSource
 from core.monitor import UnitMonitor
 from core.monitor_port import Monitor
-from core.vector_monitor import VectorMonitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.runner import WatchedUnit
 from service.settings import modbus_sources, sources
+from service.settings.can import CanSettings
 from service.settings.plant import AnalysisModel, PlantFile
 from service.settings.units import UnitSettings
-from service.wiring.modbus import (
-    fields_of,
+from service.wiring.can import can_settings_of
+from service.wiring.modbus import fields_of, transport_of
+from service.wiring.registers import (
+    at_poll_rate,
     fifo_source,
+    joined_source,
     polled_source,
-    transport_of,
+    vector_monitor,
     vector_source,
-    with_slow_source,
+    without_channels_of,
 )
 from service.wiring.simulations import simulated_feed
 
@@ -41,9 +46,13 @@ def watched_units(
 def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> Monitor:
     """What the samples of a unit are analysed by: its rack may give vectors instead of them."""
     machine, settings, source = machine_of(unit), analysis_of(analysis), unit.source
-    if isinstance(source, modbus_sources.ModbusVectorSettings):
-        return VectorMonitor(machine, source.rows, settings, source.averaging)
-    return UnitMonitor(machine, settings)
+    match source:
+        case modbus_sources.ModbusVectorSettings():
+            return vector_monitor(source, machine, settings)
+        case modbus_sources.ModbusPolledSettings():
+            return UnitMonitor(at_poll_rate(source, machine), settings)
+        case _:
+            return UnitMonitor(machine, settings)
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
@@ -67,22 +76,27 @@ def poll_period_s(unit: UnitSettings) -> float:
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
-    """Where the samples of a unit come from."""
-    return with_slow_source(_main_source(unit, clock), unit, clock)
+    """Where the samples of a unit come from, and its slow values, if from elsewhere."""
+    calibration, beside = calibration_of(unit), unit.slow_source
+    if beside is None:
+        return _main_source(unit, calibration, clock)
+    source = _main_source(unit, without_channels_of(beside, calibration), clock)
+    return joined_source(source, beside, calibration, clock)
 
 
-def _main_source(unit: UnitSettings, clock: Clock) -> SampleSource:
+def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock) -> SampleSource:
     source = unit.source
     match source:
         case sources.ModbusRingSettings():
             ring = ModbusRingSettings(transport=transport_of(source), **fields_of(source))
-            return ModbusRingSource(ring, calibration_of(unit), clock)
+            return ModbusRingSource(ring, calibration, clock)
         case modbus_sources.ModbusFifoSettings():
-            return fifo_source(source, unit, clock)
+            return fifo_source(source, calibration, clock)
         case modbus_sources.ModbusPolledSettings():
-            return polled_source(source, unit, clock)
+            return polled_source(source, machine_of(unit), calibration, clock)
         case modbus_sources.ModbusVectorSettings():
-            return vector_source(source, unit, clock)
+            return vector_source(source, machine_of(unit), calibration, clock)
+        case CanSettings():
+            return CanSource(can_settings_of(unit, source), calibration, clock)
         case sources.SimulatedSettings():
-            feed = simulated_feed(unit, clock)
-            return SimulatedSource(feed, calibration_of(unit), clock)
+            return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
