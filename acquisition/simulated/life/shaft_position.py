@@ -29,7 +29,7 @@ START_RMS = 0.04
 LOAD_PULL = 0.05
 SLOW_RMS, SLOW_TIME_S = 0.02, 4.0 * 86_400.0
 FAST_RMS, FAST_TIME_S = 0.01, 2.0 * 3600.0
-ACROSS_RMS, ACROSS_TIME_S = 0.012, 20.0 * 86_400.0
+ACROSS_RMS, ACROSS_TIME_S = 0.010, 20.0 * 86_400.0
 LEAST, MOST = 0.02, 0.66
 """Eccentricity ratios within which a healthy shaft stays."""
 
