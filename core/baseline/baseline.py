@@ -1,6 +1,6 @@
 """`BearingBaseline`: a learned baseline as a value, with who made it, when and why."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.cell_table import CellTable
-from core.baseline.surface import Surface
+from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid
 from core.condition.film_conditions import FilmConditions
 from core.stiffness_history import DIRECTIONS
@@ -24,14 +24,20 @@ class Watched(StrEnum):
 
 @dataclass(frozen=True)
 class TimeScatter:
-    """Scatter of the mean deviation over a time scale, with all that makes readings alike."""
+    """Scatter of the mean deviation over a time scale, with all that makes readings alike.
+
+    Parameters
+    ----------
+    share
+        Its standard deviation over that of the single readings: 1 if they are all alike.
+    """
 
     time_scale_h: float
-    std: float
+    share: float
 
     def __post_init__(self) -> None:
-        if not (self.time_scale_h > 0.0 and self.std > 0.0):
-            raise ValueError(f"time_scale_h = {self.time_scale_h:g}, std = {self.std:g}")
+        if not (self.time_scale_h > 0.0 and self.share > 0.0):
+            raise ValueError(f"time_scale_h = {self.time_scale_h:g}, share = {self.share:g}")
 
 
 @dataclass(frozen=True)
@@ -71,12 +77,15 @@ class Deviations:
         ln of what was measured over what was learned.
     weight : (n,)
         1 for a typical reading, less for one that scatters more.
+    scatter : (n,)
+        Of readings in the cell.
     surface_std : (n,)
     """
 
     place: npt.NDArray[np.int64]
     deviation: FloatArray
     weight: FloatArray
+    scatter: FloatArray
     surface_std: FloatArray
 
 
@@ -88,6 +97,10 @@ class QuantityBaseline:
     ----------
     direction
         "x" or "y".
+    attitude_covariance
+        Of the surface's terms of the attitude angle; empty if it has none.
+    max_surface_std
+        Uncertainty of the surface above which nothing is compared.
     scatter
         Of single readings about the surface, over all cells.
     u_random
@@ -104,7 +117,9 @@ class QuantityBaseline:
     direction: str
     grid: CellGrid
     surface: Surface
+    attitude_covariance: tuple[tuple[float, ...], ...]
     table: CellTable
+    max_surface_std: float
     scatter: float
     u_random: float
     reading_h: float
@@ -119,6 +134,9 @@ class QuantityBaseline:
                 f"scatter = {self.scatter:g}, u_random = {self.u_random:g},"
                 f" reading_h = {self.reading_h:g}"
             )
+        n_terms = ATTITUDE_TERMS if self.surface.shape.has_attitude else 0
+        if [len(row) for row in self.attitude_covariance] != [n_terms] * n_terms:
+            raise ValueError(f"attitude_covariance: not {n_terms} by {n_terms}")
         times_h = [time.time_scale_h for time in self.time_scatter]
         if times_h != sorted(set(times_h)):
             raise ValueError(f"time_scatter: {times_h} must increase")
@@ -134,9 +152,9 @@ class QuantityBaseline:
             ln of the quantity and its random standard uncertainty.
         """
         place = self.table.find(self.grid.cells(conditions))
-        place = np.where(self.grid.is_known(conditions) & np.isfinite(value), place, -1)
+        place = np.where(self.is_known(conditions) & np.isfinite(value), place, -1)
         n = place.size
-        found = Deviations(place, np.full(n, np.nan), np.zeros(n), np.zeros(n))
+        found = Deviations(place, np.full(n, np.nan), np.zeros(n), np.zeros(n), np.zeros(n))
         rows = np.flatnonzero(place >= 0)
         if rows.size:
             cell = place[rows]
@@ -144,8 +162,28 @@ class QuantityBaseline:
             variance = self.table.scatter[cell] ** 2 + excess
             found.deviation[rows] = value[rows] - self.surface.at(conditions.rows(rows))
             found.weight[rows] = np.minimum(1.0, self.scatter**2 / variance)
-            found.surface_std[rows] = self.table.surface_std[cell]
+            found.scatter[rows] = self.table.scatter[cell]
+            found.surface_std[rows] = self._surface_std(conditions.rows(rows), cell)
+            place[rows[found.surface_std[rows] > self.max_surface_std]] = -1
         return found
+
+    def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
+        """(n,) whether readings have everything that this depends on."""
+        known = self.grid.is_known(conditions)
+        if not self.surface.shape.has_attitude:
+            return known
+        return known & np.isfinite(conditions.attitude_deg)
+
+    def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
+        """(n,) that of the cell, and more where the shaft has turned away from where it was."""
+        std = self.table.surface_std[cell]
+        if not self.surface.shape.has_attitude:
+            return std
+        then = replace(conditions, attitude_deg=self.table.attitude_deg[cell])
+        turned = attitude_terms(conditions) - attitude_terms(then)
+        covariance = np.array(self.attitude_covariance)
+        variance = std**2 + np.maximum(np.sum(turned * (covariance @ turned), axis=0), 0.0)
+        return np.asarray(np.sqrt(variance))
 
 
 @dataclass(frozen=True)

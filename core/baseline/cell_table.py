@@ -31,7 +31,9 @@ class CellStatistics:
         Robust standard deviation of readings about the surface; drawn towards that of all cells
         where there are few days.
     surface_std
-        Standard uncertainty of the surface in the cell.
+        Standard uncertainty of the surface in the middle of what the cell has seen.
+    attitude_deg
+        Mean attitude angle there; zero where it is not known.
     """
 
     cell: Cell
@@ -40,6 +42,7 @@ class CellStatistics:
     location: float
     scatter: float
     surface_std: float
+    attitude_deg: float
     support: Support
 
     def __post_init__(self) -> None:
@@ -84,6 +87,11 @@ class CellTable:
         return np.array([cell.surface_std for cell in self.cells], np.float64)
 
     @cached_property
+    def attitude_deg(self) -> FloatArray:
+        """(n_cells,)."""
+        return np.array([cell.attitude_deg for cell in self.cells], np.float64)
+
+    @cached_property
     def _places(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         """Lowest bins, and place by bins counted from there."""
         bins = np.array([cell.cell for cell in self.cells])
@@ -95,16 +103,23 @@ class CellTable:
         return low, places
 
 
-def lies_between(cell: Cell, own: frozenset[Cell], reach: int = 2) -> bool:
-    """Whether a cell has others, of their own support, on both sides along some axis."""
-    for axis in range(len(cell)):
-        sides = [
-            any(
-                (*cell[:axis], cell[axis] + sign * step, *cell[axis + 1 :]) in own
-                for step in range(1, reach + 1)
-            )
-            for sign in (-1, 1)
-        ]
-        if all(sides):
-            return True
-    return False
+def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
+    """Cells that have own ones on both sides along some axis, and are none themselves.
+
+    Parameters
+    ----------
+    reach
+        Cells that may be missing between the two.
+    """
+    found: set[Cell] = set()
+    for cell in own:
+        for axis in range(len(cell)):
+            line = [_moved(cell, axis, step) for step in range(1, reach + 2)]
+            ends = [place for place, other in enumerate(line) if other in own]
+            if ends:
+                found.update(line[: ends[0]])
+    return frozenset(found)
+
+
+def _moved(cell: Cell, axis: int, by: int) -> Cell:
+    return (*cell[:axis], cell[axis] + by, *cell[axis + 1 :])

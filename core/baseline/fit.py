@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 from core.arrays import FloatArray
 from core.baseline.groups import Groups
 from core.baseline.robust import bisquare, robust_std
-from core.baseline.surface import KnotAxis, Surface, SurfaceShape
+from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
 
 HUBER_LIMIT = 1.345
 HUBER_ROUNDS, BISQUARE_ROUNDS = 6, 8
@@ -59,6 +59,14 @@ class Fit:
     robust_weight: FloatArray
     group_std: float
     clustering: float
+
+    @property
+    def attitude_covariance(self) -> tuple[tuple[float, ...], ...]:
+        """Of the terms of the attitude; empty if there are none."""
+        if not self.surface.shape.has_attitude:
+            return ()
+        part = self.covariance[-ATTITUDE_TERMS:, -ATTITUDE_TERMS:]
+        return tuple(tuple(row) for row in part.tolist())
 
     def std(self, design: FloatArray) -> FloatArray:
         """(n,) standard uncertainty of the surface at rows of a design matrix."""

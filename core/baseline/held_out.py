@@ -4,8 +4,6 @@ From their own surface, readings deviate less than later ones will: it has bent 
 of all towards what lasts for days. So spells of days are left out in turn.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -21,14 +19,6 @@ FOLDS = 5
 LONGEST_SPELL_DAYS = 10
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """Readings in supported cells, oldest first: deviation and scatter of their cell."""
-
-    deviation: FloatArray
-    cell_scatter: FloatArray
-
-
 def held_out_deviations(
     time_ns: TimeArray,
     conditions: FilmConditions,
@@ -37,8 +27,13 @@ def held_out_deviations(
     fit: Fit,
     table: CellTable,
     settings: BaselineSettings,
-) -> HeldOut:
-    """Compare each learning reading with a surface that has not seen its spell."""
+) -> FloatArray:
+    """Compare each learning reading with a surface that has not seen its spell.
+
+    Returns
+    -------
+    (n,) NaN where there is no support without the spell.
+    """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
     group_fold = groups.day // spell_days % FOLDS
@@ -53,8 +48,7 @@ def held_out_deviations(
         rows = rows[_is_known_without(left_out, settings, groups, group_fold, table, place[rows])]
         surface = refit(groups, fit, settings.bend_std, is_used.astype(np.float64))
         deviation[rows] = value[rows] - surface.at(conditions.rows(rows))
-    counted = np.isfinite(deviation)
-    return HeldOut(deviation[counted], table.scatter[place[counted]])
+    return deviation
 
 
 def _is_known_without(

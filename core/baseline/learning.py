@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.cell_scatter import LEAST_SCATTER, with_scatter
 from core.baseline.fit import Fit, fit_surface, surface_shape
 from core.baseline.groups import Groups, group_readings
 from core.baseline.held_out import held_out_deviations
-from core.baseline.robust import robust_std
 from core.baseline.settings import BaselineSettings
 from core.baseline.tabulate import tabulate
 from core.baseline.time_scatter import time_scatter
@@ -73,7 +73,7 @@ def _learn_quantity(
 ) -> QuantityBaseline | None:
     conditions = FilmConditions.of(history)
     value, u_random = watched_values(history, quantity, direction)
-    usable = is_settled & settings.grid.is_known(conditions) & np.isfinite(value)
+    usable = is_settled & settings.is_known(conditions) & np.isfinite(value)
     time_ns, conditions, value = history.time_ns[usable], conditions.rows(usable), value[usable]
     if value.size == 0:
         return None
@@ -97,19 +97,24 @@ def _fitted(
 ) -> QuantityBaseline:
     grid = settings.grid
     fit = _fit(groups, settings)
-    residual = value - fit.surface.at(conditions)
-    table = tabulate(conditions, value, residual, groups, fit, settings)
-    held_out = held_out_deviations(time_ns, conditions, value, groups, fit, table, settings)
+    table = tabulate(conditions, value, groups, fit, settings)
+    deviation = held_out_deviations(time_ns, conditions, value, groups, fit, table, settings)
+    counted = np.isfinite(deviation)
+    deviation, place = deviation[counted], table.find(grid.cells(conditions))[counted]
+    table = with_scatter(table, place, deviation)
+    scatter = table.scatter[place]
     return QuantityBaseline(
         quantity=quantity,
         direction=direction,
         grid=grid,
         surface=fit.surface,
+        attitude_covariance=fit.attitude_covariance,
         table=table,
-        scatter=max(robust_std(residual), 1e-6),
+        max_surface_std=settings.max_surface_std,
+        scatter=float(np.median(scatter)) if scatter.size else LEAST_SCATTER,
         u_random=float(np.median(u_random)),
         reading_h=settings.reading_h,
-        time_scatter=time_scatter(held_out, settings),
+        time_scatter=time_scatter(deviation, scatter, settings),
         rejected_share=float(np.mean(fit.robust_weight < REJECTED)),
     )
 
@@ -120,6 +125,6 @@ def _fit(groups: Groups, settings: BaselineSettings) -> Fit:
         groups,
         knots * grid.eccentricity_width,
         knots * grid.temperature_width_c,
-        grid.has_attitude,
+        settings.has_attitude,
     )
     return fit_surface(groups, shape, settings.bend_std)

@@ -3,7 +3,11 @@
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
 from core.condition.cells import CellGrid
+from core.condition.film_conditions import FilmConditions
 
 
 @dataclass(frozen=True)
@@ -14,11 +18,14 @@ class BaselineSettings:
     ----------
     grid
         Cells of eccentricity and oil temperature.
+    uses_attitude
+        Whether the surface depends on the attitude angle too: pads are not set evenly, and x is not
+        y. The grid decides whether cells do.
     min_readings, min_days
         Readings, and days with readings, below which a cell knows nothing by itself.
-    borrowing_readings
-        Readings from which on a cell that lies between two of its own support may borrow from its
-        neighbours through the surface.
+    borrowing_reach
+        Cells that may be missing between two of their own support: they borrow from these through
+        the surface.
     max_surface_std
         Uncertainty of the surface, in ln, above which a cell is not supported after all.
     min_learning_days
@@ -41,9 +48,10 @@ class BaselineSettings:
     """
 
     grid: CellGrid = field(default_factory=CellGrid)
+    uses_attitude: bool = True
     min_readings: int = 30
     min_days: int = 5
-    borrowing_readings: int = 6
+    borrowing_reach: int = 2
     max_surface_std: float = 0.05
     min_learning_days: int = 20
     knot_cells: float = 2.0
@@ -62,8 +70,18 @@ class BaselineSettings:
         if list(scales_h) != sorted(set(scales_h)):
             raise ValueError(f"time_scales_h = {scales_h} must increase")
 
+    @property
+    def has_attitude(self) -> bool:
+        """Whether the attitude angle counts at all."""
+        return self.uses_attitude or self.grid.has_attitude
+
+    def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
+        """(n,) whether readings have everything that a baseline depends on."""
+        known = self.grid.is_known(conditions)
+        return known & np.isfinite(conditions.attitude_deg) if self.uses_attitude else known
+
 
 POSITIVE = (
-    *("min_readings", "min_days", "borrowing_readings", "max_surface_std", "min_learning_days"),
+    *("min_readings", "min_days", "borrowing_reach", "max_surface_std", "min_learning_days"),
     *("knot_cells", "bend_std", "reading_h"),
 )

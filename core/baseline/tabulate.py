@@ -1,109 +1,142 @@
 """Filling the table of cells: what each has seen, and whether that is enough."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.cell_table import CellStatistics, CellTable, Support, lies_between
+from core.baseline.cell_scatter import LEAST_SCATTER
+from core.baseline.cell_table import CellStatistics, CellTable, Support, cells_between
 from core.baseline.fit import Fit
 from core.baseline.groups import Groups, group_medians
-from core.baseline.robust import STD_PER_MAD, robust_std
 from core.baseline.settings import BaselineSettings
-from core.condition.cells import CellArray, CellGrid
+from core.baseline.surface import Surface
+from core.condition.cells import Cell, CellArray, CellGrid
 from core.condition.film_conditions import FilmConditions
-
-PRIOR_DAYS = 5.0
-"""Days that the scatter over all cells counts for in the scatter of one."""
 
 BELIEVED = 0.1
 """Robust weight from which on a group counts as support."""
 
 
+@dataclass(frozen=True)
+class _Contents:
+    """What a cell has seen, and the middle of it."""
+
+    n_readings: int
+    n_days: int
+    location: float
+    eccentricity_ratio: float
+    oil_temperature_c: float
+    attitude_deg: float
+
+
 def tabulate(
     conditions: FilmConditions,
     value: FloatArray,
-    residual: FloatArray,
     groups: Groups,
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Statistics and support of every cell with readings.
+    """Statistics and support of every cell with readings, and of those between them.
 
     Parameters
     ----------
-    value, residual : (n,)
+    value : (n,)
         Of the readings.
     """
-    grid = settings.grid
-    cells, place = np.unique(grid.cells(conditions), axis=1, return_inverse=True)
-    place = place.reshape(-1)
-    n_readings, n_days = support_counts(groups, fit, grid, cells)
-    raw = STD_PER_MAD * group_medians(np.abs(residual), place)
-    overall = robust_std(residual)
-    scatter = np.sqrt((n_days * raw**2 + PRIOR_DAYS * overall**2) / (n_days + PRIOR_DAYS))
-    std = fit.std(fit.surface.shape.design(_centres(grid, cells)))
-    support = _supports(cells, n_readings, n_days, std, settings)
-    location = group_medians(value, place)
+    contents = _seen(conditions, value, groups, fit, settings.grid)
+    enough = {
+        cell
+        for cell, content in contents.items()
+        if content.n_readings >= settings.min_readings and content.n_days >= settings.min_days
+    }
+    between = cells_between(frozenset(enough), settings.borrowing_reach)
+    for cell in sorted(between - set(contents)):
+        contents[cell] = _unseen(cell, enough, contents, fit.surface, settings.grid)
+    std = _surface_std(list(contents.values()), fit)
     return CellTable(
         tuple(
             CellStatistics(
-                cell=tuple(int(i) for i in cells[:, row]),
-                n_readings=int(n_readings[row]),
-                n_days=int(n_days[row]),
-                location=float(location[row]),
-                scatter=float(max(scatter[row], 1e-6)),
+                cell=cell,
+                n_readings=content.n_readings,
+                n_days=content.n_days,
+                location=content.location,
+                scatter=max(fit.group_std, LEAST_SCATTER),  # until it is known
                 surface_std=float(std[row]),
-                support=support[row],
+                attitude_deg=content.attitude_deg,
+                support=_support(cell, enough, between, std[row] <= settings.max_surface_std),
             )
-            for row in range(cells.shape[1])
+            for row, (cell, content) in enumerate(contents.items())
         )
     )
 
 
-def support_counts(
+def _support(cell: Cell, enough: set[Cell], between: frozenset[Cell], is_sure: np.bool_) -> Support:
+    if not is_sure:
+        return Support.NONE
+    if cell in enough:
+        return Support.OWN
+    return Support.BORROWED if cell in between else Support.NONE
+
+
+def _seen(
+    conditions: FilmConditions, value: FloatArray, groups: Groups, fit: Fit, grid: CellGrid
+) -> dict[Cell, _Contents]:
+    """Contents of every cell with readings."""
+    cells, place = np.unique(grid.cells(conditions), axis=1, return_inverse=True)
+    place = place.reshape(-1)
+    n_readings, n_days = _support_counts(groups, fit, grid, cells)
+    angle = np.radians(np.nan_to_num(conditions.attitude_deg))
+    sines, cosines = (np.bincount(place, part(angle)) for part in (np.sin, np.cos))
+    columns = (
+        *(n_readings.tolist(), n_days.tolist(), group_medians(value, place).tolist()),
+        group_medians(conditions.eccentricity_ratio, place).tolist(),
+        group_medians(conditions.oil_temperature_c, place).tolist(),
+        np.degrees(np.arctan2(sines, cosines)).tolist(),
+    )
+    contents = (_Contents(*row) for row in zip(*columns, strict=True))
+    return dict(zip(map(tuple, cells.T.tolist()), contents, strict=True))
+
+
+def _unseen(
+    cell: Cell,
+    enough: set[Cell],
+    contents: dict[Cell, _Contents],
+    surface: Surface,
+    grid: CellGrid,
+) -> _Contents:
+    """A cell between others: as its middle, with the attitude of the nearest."""
+    nearest = min(
+        sorted(enough), key=lambda other: sum(abs(a - b) for a, b in zip(cell, other, strict=True))
+    )
+    e, oil_c = grid.centre(cell)[:2]
+    attitude_deg = contents[nearest].attitude_deg
+    height = float(surface.at(FilmConditions.one(e, oil_c, attitude_deg))[0])
+    return _Contents(0, 0, height, e, oil_c, attitude_deg)
+
+
+def _surface_std(contents: list[_Contents], fit: Fit) -> FloatArray:
+    columns = [(c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents]
+    return fit.std(fit.surface.shape.design(FilmConditions(*np.array(columns).T)))
+
+
+def _support_counts(
     groups: Groups, fit: Fit, grid: CellGrid, cells: CellArray
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """(n_cells,) readings and days of each cell, without what the fit has rejected."""
     believed = groups.rows(fit.robust_weight >= BELIEVED)
-    place = find_columns(grid.cells(believed.conditions), cells)
+    place = _find_columns(grid.cells(believed.conditions), cells)
     days = np.unique(np.vstack([place, believed.day]), axis=1)[0]
     n = cells.shape[1]
     n_readings = np.bincount(place, believed.n_readings, n).astype(np.int64)
     return n_readings, np.bincount(days, minlength=n)
 
 
-def find_columns(wanted: CellArray, cells: CellArray) -> npt.NDArray[np.int64]:
+def _find_columns(wanted: CellArray, cells: CellArray) -> npt.NDArray[np.int64]:
     """(n,) which column of `cells`, sorted as by `np.unique`, each wanted column is."""
     low = np.minimum(cells.min(axis=1), wanted.min(axis=1, initial=0))[:, np.newaxis]
     size = tuple(np.maximum(cells.max(axis=1), wanted.max(axis=1, initial=0)) - low[:, 0] + 1)
     flat = np.ravel_multi_index(tuple(cells - low), size)
     found = np.searchsorted(flat, np.ravel_multi_index(tuple(wanted - low), size))
     return np.asarray(found, np.int64)
-
-
-def _centres(grid: CellGrid, cells: CellArray) -> FilmConditions:
-    centres = np.array([grid.centre(tuple(cell)) for cell in cells.T.tolist()]).T
-    attitude_deg = centres[2] if grid.has_attitude else np.zeros(cells.shape[1])
-    return FilmConditions(centres[0], centres[1], attitude_deg)
-
-
-def _supports(
-    cells: CellArray,
-    n_readings: npt.NDArray[np.int64],
-    n_days: npt.NDArray[np.int64],
-    std: FloatArray,
-    settings: BaselineSettings,
-) -> list[Support]:
-    is_sure = std <= settings.max_surface_std
-    is_own = (n_readings >= settings.min_readings) & (n_days >= settings.min_days) & is_sure
-    names = [tuple(cell) for cell in cells.T.tolist()]
-    own = frozenset(name for name, yes in zip(names, is_own, strict=True) if yes)
-    may_borrow = (n_readings >= settings.borrowing_readings) & is_sure
-    return [
-        Support.OWN
-        if is_own[row]
-        else Support.BORROWED
-        if may_borrow[row] and lies_between(name, own)
-        else Support.NONE
-        for row, name in enumerate(names)
-    ]

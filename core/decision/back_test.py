@@ -77,7 +77,7 @@ def _unusable(
     is_there: _Bools,
 ) -> CodeArray:
     """(n,) why a reading cannot be used; -1 if it can."""
-    is_known = baseline.grid.is_known(FilmConditions.of(history)) & is_there
+    is_known = baseline.is_known(FilmConditions.of(history)) & is_there
     why = np.where(is_known, -1, Verdict.BAD_QUALITY).astype(np.int8)
     evidence = history.evidence[DIRECTIONS.index(baseline.direction)]
     for said, verdict in OF_EVIDENCE.items():

@@ -8,7 +8,7 @@ import numpy as np
 from core.alarms.alarm import AlarmLevel
 from core.baseline.baseline import QuantityBaseline
 from core.condition.film_conditions import FilmConditions
-from core.decision.gathered import NOTHING_GATHERED, Finding, GatheredEvidence
+from core.decision.gathered import NOTHING_GATHERED, Counted, Finding, GatheredEvidence
 from core.decision.level_timer import REST, LevelTimer
 from core.decision.limits import ChangeLimits
 from core.decision.reading import WatchedReading
@@ -83,7 +83,7 @@ def advance(
     condition = FilmConditions.one(
         reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
     )
-    if not baseline.grid.is_known(condition)[0]:
+    if not baseline.is_known(condition)[0]:
         return replace(decision, verdict=Verdict.BAD_QUALITY)
     return _compared(decision, reading, condition, baseline, limits)
 
@@ -127,18 +127,26 @@ def _compared(
     last_ns = decision.last_counted_ns
     if last_ns is not None and reading.time_ns - last_ns < least_step_ns(baseline):
         return replace(decision, verdict=_verdict(decision, baseline, limits))
-    deviation, weight, surface_std = (
-        float(column[0]) for column in (found.deviation, found.weight, found.surface_std)
+    counted = Counted(
+        *(
+            float(column[0])
+            for column in (found.deviation, found.weight, found.scatter, found.surface_std)
+        )
     )
-    evidence = decision.evidence.step(deviation, weight, surface_std, baseline)
+    evidence = decision.evidence.step(counted, baseline)
     decision = replace(
         decision,
-        deviation=deviation,
-        deviation_std=math.hypot(baseline.scatter / math.sqrt(weight), surface_std),
+        deviation=counted.deviation,
+        deviation_std=_deviation_std(counted, reading, baseline),
         evidence=evidence,
         last_counted_ns=reading.time_ns,
     )
     return _judged(decision, evidence.findings(baseline), baseline, limits)
+
+
+def _deviation_std(counted: Counted, reading: WatchedReading, baseline: QuantityBaseline) -> float:
+    excess = max(reading.u_random**2 - baseline.u_random**2, 0.0)
+    return math.sqrt(counted.scatter**2 + excess + counted.surface_std**2)
 
 
 def _judged(

@@ -8,6 +8,16 @@ from core.baseline.smoothing import NOTHING_NEW, Newest, forgetting, forgetting_
 
 
 @dataclass(frozen=True)
+class Counted:
+    """A reading that counts: the numbers of `Deviations`."""
+
+    deviation: float
+    weight: float
+    scatter: float
+    surface_std: float
+
+
+@dataclass(frozen=True)
 class ScaleSums:
     """Forgetting sums over one time scale.
 
@@ -15,24 +25,24 @@ class ScaleSums:
     ----------
     fill
         Of ones: how much of the time scale has been seen.
-    weight, deviation, surface
-        Of weights, of weighted deviations, of weighted uncertainties of the surface.
+    weight, deviation, scatter, surface
+        Of weights; weighted, of deviations, scatters of their cells, uncertainties of the surface.
     """
 
     fill: float = 0.0
     weight: float = 0.0
     deviation: float = 0.0
+    scatter: float = 0.0
     surface: float = 0.0
 
-    def step(
-        self, weight: float, deviation: float, surface_std: float, forgotten: float
-    ) -> "ScaleSums":
+    def step(self, counted: Counted, middle: float, forgotten: float) -> "ScaleSums":
         """Take in one reading."""
         return ScaleSums(
             forgetting_step(self.fill, 1.0, forgotten),
-            forgetting_step(self.weight, weight, forgotten),
-            forgetting_step(self.deviation, weight * deviation, forgotten),
-            forgetting_step(self.surface, weight * surface_std, forgotten),
+            forgetting_step(self.weight, counted.weight, forgotten),
+            forgetting_step(self.deviation, counted.weight * middle, forgotten),
+            forgetting_step(self.scatter, counted.weight * counted.scatter, forgotten),
+            forgetting_step(self.surface, counted.weight * counted.surface_std, forgotten),
         )
 
 
@@ -74,9 +84,7 @@ class GatheredEvidence:
     newest: Newest = NOTHING_NEW
     scales: tuple[ScaleSums, ...] = ()
 
-    def step(
-        self, deviation: float, weight: float, surface_std: float, baseline: QuantityBaseline
-    ) -> "GatheredEvidence":
+    def step(self, counted: Counted, baseline: QuantityBaseline) -> "GatheredEvidence":
         """Count one more deviation.
 
         Raises
@@ -88,13 +96,13 @@ class GatheredEvidence:
         scales = self.scales or (ScaleSums(),) * len(times)
         if len(scales) != len(times):
             raise ValueError(f"evidence on {len(scales)} time scales, baseline on {len(times)}")
-        newest = self.newest.step(deviation)
+        newest = self.newest.step(counted.deviation)
         middle = newest.median
         return GatheredEvidence(
             self.n_counted + 1,
             newest,
             tuple(
-                sums.step(weight, middle, surface_std, _forgotten(time, baseline))
+                sums.step(counted, middle, _forgotten(time, baseline))
                 for sums, time in zip(scales, times, strict=True)
             ),
         )
@@ -115,7 +123,7 @@ def _forgotten(time: TimeScatter, baseline: QuantityBaseline) -> float:
 def _finding(sums: ScaleSums, time: TimeScatter) -> Finding:
     surface = sums.surface / sums.weight
     # half-filled means stray further; the surface's error stays, however long one averages
-    own = time.std / sums.fill
+    own = time.share * (sums.scatter / sums.weight) / sums.fill
     std = math.sqrt(own * own + surface * surface)
     return Finding(time.time_scale_h, sums.deviation / sums.weight, std)
 
