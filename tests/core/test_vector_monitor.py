@@ -354,8 +354,9 @@ def test_missed_polls_are_an_exact_gap_and_repeated_ones_are_dropped(rack) -> No
     stream = polls(60.0, 50.0, 20.0, 10.0, n=40)
     watch(monitor, stream[:10])
     watch(monitor, stream[15:20])
-    watch(monitor, stream[18:24])
+    newest = watch(monitor, stream[18:24])[-1]
 
+    assert newest.window.n_segments == 19
     [gap] = monitor.drain_gaps()
     assert (gap.first_index, gap.n_samples) == (10, 5)
     assert monitor.drain_gaps() == []

@@ -11,7 +11,7 @@ from acquisition.daq.fifo_device import FifoDevice
 from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.counted_samples import CountedSamples
-from acquisition.modbus.fifo_assembly import place_records
+from acquisition.modbus.fifo_assembly import ChannelAssembly, place_records
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.registers.cells import MapError
@@ -209,8 +209,11 @@ async def test_without_a_counter_a_loss_ends_the_epoch(plant) -> None:
 
     assert last.epoch == first.epoch
     assert after[-1].epoch == first.epoch + 1
-    for block in after[-1:]:
-        assert np.diff(block.samples[0]).tolist() == [1.0] * (block.n_samples - 1)
+    for block in after:
+        number = np.arange(block.first_index, block.stop_index)
+        lost = block.samples[0] - number
+        assert len(set(lost.tolist())) == 1
+        assert (lost[0] == 0.0) == (block.epoch == first.epoch)
 
 
 async def test_without_a_counter_what_waited_for_a_reader_is_thrown_away(plant) -> None:
@@ -282,6 +285,24 @@ def test_a_counter_that_counts_nothing_is_refused() -> None:
     counters = np.array([5000, 40_000, 12, 33_333])
     with pytest.raises(FrameError, match="does not count"):
         place_records(FifoPiece(counters, np.zeros((2, 4), dtype=np.int16)), samples, 0.0)
+
+
+def test_channels_that_count_differently_are_not_put_side_by_side() -> None:
+    assembly = ChannelAssembly(2, CountedSamples(600.0, removes=True, epoch=1))
+    pieces = [
+        FifoPiece(first + np.arange(4), np.zeros((1, 4), dtype=np.int16)) for first in (5000, 0)
+    ]
+    with pytest.raises(FrameError, match="counts -5004 samples apart"):
+        assembly.place(pieces, 0.0)
+
+
+def test_a_channel_that_gives_nothing_holds_the_others_back_in_bounded_memory() -> None:
+    assembly = ChannelAssembly(2, CountedSamples(600.0, removes=True, epoch=1))
+    nothing = FifoPiece(np.arange(0), np.zeros((1, 0), dtype=np.int16))
+    for n in range(1000):
+        piece = FifoPiece(30 * n + np.arange(30), np.zeros((1, 30), dtype=np.int16))
+        assert assembly.place([piece, nothing], n * 0.05) == []
+    assert max(map(len, assembly._waiting)) <= 1100
 
 
 def test_a_source_needs_a_queue_of_its_channels(counts_calibration, stepped_clock) -> None:
