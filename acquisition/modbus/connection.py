@@ -184,7 +184,7 @@ class Connection:
         """Tell the waiting request at once that the link is gone; pymodbus lets it time out."""
         answer = self._client.ctx.response_future
         if not connected and self._framer.awaiting and not answer.done():
-            answer.set_exception(ConnectionException(_CLOSED))
+            answer.set_exception(LinkError(f"{self._where}: {_CLOSED}"))
 
 
 def _reason(exc: OSError) -> str:

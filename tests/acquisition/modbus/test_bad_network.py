@@ -86,7 +86,7 @@ async def test_no_mischief_of_the_network_makes_a_false_sample_or_an_uncounted_l
     assert proxy.n_done[kind] > 3
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 async def test_all_mischief_together_makes_no_false_sample_and_no_uncounted_loss(
     seed, plant, source_at
 ):
