@@ -96,7 +96,7 @@ class RingDevice:
         self.identification: Mapping[int, bytes] = {}
         self._repetition = Repetition()
         self._n_frozen = 0
-        self._n_unread = 0
+        self._unread: deque[int] = deque(maxlen=self._settings.n_slots)
         self._n_looks = 0
         self.first_sequence = self._settings.first_sequence
         self._n_restarts = 0
@@ -108,6 +108,11 @@ class RingDevice:
         base = self._settings.base_address
         self.memory = RegisterMemory(base, self.layout.end_address - base)
         self._power_up(first, self._settings.first_index)
+
+    @property
+    def _n_unread(self) -> int:
+        """Places of the ring from the oldest slot that nobody has read to the newest."""
+        return (self._newest - self._unread[0]) % U32 + 1 if self._unread else 0
 
     @property
     def newest(self) -> int:
@@ -221,12 +226,13 @@ class RingDevice:
         return max(0, self.layout.n_slots - 2 - n_slots)
 
     def _note_read(self, asked: range) -> None:
-        """Note the newest slot whose last register is among those asked for."""
+        """Note the slots whose last registers were asked for, as far as all before were read."""
         ring = self.layout
-        place = (asked.stop - ring.ring_address - ring.slot_registers) // ring.slot_stride
-        last = ring.ring_address + place * ring.slot_stride + ring.slot_registers - 1
-        if place >= 0 and last in asked:
-            self._n_unread = min(self._n_unread, (self._newest - place) % ring.n_slots)
+        end = ring.ring_address + ring.slot_registers - 1
+        first = -((end - asked.start) // ring.slot_stride)
+        places = range(first, (asked.stop - 1 - end) // ring.slot_stride + 1)
+        while self._unread and self._unread[0] % ring.n_slots in places:
+            self._unread.popleft()
 
     def _take(self, fault: SlotFault | None) -> None:
         raw = self._slots.take()
@@ -241,7 +247,7 @@ class RingDevice:
 
     def _power_up(self, first: RawBlock, first_index: int | None) -> None:
         self.memory.clear()
-        self._n_unread = 0
+        self._unread.clear()
         self._feed_epoch = first.epoch
         self.epoch = (first.epoch + self._n_restarts) % U32
         self._newest = self.first_sequence
@@ -251,7 +257,7 @@ class RingDevice:
     def _write(self, raw: RawBlock, n_slots: int, spoilers: list[SlotFault]) -> None:
         """Write a slot that is so many places after the one before."""
         self._number = self._position = self._slots.number(raw)
-        self._n_unread += n_slots
+        self._unread.append(self._newest)
         self._n_looks = 0
         right = self._slot(raw)
         slot: Slot | None = right
