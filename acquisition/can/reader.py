@@ -22,6 +22,7 @@ _RECEIVE_S = 0.1
 _REST_S = 0.005
 """Frames are taken this often; until then they wait in the buffer of the system or the adapter."""
 
+_READS_PER_BATCH = 4
 _MAX_BATCH = 2000
 _MAX_NONSENSE = 1000
 """Unreadable frames in a row after which the link counts as lost."""
@@ -84,6 +85,7 @@ class FrameReader:
         self._stopping = threading.Event()
         self._news = asyncio.Event()
         self._ended = asyncio.Event()
+        self._arrived_ns = 0
         self._failure: BaseException | None = None
         self._opened: asyncio.Future[None]
         self._thread: threading.Thread
@@ -164,28 +166,38 @@ class FrameReader:
         while not self._stopping.is_set():
             frames: list[Frame] = []
             try:
-                self._receive(bus, frames)
+                self._collect(bus, frames)
             finally:  # what came before the bus failed is good
                 if isinstance(bus, SlcanBus):
                     self._refused[Refusal.MALFORMED] += bus.take_n_malformed()
                 if frames:
-                    self._hand_over(Batch(frames, self._clock.now_ns()))
-            if frames:
-                self._stopping.wait(_REST_S)
-            elif bus.state is can.BusState.ERROR:
+                    self._hand_over(Batch(frames, self._arrived_ns))
+            if not frames and bus.state is can.BusState.ERROR:
                 raise LinkError(f"{self._where}: the interface says that it is in error")
 
-    def _receive(self, bus: can.BusABC, frames: list[Frame]) -> None:
+    def _collect(self, bus: can.BusABC, frames: list[Frame]) -> None:
+        """Wait for a frame, then go on for a while, since a batch costs more than its frames."""
+        self._receive(bus, frames, _RECEIVE_S)
+        for _ in range(_READS_PER_BATCH - 1):
+            if not frames or len(frames) >= _MAX_BATCH or self._stopping.wait(_REST_S):
+                return
+            self._receive(bus, frames, 0.0)
+
+    def _receive(self, bus: can.BusABC, frames: list[Frame], timeout_s: float) -> None:
         """Take all frames that have come, after waiting for the first."""
-        timeout_s = _RECEIVE_S
-        while len(frames) < _MAX_BATCH and not self._stopping.is_set():
-            message = self._next_message(bus, timeout_s)
-            if message is None:
-                break
-            timeout_s = 0.0
-            frame = self._gate.admit(message)
-            if frame is not None:
-                frames.append(frame)
+        n_before = len(frames)
+        try:
+            while len(frames) < _MAX_BATCH:
+                message = self._next_message(bus, timeout_s)
+                if message is None:
+                    break
+                timeout_s = 0.0
+                frame = self._gate.admit(message)
+                if frame is not None:
+                    frames.append(frame)
+        finally:
+            if len(frames) > n_before:
+                self._arrived_ns = self._clock.now_ns()
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
         """Next message, over what nobody can read; a bus that says nothing else is lost."""

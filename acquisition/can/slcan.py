@@ -63,7 +63,7 @@ class SlcanBus(slcanBus):
         self._rest = b""
         self._skipping = True  # the stream may begin in the middle of a line
         self._n_malformed = 0
-        super().__init__(channel, **options)
+        super().__init__(channel, **{"timeout": 0.0, **options})
 
     def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
         if not self._messages:
