@@ -32,7 +32,7 @@ def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
 
 def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -> str:
     """The mistake in words."""
-    key = "".join(f"[{p + 1}]" if isinstance(p, int) else f".{p}" for p in location).lstrip(".")
+    key = "".join(_step(part) for part in location).lstrip(".")
     found, value = _value(data, location)
     shown = f"{key} = {_shown(value)}"
     meaning = description(location)
@@ -47,6 +47,13 @@ def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -
     else:
         problem = f"{shown}: {error['msg']}"
     return f"{problem} — {meaning}" if meaning else problem
+
+
+def _step(part: int | str) -> str:
+    """One step of a place; a key may be any text, but a message stays one line."""
+    if isinstance(part, int):
+        return f"[{part + 1}]"
+    return f".{part}" if part.isprintable() else f".{part!r}"
 
 
 def _shown(value: Any) -> str:

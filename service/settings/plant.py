@@ -151,7 +151,7 @@ class PlantFile(Settings):
     """Segments and averaging."""
 
     alarms: AlarmSettings = AlarmSettings()
-    """What raises an alarm on every unit."""
+    """Delays and limits of the alarms of all units."""
 
     capture: CaptureSettings = CaptureSettings()
     """Samples that are kept around an alarm."""

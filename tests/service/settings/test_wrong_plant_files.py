@@ -281,3 +281,10 @@ def test_an_empty_file_lacks_the_plant_and_its_units(mistakes: Mistakes) -> None
         "1: plant is missing",
         "1: unit is missing",
     ]
+
+
+def test_a_key_with_a_line_break_in_it_is_refused_in_one_line(
+    plant_text: str, mistakes: Mistakes
+) -> None:
+    found = mistakes(plant_text.replace('name = "Demo plant"', '"na\\nme" = "Demo plant"', 1))
+    assert any("'na\\nme'" in line and "unknown key" in line for line in found)

@@ -60,7 +60,7 @@ def test_every_sample_flag_and_stamp_comes_back(
     write_log(tmp_path / "log", kind, device)
     (tmp_path / "daq.dbc").write_text(daq_dbc(shape), encoding="utf-8")
     link = CanLinkSettings(interface="virtual", channel="none", fd=fd)
-    settings: CanSettings = daq_settings(shape, link, tmp_path / "daq.dbc", ("um", "um"))
+    settings: CanSettings = daq_settings(shape, link, ("um", "um"))
     decoder = CanLogDecoder(settings, counts_calibration())
     job = ImportJob(format=kind, rate_hz=600.0, time=TimeAxis("file", 0))
     with reading(tmp_path / "log", job) as found:
