@@ -11,7 +11,9 @@ MANY = PadRing(360, 6.67e9, 200.0, 0.034, 92.3)
 DESIGN = {"clearance_um": 200.0, "viscosity_pa_s": 0.034, "speed_rpm": 92.3}
 
 
-def film(ring: PadRing, ratio: float = 0.0, angle_deg: float = 0.0, **changed: float) -> FilmColumns:
+def film(
+    ring: PadRing, ratio: float = 0.0, angle_deg: float = 0.0, **changed: float
+) -> FilmColumns:
     given = DESIGN | changed
     angle = np.radians(angle_deg)
     centre_um = ratio * given["clearance_um"] * np.array([[np.cos(angle)], [np.sin(angle)]])

@@ -17,8 +17,8 @@ STANDING_TIME_FACTOR = 10.0
 STANDING_OIL_C = 3.0
 """Oil over water at standstill in the end: that of the hall."""
 
-WATER_MEAN_C = 23.0
-WATER_SEASON_C = 5.0
+WATER_MEAN_C = 22.5
+WATER_SEASON_C = 4.5
 """The Paraná at Itaipu, warmest in February."""
 
 WARMEST_DAY = 45.0

@@ -1,0 +1,153 @@
+"""A healthy life: the same each time, as varied as the paper says, and going nowhere."""
+
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from acquisition.simulated.life.damage import Damage, DamageKind
+from acquisition.simulated.life.life import live
+from acquisition.simulated.life.life_truth import UnitLife
+from core.stiffness_history import Evidence
+
+Life = Callable[..., UnitLife]
+SEEDS = (0, 1, 2, 3)
+
+
+def test_the_same_seed_lives_the_same_life_and_another_one_another(two_years: Life) -> None:
+    life = two_years(1)
+    again = live(1, int(life.operation.time_ns[0]) // 86_400_000_000_000 * 86_400_000_000_000, 2.0)
+    other = two_years(2)
+
+    for name, readings in life.readings.items():
+        for column in fields(readings):
+            np.testing.assert_array_equal(
+                getattr(readings, column.name), getattr(again.readings[name], column.name)
+            )
+    assert other.operation.time_ns.size != life.operation.time_ns.size
+
+
+def test_damage_changes_nothing_before_it_and_nothing_in_other_bearings(
+    two_years: Life, day_ns: Callable[[float], int]
+) -> None:
+    damage = Damage(DamageKind.STIFFNESS_LOSS, "LJB", day_ns(400), 0.1)
+    healthy, ill = two_years(1), two_years(1, damage)
+
+    before = healthy.operation.time_ns < damage.onset_ns
+    for name in healthy.readings:
+        same = before if name == "LJB" else np.ones_like(before)
+        np.testing.assert_array_equal(
+            healthy.readings[name].ln_k[:, same], ill.readings[name].ln_k[:, same]
+        )
+    np.testing.assert_array_equal(ill.is_damaged(), ~before)
+    assert not healthy.is_damaged().any()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_healthy_machine_meets_a_four_fold_range_of_stiffness(two_years: Life, seed: int) -> None:
+    # "may increase significantly, in four times or more" (Brito et al., section 4): the widest
+    # direction of the three bearings, but for one reading in a hundred at either end
+    for truth in two_years(seed).truth.values():
+        low, high = np.percentile(truth.ln_k, [0.5, 99.5], axis=1)
+        assert 3.5 <= np.exp(np.max(high - low)) <= 16.0
+
+
+def test_healthy_films_have_no_trend(two_years: Life) -> None:
+    # condition wanders for weeks: the slope of 36 films is zero within its own scatter
+    slopes = [
+        np.polyfit(life.operation.time_ns / 3.15576e16, ln_k, 1)[0]
+        for life in map(two_years, range(6))
+        for truth in life.truth.values()
+        for ln_k in truth.ln_k
+    ]
+
+    lives = np.array(slopes).reshape(6, 6).mean(axis=1)  # films of one life are alike
+    assert abs(np.mean(lives)) < 3.0 * np.std(lives) / np.sqrt(6.0) + 0.02
+
+
+def test_in_the_same_condition_a_healthy_film_is_the_same_in_both_years(two_years: Life) -> None:
+    for name, truth in two_years(0).truth.items():
+        eccentricity, oil_c = truth.eccentricity_ratio, truth.oil_temperature_c
+        alike = (np.abs(eccentricity - 0.35) < 0.02) & (np.abs(oil_c - np.median(oil_c)) < 2.0)
+        year_2 = np.arange(alike.size) > np.searchsorted(
+            two_years(0).operation.time_ns, two_years(0).operation.time_ns[0] + 31_557_600 * 10**9
+        )
+        first, second = (truth.ln_k[:, alike & side].mean() for side in (~year_2, year_2))
+        assert abs(first - second) < 0.06, name
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_oil_stays_where_table_1_has_it_once_the_unit_is_warm(two_years: Life, seed: int) -> None:
+    life = two_years(seed)
+    time_ns = life.operation.time_ns
+    starts = np.flatnonzero(np.diff(time_ns, prepend=0) > 3_600_000_000_000)
+    since_start = (
+        np.arange(time_ns.size)
+        - starts[np.searchsorted(starts, np.arange(time_ns.size), side="right") - 1]
+    )
+    for name, (least_c, most_c) in {"UJB": (38, 55), "LJB": (38, 56), "TJB": (34, 52)}.items():
+        warm = life.truth[name].oil_temperature_c[since_start > 36]
+        assert least_c <= warm.min(), name
+        assert warm.max() <= most_c, name
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_units_run_most_of_the_time_and_start_some_times_a_week(two_years: Life, seed: int) -> None:
+    operation = two_years(seed).operation
+    n_starts = np.sum(np.diff(operation.time_ns) > 3_600_000_000_000)
+
+    assert 0.6 <= len(operation) / (2 * 365.25 * 144) <= 0.95
+    assert 50 <= n_starts <= 500
+    assert 0.3 <= np.mean(operation.load > 0.85) <= 0.9
+    assert np.all(operation.power_mw[~operation.is_at_speed] == 0.0)
+    assert operation.power_mw.max() < 715.0
+
+
+def test_every_start_passes_through_speed_without_load(two_years: Life) -> None:
+    operation = two_years(0).operation
+    first = np.flatnonzero(np.diff(operation.time_ns) > 3_600_000_000_000) + 1
+
+    assert np.all(operation.power_mw[first] == 0.0)
+
+
+def test_readings_scatter_by_what_they_say_and_by_what_is_alike_for_hours(two_years: Life) -> None:
+    life = two_years(0)
+    for name, readings in life.readings.items():
+        error = readings.ln_k - life.truth[name].ln_k
+        steps = np.diff(error[0]) / np.sqrt(2.0)
+        said = np.nanmedian(readings.u_random[0])
+        assert 1.4826 * np.nanmedian(np.abs(steps)) == pytest.approx(said, rel=0.15), name
+        daily = [np.nanmean(day) for day in np.array_split(error[0], error.shape[1] // 144)]
+        assert 0.001 < np.nanstd(daily) < 0.01, name  # independent readings would give 0.0004
+
+
+def test_little_load_means_little_excitation_and_more_uncertainty(two_years: Life) -> None:
+    life = two_years(0)
+    readings, load = life.readings["UJB"], life.operation.load
+    no_load, full = load < 0.05, load > 0.9
+    silent = readings.evidence[0] == Evidence.INSUFFICIENT_EXCITATION
+
+    assert np.nanmedian(readings.u_random[0, no_load]) > 2.0 * np.nanmedian(
+        readings.u_random[0, full]
+    )
+    assert silent[no_load].mean() > 10.0 * silent[full].mean()
+
+
+def test_measured_eccentricity_is_close_to_the_true_position_but_not_it(two_years: Life) -> None:
+    life = two_years(0)
+    truth, readings = life.truth["UJB"], life.readings["UJB"]
+    error_um = 500.0 * readings.eccentricity_ratio - np.hypot(*truth.centre_um)
+
+    assert 0.5 < np.std(error_um) < 8.0
+    assert np.all(readings.u_eccentricity < 0.02)
+
+
+def test_nobody_lives_for_less_than_a_day() -> None:
+    with pytest.raises(ValueError, match="at least a day, got 0 years"):
+        live(1, 0, 0)
+
+
+def test_damage_to_a_bearing_that_is_not_there_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match="'GGB' is none of LJB, TJB, UJB"):
+        live(1, 0, 0.1, [Damage(DamageKind.STIFFNESS_LOSS, "GGB", 0, 0.1)])
