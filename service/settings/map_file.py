@@ -59,4 +59,5 @@ def _line(path: Path, text: str, error: ErrorDetails) -> str:
     words = str(reason) if isinstance(reason, MisfitError) else error["msg"]
     value = error["input"]
     shown = f" = {value!r}" if isinstance(value, int | float | str | bool) else ""
-    return f"{path}:{line_of(at, text)}: {key}{shown}: {words}"
+    said = f"{key}{shown}: {words}".replace("\n", "\\n")  # a key may hold anything
+    return f"{path}:{line_of(at, text)}: {said}"

@@ -57,7 +57,8 @@ class MappedDeviceSettings(ModbusLinkSettings):
         try:
             return load_map_file(folder / self.map_file)
         except MapFileError as error:
-            raise MisfitError(f"names a map that cannot be used: {error}", "map_file") from error
+            mistakes = str(error).replace("\n", "; ")
+            raise MisfitError(f"names a map that cannot be used: {mistakes}", "map_file") from error
 
     def _require_least(self, key: str, least: float) -> None:
         if getattr(self, key) < least:

@@ -107,6 +107,7 @@ def changed(old: str, new: str) -> str:
             + 'fields = ["day", "day", "year", "hour", "minute", "second"]\n',
             "time.fields: must name each of year, month",
         ),
+        (MINIMAL + '"\\n" = 1\n', "value[2].\\n = 1: Extra inputs"),
         ("base = ", "not TOML"),
         ("", "value: Field required"),
     ],

@@ -103,6 +103,17 @@ def test_a_rack_that_can_never_work_is_refused(settings: dict[str, Any], said: s
     assert said in misfit(ModbusVectorSettings, **given)
 
 
+def test_a_map_with_many_mistakes_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text("bass = 1\nbast = 2\n")
+    with pytest.raises(ValidationError) as refusal:
+        SlowDeviceSettings.model_validate(
+            LINK | {"map_file": "map.toml", "poll_period_s": 1.0}, context={FOLDER: tmp_path}
+        )
+    said = str(refusal.value.errors()[0]["ctx"]["error"])
+    assert said.count("map.toml:") == 3
+    assert "\n" not in said
+
+
 def test_a_slow_device_measures_slow_channels_alone() -> None:
     slow = load(SlowDeviceSettings, map_file="maps/slow-gateway.toml", poll_period_s=1.0)
     known = ("speed", "active_power", "ujb_oil_temperature", "ljb_oil_temperature")

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.clock import SystemClock
 from acquisition.delivery import Delivery
 from core.assessment import Assessment
 from core.blocks import SampleBlock
@@ -126,13 +125,12 @@ async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> No
         np.testing.assert_array_equal(block.samples, other.samples)
 
 
-async def test_polled_registers_show_the_newest_sample(settings, unit) -> None:
+async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_clock) -> None:
     ids = [channel.id for channel in unit.channels]
     values = [{"channel": id_} | address(n) for n, id_ in enumerate(ids)]
     given = {"kind": "modbus_polled", "poll_period_s": 0.01, "host": "127.0.0.1"}
     plan = ModbusPolledSettings.model_validate(given | {"map": {"value": values}})
-    clock = SystemClock()
-    calibration = calibration_of(settings)
+    clock, calibration = stepped_clock, calibration_of(settings)
     feed = feed_of(settings, clock)
     device = polled_device(plan, unit, calibration, feed, on_demand=True)
     async with served(device) as endpoint:
