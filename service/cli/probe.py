@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from acquisition.errors import AcquisitionError
 from acquisition.registers.cells import ByteOrder
+from core.machine import Measurand
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
 from service.probing import RegisterLook, ValueLook, looks, value_looks
@@ -30,6 +31,13 @@ MAX_COUNT = 1000
 BIT_FUNCTIONS = (1, 2)
 RTU_PREFIX = "/"
 SINGLES = ("int16", "uint16")
+MEASURAND_UNITS = {
+    Measurand.GAP_UM: "µm",
+    Measurand.DISPLACEMENT_UM: "µm",
+    Measurand.VELOCITY_MM_S: "mm/s",
+    Measurand.ACCELERATION_M_S2: "m/s²",
+    Measurand.KEY_PHASE_V: "V",
+}
 
 Result = TypeVar("Result")
 DevicePlace = Annotated[
@@ -162,7 +170,7 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
 
 def _units_of(unit: UnitSettings) -> dict[str, str]:
     """In which unit each channel is read."""
-    waveforms = {c.id: c.measurand.value.partition("_")[2] for c in unit.channel}
+    waveforms = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in unit.channel}
     return waveforms | {c.id: c.unit for c in unit.slow_channel}
 
 

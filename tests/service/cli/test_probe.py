@@ -186,3 +186,47 @@ async def test_another_device_than_the_map_is_for_is_refused(probe, server, tmp_
 
     assert result.exit_code == 1
     assert "another device than configured: register 40101" in result.stderr
+
+
+async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path: Path) -> None:
+    ids = [
+        f"{b}_{p}_{a}" for b in ("ujb", "ljb", "tjb") for p in ("shaft", "bearing") for a in "xy"
+    ]
+    values = "".join(
+        f'[[value]]\nchannel = "{id_}"\nquantity = "order1_amplitude"\ndetector = "pp"\n'
+        f'address = {10 * n}\ntype = "float32"\n'
+        for n, id_ in enumerate(ids)
+    )
+    (tmp_path / "map.toml").write_text(f'{values}[[value]]\nchannel = "speed"\naddress = 500\n')
+    registers = load_map_file(tmp_path / "map.toml").register_map()
+    device = MapDevice(
+        SlowFeed((92.0,)),
+        registers,
+        (),
+        UnitCalibration("U1", 1.0, (), (SlowCalibration("speed", 0.0, 200.0),)),
+    )
+    for n, value in enumerate(registers.values[:-1]):
+        device.image.put_value(value, 10.0 + n)
+    async with ModbusTcpServer(device) as server:
+        source = f'kind = "modbus_vector"\nhost = "127.0.0.1"\nport = {server.port}\n'
+        source += 'map_file = "map.toml"\npoll_period_s = 5.0\n'
+        demo = (MAPS.parent / "demo.toml").read_text()
+        ring = 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = 0\n'
+        assert ring in demo
+        (tmp_path / "plant.toml").write_text(demo.replace(ring, source, 1))
+        plant = str(tmp_path / "plant.toml")
+        table = await probe("map", plant, "--unit", "U1")
+        rows = await probe("map", plant, "--unit", "U1", "--json")
+        other = await probe("map", plant, "--unit", "U2")
+        none = await probe("map", plant, "--unit", "U1", "--slow")
+
+    assert table.exit_code == 0, table.output
+    found = {row["id"]: row for row in json.loads(rows.stdout)}
+    assert found["ujb_shaft_x.order1_amplitude"]["value"] == 10.0
+    assert found["ujb_shaft_x.order1_amplitude"]["unit"] == "µm pk"
+    assert found["tjb_bearing_y.order1_amplitude"]["unit"] == "mm/s pk"
+    assert found["speed"]["unit"] == "r/min"
+    assert len(table.stdout.splitlines()) == 13
+    assert other.exit_code == none.exit_code == 2
+    assert "the source of unit U2 has no register map" in other.stderr
+    assert "the slow_source of unit U1 has no register map" in none.stderr
