@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.bracket import BracketDynamics
@@ -24,8 +25,8 @@ def vector_ratio_budget(
 ) -> Budget | None:
     """Uncertainty of ``|X_b| / |U| k_b`` over some polls.
 
-    A rack may be asked more often than it measures: only polls whose amplitudes differ from the
-    ones before count as independent.
+    A rack may be asked more often than it measures, or average for longer than a poll period: the
+    spread of the polls is divided by their effective number.
 
     Parameters
     ----------
@@ -40,8 +41,8 @@ def vector_ratio_budget(
     -------
     None with fewer than two independent polls.
     """
-    independent = n_independent(shaft_um_pk, bearing_um_pk)
-    if independent < 2:
+    independent = n_effective(shaft_um_pk, bearing_um_pk)
+    if independent < 2.0:
         return None
     shaft = float(np.sqrt(np.mean(shaft_um_pk**2)))
     value = float(np.sqrt(np.mean(bearing_um_pk**2))) / shaft * bracket.stiffness_n_per_m
@@ -65,7 +66,27 @@ def vector_ratio_budget(
 
 def n_independent(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> int:
     """Polls in which at least one of two amplitudes differs from the poll before."""
-    if shaft_um_pk.size == 0:
-        return 0
-    changed = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
-    return 1 + int(np.count_nonzero(changed))
+    return int(np.count_nonzero(_changed(shaft_um_pk, bearing_um_pk)))
+
+
+def n_effective(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> float:
+    """How many independent polls would say as much as these, at least 2 of 2 or more.
+
+    A rack averages, perhaps for longer than a poll period: neighbouring polls then share much of
+    what they show. For a first-order process that leaves ``n (1 - r) / (1 + r)``, r the correlation
+    of neighbours (Bayley and Hammersley 1946); negative ones are taken for chance.
+    """
+    changed = _changed(shaft_um_pk, bearing_um_pk)
+    ratio = bearing_um_pk[changed] / shaft_um_pk[changed]
+    if ratio.size <= 2:
+        return float(ratio.size)
+    rest = ratio - ratio.mean()
+    power = float(rest @ rest)
+    r = max(float(rest[1:] @ rest[:-1]) / power, 0.0) if power > 0.0 else 0.0
+    return max(2.0, ratio.size * (1.0 - r) / (1.0 + r))
+
+
+def _changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
+    changed = np.ones(shaft_um_pk.size, dtype=np.bool_)
+    changed[1:] = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
+    return changed

@@ -19,7 +19,7 @@ from core.settings import AnalysisSettings
 from core.stiffness_budget import transfer_budgets
 from core.transfer import line_transfer
 from core.uncertainty import Budget
-from core.vector_budget import n_independent, vector_ratio_budget
+from core.vector_budget import n_effective, n_independent, vector_ratio_budget
 from core.whirl import roundness
 
 
@@ -186,9 +186,9 @@ class VectorLine:
         if phased is None:
             nothing = missing(Reason.NOT_MEASURED)
             return nothing, nothing
-        independent = n_independent(*self._common(shaft, bearing))
-        found = line_transfer(phased, 0, shaft, bearing, self.bearing.bracket, float(independent))
-        if independent < self.min_polls or found is None:
+        common = self._common(shaft, bearing)
+        found = line_transfer(phased, 0, shaft, bearing, self.bearing.bracket, n_effective(*common))
+        if n_independent(*common) < self.min_polls or found is None:
             few = missing(Reason.FEW_SEGMENTS)
             return few, few
         of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk())

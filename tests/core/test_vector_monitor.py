@@ -193,6 +193,23 @@ def test_a_rack_asked_more_often_than_it_measures_is_not_believed_more(rack) -> 
     assert often.readings[name].u_random == pytest.approx(once.readings[name].u_random, rel=0.05)
 
 
+def test_a_rack_that_averages_longer_than_a_poll_is_not_believed_more(rack) -> None:
+    """Each poll shows the mean of the last ten periods: neighbours share nine of them."""
+    results = []
+    for seed in range(60):
+        each = np.random.default_rng(seed).normal(size=(4, 69))
+        mean = np.array([np.convolve(row, np.full(10, 0.1), "valid") for row in each])
+        values = np.array([[60.0], [60.0], [20.0], [20.0]]) * (1 + 0.1 * mean)
+        results.append(watch(rack(), blocks_of(values))[-1].readings["order1_k_eff_xx_n_per_m"])
+
+    found = np.std([reading.value for reading in results])
+    stated = np.array([reading.u_random for reading in results])
+    assert found / 1.5 < np.mean(stated) < 2.5 * found
+    truth = 20.0 / 60.0 * K_B
+    missed = [abs(r.value - truth) > 2.0 * u for r, u in zip(results, stated, strict=True)]
+    assert sum(missed) <= 12
+
+
 def test_a_rack_that_repeats_itself_is_doubted(rack) -> None:
     newest = watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.0))[-1]
 
