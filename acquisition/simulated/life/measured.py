@@ -24,8 +24,8 @@ GAIN_HALF_WIDTH = 0.05
 """Class of probes and accelerometers (Brito et al., section 2.2.1)."""
 
 GAP_DRIFT = ((30.0 * 86_400.0, 0.8), (6.0 * 3600.0, 0.5), (600.0, 0.3))
-"""Time and rms in µm of what a displacement from four probes strays by. Eddy-current probes drift by
-about 0.03 % of their gap (2 mm) per kelvin, of which opposite probes share most."""
+"""Time and rms in µm of what a displacement from four probes strays by. It is an assumption: a
+drift of 0.03 % of the gap of 2 mm per kelvin, most of which opposite probes share."""
 
 REFERENCE_UM_RMS = 3.0
 GAP_GAIN_HALF_WIDTH = 0.02
