@@ -142,14 +142,12 @@ class UncountedInstants:
         self._next += n_samples
 
     def _turn(self, wave: int) -> None:
-        """Notice where a set begins, and a frame that is out of turn."""
+        """Notice where a set begins; one that is complete by then had all its frames in turn."""
         if wave <= self._last_wave:
             if self._frames:
                 self._spoil()
             self._spoilt = False
         self._last_wave = wave
-        if wave != len(self._frames):
-            self._spoil()
 
     def _spoil(self) -> None:
         """Give up the set that is being collected: it counts, but is not used."""

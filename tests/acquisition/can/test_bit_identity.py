@@ -31,12 +31,12 @@ def fingerprint(blocks) -> list[str]:
     ]  # fmt: skip
 
 
-def straight(feed, calibration) -> list:
+def straight(feed, calibration, n_samples: int = 50) -> list:
     delivery = Delivery(calibration)
     blocks = []
     try:
         while True:
-            blocks += delivery.take(feed.advance(50))
+            blocks += delivery.take(feed.advance(n_samples))
     except FeedEndedError:
         return blocks
 
@@ -58,6 +58,22 @@ async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
     assert len({b.epoch for b in direct}) > 1
     assert any(a.stop_index < b.first_index for a, b in itertools.pairwise(direct))
     assert source.refused_frames == {}
+
+
+@pytest.mark.parametrize("n_samples", [1, 3, 48, 51])
+@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+async def test_blocks_of_any_length_come_through(
+    fd, n_samples, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
+):
+    """Also where they end within a frame of five samples."""
+    feeds = [eventful_feed(n_blocks=200) for _ in range(2)]
+    direct = straight(feeds[0], counts_calibration(n_channels=4), n_samples)
+    shape = shape_of(fd=fd)
+    device = CanDevice(feeds[1], shape, block_samples=n_samples)
+    async with SlcanTcpServer(device, on_demand=True) as server:
+        source = source_of(shape, server.endpoint, when_full="wait")
+        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+    assert fingerprint(wired) == fingerprint(direct)
 
 
 @pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])

@@ -1,6 +1,7 @@
 """C1, C2, C10: offered = stored + gap + rejected, whatever is lost on the bus."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,6 +155,21 @@ async def test_a_lost_header_never_lets_old_slow_values_pass_for_new(
             assert [np.isnan(v) for v in middle[0].slow] == [name == "SLOW_0", name == "SLOW_1"]
         if name.startswith("TIME"):
             assert middle[0].start_ns - first.start_ns == 83_333_333
+
+
+def test_frames_that_disagree_about_their_samples_are_dropped_whole(
+    shape_of, assembler_of, counting_feed
+):
+    shape = shape_of(n_channels=12, fd=True)
+    feed = counting_feed(n_channels=12)
+    encoder, assembler = FrameEncoder(shape), assembler_of(shape)
+    frames = encoder.frames(feed.advance(BLOCK))
+    last = frames[-1]
+    frames[-1] = replace(last, data=last.data[:2] + b"\3" + last.data[3:])
+    blocks = assembler.take_wire(frames, START_NS)
+    blocks += assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS)
+    assert [(b.first_index, b.stop_index) for b in blocks] == [(0, 45), (50, 100)]
+    assert blocks[1].rejected == (Rejection("incomplete_frames", 5),)
 
 
 async def test_memory_stays_bounded_when_one_node_falls_silent(
