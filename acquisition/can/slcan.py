@@ -158,17 +158,18 @@ def _parsed(line: bytes, ids: frozenset[int] | None) -> Message | None:
     extended, remote, fd = form
     end = 9 if extended else 4
     try:
-        frame_id = int(line[1:end], 16)
+        # not int(…, 16), which takes "0x1", "1_0" and " 1" for numbers
+        frame_id = int.from_bytes(unhexlify(line[1:end].rjust(8, b"0")), "big")
         if ids is not None and frame_id not in ids:
             return None
-        code = int(line[end : end + 1], 16)
+        code = unhexlify(b"0" + line[end : end + 1])[0]
         data = unhexlify(line[end + 1 :])
-    except (ValueError, HexError) as exc:
+    except (HexError, IndexError) as exc:
         raise FrameError(f"not an slcan frame: {line[:40]!r}") from exc
     length = _FD_LENGTHS[code] if fd else code
     if len(data) != (0 if remote else length) or length > (64 if fd else 8):
         raise FrameError(f"an slcan frame of {len(data)} bytes that says {length}")
-    if not line[1:end].isalnum() or frame_id >= (1 << 29 if extended else 1 << 11):
+    if frame_id >= (1 << 29 if extended else 1 << 11):
         raise FrameError(f"not a CAN id: {line[1:end]!r}")
     return Message(
         arbitration_id=frame_id,
