@@ -8,6 +8,7 @@ import numpy as np
 from acquisition.daq import faults
 from acquisition.daq.faults import Repetition, SlotFault
 from acquisition.daq.ledger import Ledger
+from acquisition.daq.reading_watch import ReadingWatch
 from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_shape import RingDeviceSettings, layout_of
 from acquisition.daq.slot_feed import SlotFeed
@@ -96,7 +97,6 @@ class RingDevice:
         self.identification: Mapping[int, bytes] = {}
         self._repetition = Repetition()
         self._n_frozen = 0
-        self._unread: deque[int] = deque(maxlen=self._settings.n_slots)
         self._n_looks = 0
         self.first_sequence = self._settings.first_sequence
         self._n_restarts = 0
@@ -105,14 +105,10 @@ class RingDevice:
         if first is None:
             raise ConfigError(f"the feed has not one slot of {self._settings.samples_per_slot}")
         self.layout = layout_of(first, self._settings)
+        self._watch = ReadingWatch(self.layout)
         base = self._settings.base_address
         self.memory = RegisterMemory(base, self.layout.end_address - base)
         self._power_up(first, self._settings.first_index)
-
-    @property
-    def _n_unread(self) -> int:
-        """Places of the ring from the oldest slot that nobody has read to the newest."""
-        return (self._newest - self._unread[0]) % U32 + 1 if self._unread else 0
 
     @property
     def newest(self) -> int:
@@ -129,7 +125,7 @@ class RingDevice:
             if ahead is None:
                 self.ended = True
                 return
-            if self.patient and self._n_unread > self._most_unread(ahead):
+            if self.patient and self._must_wait(ahead):
                 return
             self._position += 1
             if ahead.epoch != self._feed_epoch or self._slots.number(ahead) <= self._position:
@@ -184,7 +180,7 @@ class RingDevice:
         if self._settings.base_address in asked:
             self._look()
         data = self.memory.read(address, count)
-        self._note_read(asked)
+        self._watch.note_read(asked)
         return data
 
     def read_bits(self, function: int, address: int, count: int) -> None:
@@ -212,27 +208,24 @@ class RingDevice:
 
     def _look(self) -> None:
         """Note that a reader looks at the header, whether there is something new."""
-        if self._n_unread:
+        self._watch.note_look()
+        if not self._watch.waiting:
             return
         if self.on_demand and not self.ended:
             self.produce_unpaced(max(1, (self.layout.n_slots - 2) // 2))
         self._n_looks += self.ended
 
-    def _most_unread(self, ahead: RawBlock) -> int:
-        """Slots that may be unread when this one comes: none when its ring begins anew."""
+    def _must_wait(self, ahead: RawBlock) -> bool:
+        """Whether a slot would come before its reader can take it."""
+        if not self._watch.anything_read:
+            return True
+        # a reader of version 1 looks once more behind the slots, and leaves out what may be gone
+        checked = self.layout.checked
         if ahead.epoch != self._feed_epoch:
-            return 0
-        n_slots = self._slots.number(ahead) - self._number
-        return max(0, self.layout.n_slots - 2 - n_slots)
-
-    def _note_read(self, asked: range) -> None:
-        """Note the slots whose last registers were asked for, as far as all before were read."""
-        ring = self.layout
-        end = ring.ring_address + ring.slot_registers - 1
-        first = -((end - asked.start) // ring.slot_stride)
-        places = range(first, (asked.stop - 1 - end) // ring.slot_stride + 1)
-        while self._unread and self._unread[0] % ring.n_slots in places:
-            self._unread.popleft()
+            return self._watch.n_unread > 0 if checked else not self._watch.waiting
+        n_safe = self.layout.n_slots - 2 if checked else (self.layout.n_slots - 3) // 2
+        n_ahead = self._slots.number(ahead) - self._number
+        return self._watch.n_unread > max(0, n_safe - n_ahead)
 
     def _take(self, fault: SlotFault | None) -> None:
         raw = self._slots.take()
@@ -247,7 +240,7 @@ class RingDevice:
 
     def _power_up(self, first: RawBlock, first_index: int | None) -> None:
         self.memory.clear()
-        self._unread.clear()
+        self._watch.begin_anew()
         self._feed_epoch = first.epoch
         self.epoch = (first.epoch + self._n_restarts) % U32
         self._newest = self.first_sequence
@@ -257,7 +250,7 @@ class RingDevice:
     def _write(self, raw: RawBlock, n_slots: int, spoilers: list[SlotFault]) -> None:
         """Write a slot that is so many places after the one before."""
         self._number = self._position = self._slots.number(raw)
-        self._unread.append(self._newest)
+        self._watch.note_written(self._newest)
         self._n_looks = 0
         right = self._slot(raw)
         slot: Slot | None = right

@@ -50,12 +50,16 @@ def transport_of(server) -> TcpTransport | SerialTransport:
     return TcpTransport(**found) if "port" in found else SerialTransport(**found)
 
 
+def source_of(server, calibration: UnitCalibration) -> ModbusRingSource:
+    transport = transport_of(server)
+    timeout_s = 5.0 if isinstance(transport, TcpTransport) else 0.3
+    settings = ModbusRingSettings(transport=transport, poll_period_s=0.0001, timeout_s=timeout_s)
+    return ModbusRingSource(settings, calibration, SystemClock())
+
+
 async def replayed(server, calibration: UnitCalibration) -> list[SampleBlock]:
     """All that a reader gets until the server says that everything was read."""
-    settings = ModbusRingSettings(
-        transport=transport_of(server), poll_period_s=0.0001, timeout_s=0.2
-    )
-    source = ModbusRingSource(settings, calibration, SystemClock())
+    source = source_of(server, calibration)
     blocks: list[SampleBlock] = []
 
     async def read() -> None:
@@ -63,10 +67,11 @@ async def replayed(server, calibration: UnitCalibration) -> list[SampleBlock]:
             async for block in stream:
                 blocks.append(block)
 
-    reading = asyncio.create_task(read())
-    await server.run()
+    reading, serving = asyncio.create_task(read()), asyncio.create_task(server.run())
+    await asyncio.wait([reading, serving], return_when=asyncio.FIRST_COMPLETED)
+    assert serving.done(), reading
     reading.cancel()
-    await asyncio.gather(reading, return_exceptions=True)
+    await asyncio.wait([reading])
     return blocks
 
 
@@ -155,21 +160,39 @@ async def test_a_paced_server_ends_with_its_recording_when_nobody_reads(stepped_
     assert device.ledger.n_samples("U1") == 500
 
 
-async def test_a_paced_server_waits_for_its_reader_before_it_ends(counts_calibration):
-    device = RingDevice(PiecewiseFeed((1, 0, 300)))
+class Hurry(SystemClock):
+    """A clock that runs a thousand times as fast."""
 
-    class Instant(SystemClock):
-        """A clock of a replay that is over at once."""
+    def monotonic_s(self) -> float:
+        return 1000.0 * super().monotonic_s()
 
-        def monotonic_s(self) -> float:
-            return 1000.0 * super().monotonic_s()
+    async def sleep(self, duration_s: float) -> None:
+        await super().sleep(duration_s / 1000.0)
 
-        async def sleep(self, duration_s: float) -> None:
-            await super().sleep(duration_s / 1000.0)
 
-    async with ModbusRingServer(device, Instant()) as server:
+async def test_a_patient_server_loses_nothing_however_fast_its_clock(settings, counts_calibration):
+    device = RingDevice(PiecewiseFeed((1, 0, 5000), (2, 100, 3000)), settings=settings)
+    async with ModbusRingServer(device, Hurry(), patient=True) as server:
         blocks = await replayed(server, counts_calibration())
-    assert blocks[-1].stop_index == 300
+    found = [(block.epoch, block.first_index) for block in blocks]
+    assert found == [
+        *((1, index) for index in range(0, 5000, 50)),
+        *((2, index) for index in range(100, 3000, 50)),
+    ]
+
+
+async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(settings, counts_calibration):
+    device = RingDevice(PiecewiseFeed((1, 0, 20_000)), settings=settings)
+    async with ModbusRingServer(device, Hurry(), patient=True) as server:
+        async with source_of(server, counts_calibration()).connect() as stream:
+            before = await anext(stream)
+        after = await replayed(server, counts_calibration())
+    assert before.stop_index <= after[0].first_index
+    assert after[-1].stop_index == 20_000
+    for block in after:
+        assert block.samples[0].tolist() == [
+            n % 2**15 for n in range(block.first_index, block.stop_index)
+        ]
 
 
 async def test_a_device_whose_recording_has_ended_stands_still(settings, counts_calibration):

@@ -1,0 +1,60 @@
+"""`ReadingWatch`: which slots of a ring its reader has read, as far as a device can see."""
+
+from collections import deque
+
+from acquisition.modbus.ring_layout import U32, RingLayout
+
+
+class ReadingWatch:
+    """Notes what is written and which registers are asked for.
+
+    A slot counts as read when its last register was, and all before it were. A reader that has read
+    the newest slot before it looks at the header again leaves out what it has not read.
+
+    Attributes
+    ----------
+    anything_read
+        Whether any slot ever was.
+    waiting
+        Whether a reader has looked at the header after it had read all slots.
+    """
+
+    def __init__(self, layout: RingLayout) -> None:
+        self._layout = layout
+        self._unread: deque[int] = deque(maxlen=layout.n_slots)
+        self._newest = 0
+        self._newest_was_read = False
+        self.anything_read = False
+        self.waiting = False
+
+    def begin_anew(self) -> None:
+        """Forget all slots, as an empty ring does."""
+        self._unread.clear()
+
+    def note_written(self, sequence: int) -> None:
+        """Note the newest slot."""
+        self._unread.append(sequence)
+        self._newest, self._newest_was_read = sequence, False
+        self.waiting = False
+
+    def note_look(self) -> None:
+        """Note that the header is read."""
+        if self._newest_was_read:
+            self._unread.clear()
+        self.waiting = not self._unread
+
+    def note_read(self, asked: range) -> None:
+        """Note that registers are read."""
+        ring = self._layout
+        end = ring.ring_address + ring.slot_registers - 1
+        first = -((end - asked.start) // ring.slot_stride)
+        places = range(first, (asked.stop - 1 - end) // ring.slot_stride + 1)
+        while self._unread and self._unread[0] % ring.n_slots in places:
+            self._unread.popleft()
+            self.anything_read = True
+        self._newest_was_read |= self._newest % ring.n_slots in places
+
+    @property
+    def n_unread(self) -> int:
+        """Places of the ring from the oldest slot that was not read to the newest."""
+        return (self._newest - self._unread[0]) % U32 + 1 if self._unread else 0
