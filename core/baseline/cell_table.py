@@ -1,5 +1,6 @@
 """What a baseline knows of every cell that it has seen."""
 
+import itertools
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -119,6 +120,12 @@ def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
             if ends:
                 found.update(line[: ends[0]])
     return frozenset(found)
+
+
+def neighbourhood(cell: Cell) -> tuple[Cell, ...]:
+    """The cell and all that touch it."""
+    steps = itertools.product((-1, 0, 1), repeat=len(cell))
+    return tuple(tuple(i + step for i, step in zip(cell, by, strict=True)) for by in steps)
 
 
 def _moved(cell: Cell, axis: int, by: int) -> Cell:

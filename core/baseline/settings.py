@@ -23,6 +23,9 @@ class BaselineSettings:
         y. The grid decides whether cells do.
     min_readings, min_days
         Readings, and days with readings, below which a cell knows nothing by itself.
+    borrowing_readings
+        Readings in a cell from which on it may borrow, if it and those that touch it have seen
+        `min_days` in all.
     borrowing_reach
         Cells that may be missing between two of their own support: they borrow from these through
         the surface.
@@ -49,8 +52,9 @@ class BaselineSettings:
 
     grid: CellGrid = field(default_factory=CellGrid)
     uses_attitude: bool = True
-    min_readings: int = 30
-    min_days: int = 5
+    min_readings: int = 20
+    min_days: int = 3
+    borrowing_readings: int = 6
     borrowing_reach: int = 2
     max_surface_std: float = 0.05
     min_learning_days: int = 20
@@ -82,6 +86,6 @@ class BaselineSettings:
 
 
 POSITIVE = (
-    *("min_readings", "min_days", "borrowing_reach", "max_surface_std", "min_learning_days"),
-    *("knot_cells", "bend_std", "reading_h"),
+    *("min_readings", "min_days", "borrowing_readings", "borrowing_reach", "max_surface_std"),
+    *("min_learning_days", "knot_cells", "bend_std", "reading_h"),
 )

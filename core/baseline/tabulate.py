@@ -7,7 +7,13 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.cell_scatter import LEAST_SCATTER
-from core.baseline.cell_table import CellStatistics, CellTable, Support, cells_between
+from core.baseline.cell_table import (
+    CellStatistics,
+    CellTable,
+    Support,
+    cells_between,
+    neighbourhood,
+)
 from core.baseline.fit import Fit
 from core.baseline.groups import Groups, group_medians
 from core.baseline.settings import BaselineSettings
@@ -52,6 +58,7 @@ def tabulate(
         if content.n_readings >= settings.min_readings and content.n_days >= settings.min_days
     }
     between = cells_between(frozenset(enough), settings.borrowing_reach)
+    between |= {cell for cell in contents if _may_borrow(cell, contents, settings)}
     for cell in sorted(between - set(contents)):
         contents[cell] = _unseen(cell, enough, contents, fit.surface, settings.grid)
     std = _surface_std(list(contents.values()), fit)
@@ -70,6 +77,13 @@ def tabulate(
             for row, (cell, content) in enumerate(contents.items())
         )
     )
+
+
+def _may_borrow(cell: Cell, contents: dict[Cell, _Contents], settings: BaselineSettings) -> bool:
+    if contents[cell].n_readings < settings.borrowing_readings:
+        return False
+    around = [contents[other].n_days for other in neighbourhood(cell) if other in contents]
+    return sum(around) >= settings.min_days
 
 
 def _support(cell: Cell, enough: set[Cell], between: frozenset[Cell], is_sure: np.bool_) -> Support:

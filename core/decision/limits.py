@@ -35,7 +35,7 @@ class ChangeLimits:
     alert_change: float = 0.03
     danger_change: float = 0.15
     deadband: float = 0.01
-    significance: float = 5.0
+    significance: float = 6.0
     min_evidence_h: float = 4.0
     on_delay_h: float = 1.0
     off_delay_h: float = 8.0

@@ -1,0 +1,121 @@
+"""The table: what is required, what was found, and what a fixed threshold would have said."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.simulated.life.damage import DamageKind
+from benchmarks.detection_cases import DAMAGE_CASES, Changed, DamageCase, Found, Outside
+from core.decision.attribution import Cause
+
+MOST_FALSE_ALARMS = 0.1
+"""Per unit-year, all bearings and directions counted."""
+
+HEADINGS = ("case", "required", "found", "n", "fixed threshold", "verdict")
+
+
+@dataclass(frozen=True)
+class UnitResult:
+    """Everything about one unit; pairs are the sequential test and the fixed threshold."""
+
+    years: float
+    false_alarms: tuple[int, int]
+    found: Mapping[str, Found]
+    changed: tuple[Changed, ...]
+    outside: Mapping[bool, Outside]
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the table; `is_met` is None where nothing is required."""
+
+    case: str
+    required: str
+    found: str
+    n: int
+    fixed: str = ""
+    is_met: bool | None = None
+
+
+def lines(results: Sequence[UnitResult]) -> Iterator[Line]:
+    yield _healthy(results)
+    for case in DAMAGE_CASES:
+        found = [result.found[case.name] for result in results]
+        yield _damage(case, found)
+        if not case.anywhere and (case.size == 0.2 or case.kind is DamageKind.ACCELEROMETER_GAIN):
+            yield from _causes(case, found)
+    yield _changes([one for result in results for one in result.changed])
+    for is_damaged, name in ((False, "outside the support"), (True, "the same, with 20 % loss")):
+        yield _outside(name, [result.outside[is_damaged] for result in results])
+
+
+def _healthy(results: Sequence[UnitResult]) -> Line:
+    years = sum(result.years for result in results)
+    ours, fixed = (sum(r.false_alarms[i] for r in results) / years for i in (0, 1))
+    return Line(
+        "healthy: false alarms per unit-year",
+        f"≤ {MOST_FALSE_ALARMS:g}",
+        f"{ours:.3f}",
+        len(results),
+        f"{fixed:.3f}",
+        ours <= MOST_FALSE_ALARMS,
+    )
+
+
+def _damage(case: DamageCase, found: Sequence[Found]) -> Line:
+    hours = [one.after_h for one in found if one.after_h is not None]
+    share = len(hours) / len(found)
+    median = f", median {np.median(hours):.0f} h" if hours else ""
+    return Line(
+        case.name,
+        "" if case.least_share is None else f"≥ {100 * case.least_share:.0f} %",
+        f"{100 * share:.1f} %{median}",
+        len(found),
+        f"{100 * np.mean([one.by_fixed for one in found]):.1f} %",
+        None if case.least_share is None else share >= case.least_share,
+    )
+
+
+def _causes(case: DamageCase, found: Sequence[Found]) -> Iterator[Line]:
+    """What alarms were put down to, at once and a day of running later."""
+    is_film = case.kind is not DamageKind.ACCELEROMETER_GAIN
+    wrong = Cause.BRACKET_OR_TRANSDUCER if is_film else Cause.FILM
+    for key, when in (("cause", "at the alarm"), ("cause_later", "24 h later")):
+        causes = Counter(getattr(one, key) for one in found if one.after_h is not None)
+        said = ", ".join(f"{cause}: {causes[cause]}" for cause in Cause if causes[cause])
+        yield Line(
+            f"  its cause, {when}",
+            "" if is_film else "never the film",
+            said,
+            causes.total(),
+            "cannot say",
+            None if is_film else causes[wrong] == 0,
+        )
+
+
+def _changes(changed: Sequence[Changed]) -> Line:
+    factors = [max(c.factor, 1.0 / c.factor) for c in changed if np.isfinite(c.factor)]
+    alarms, crossings = sum(c.alarms for c in changed), sum(c.fixed_alarms for c in changed)
+    return Line(
+        f"condition alone, stiffness ×{np.median(factors):.1f} or ÷{np.median(factors):.1f}",
+        "0 alarms",
+        f"{alarms} alarms",
+        len(changed),
+        f"{crossings} alarms",
+        alarms == 0,
+    )
+
+
+def _outside(name: str, outside: Sequence[Outside]) -> Line:
+    share = np.nanmean([one.no_baseline_share for one in outside])
+    alarms, crossings = sum(o.alarms for o in outside), sum(o.fixed_alarms for o in outside)
+    return Line(
+        name,
+        "0 alarms",
+        f"{alarms} alarms, {100 * share:.1f} % no_baseline",
+        len(outside),
+        f"{crossings} alarms",
+        alarms == 0,
+    )

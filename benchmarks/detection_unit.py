@@ -1,0 +1,150 @@
+"""One simulated unit: what is learned from its first year, and what is decided in the second."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.simulated.life.condition_change import ConditionChange
+from acquisition.simulated.life.damage import Damage
+from acquisition.simulated.life.life import live
+from acquisition.simulated.life.life_truth import UnitLife
+from benchmarks.detection_fixed import BANDS, FixedThreshold
+from core.baseline.baseline import Origin, QuantityBaseline, Watched
+from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
+from core.condition.operating_limits import OperatingLimits
+from core.condition.operation_history import operation_history
+from core.decision.attribution import Attribution, Place, attribute
+from core.decision.back_test import DecisionHistory, back_test
+from core.decision.limits import ChangeLimits
+from core.decision.movement import movements_at
+from core.decision.verdict import JUDGED
+from core.stiffness_history import DIRECTIONS, StiffnessHistory
+
+DAY_NS = 86_400 * 10**9
+START_NS = 19_723 * DAY_NS
+"""Midnight of 1 January 2024."""
+
+YEARS = 2.0
+LEARNING_DAYS = 365
+SETTINGS = BaselineSettings()
+LIMITS = ChangeLimits()
+
+
+@dataclass(frozen=True, eq=False)
+class Later:
+    """What comes after the learning period of one life."""
+
+    histories: Mapping[str, StiffnessHistory]
+    is_settled: npt.NDArray[np.bool_]
+
+    @property
+    def time_ns(self) -> npt.NDArray[np.int64]:
+        return next(iter(self.histories.values())).time_ns
+
+    @property
+    def years(self) -> float:
+        return float(self.time_ns[-1] - self.time_ns[0]) / DAY_NS / 365.25
+
+
+class LearnedUnit:
+    """A unit with its baselines; damage comes to it after it has been learned."""
+
+    def __init__(self, seed: int) -> None:
+        self.seed = seed
+        life = live(seed, START_NS, YEARS)
+        settled, n = _settled(life), _n_learning(life)
+        self.baselines = {
+            bearing: learn(history.rows(0, n), settled[:n], _origin(seed, bearing), SETTINGS)
+            for bearing, history in life.readings.items()
+        }
+        self.fixed = _fixed(life, settled, n)
+        self.healthy = _later(life)
+
+    def later(
+        self, damage: Iterable[Damage] = (), changes: Iterable[ConditionChange] = ()
+    ) -> Later:
+        """The same life, damaged or changed."""
+        return _later(live(self.seed, START_NS, YEARS, damage, changes))
+
+    def decide(self, later: Later, bearing: str, direction: str) -> DecisionHistory:
+        found = self.stiffness(bearing, direction)
+        return back_test(later.histories[bearing], later.is_settled, found, LIMITS)
+
+    def stiffness(self, bearing: str, direction: str) -> QuantityBaseline:
+        found = self.baselines[bearing].of(Watched.STIFFNESS, direction)
+        if found is None:
+            raise RuntimeError(f"unit {self.seed} has learned nothing of {bearing} {direction}")
+        return found
+
+    def places(self) -> list[Place]:
+        return [(bearing, direction) for bearing in self.baselines for direction in DIRECTIONS]
+
+    def judged_rows(self, bearing: str) -> npt.NDArray[np.int64]:
+        """Rows in which the healthy bearing is judged in both directions."""
+        verdicts = [self.decide(self.healthy, bearing, d).verdict for d in DIRECTIONS]
+        return np.flatnonzero(np.all(np.isin(verdicts, [int(v) for v in JUDGED]), axis=0))
+
+    def attribution(self, later: Later, place: Place, row: int) -> Attribution:
+        """What a change at a place is put down to after a row."""
+        decided = self.decide(later, *place)
+        movements = {
+            (bearing, direction): movements_at(
+                later.histories[bearing].rows(0, row + 1),
+                later.is_settled[: row + 1],
+                self.baselines[bearing],
+                direction,
+                float(decided.time_scale_h[row]),
+            )
+            for bearing, direction in self.places()
+        }
+        return attribute(place, movements)
+
+
+def fixed_false_alarms(seed: int) -> tuple[float, list[int]]:
+    """Years of a healthy unit after learning, and how often a fixed threshold alarms, by band."""
+    life = live(seed, START_NS, YEARS)
+    fixed, later = _fixed(life, _settled(life), _n_learning(life)), _later(life)
+    return later.years, [
+        sum(
+            threshold.raised(
+                later.histories[bearing].ln_k[DIRECTIONS.index(direction)], later.is_settled, band
+            ).size
+            for (bearing, direction), threshold in fixed.items()
+        )
+        for band in BANDS.tolist()
+    ]
+
+
+def _fixed(life: UnitLife, settled: npt.NDArray[np.bool_], n: int) -> dict[Place, FixedThreshold]:
+    return {
+        (bearing, direction): FixedThreshold.learned(history.ln_k[row, :n][settled[:n]])
+        for bearing, history in life.readings.items()
+        for row, direction in enumerate(DIRECTIONS)
+    }
+
+
+def _settled(life: UnitLife) -> npt.NDArray[np.bool_]:
+    operation = life.operation
+    limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
+    return operation_history(
+        operation.time_ns, operation.speed_rpm, operation.power_mw, limits
+    ).is_settled
+
+
+def _n_learning(life: UnitLife) -> int:
+    return int(np.searchsorted(life.operation.time_ns, START_NS + LEARNING_DAYS * DAY_NS))
+
+
+def _later(life: UnitLife) -> Later:
+    n = _n_learning(life)
+    return Later(
+        {bearing: history.rows(n, len(history)) for bearing, history in life.readings.items()},
+        _settled(life)[n:],
+    )
+
+
+def _origin(seed: int, bearing: str) -> Origin:
+    return Origin(f"U{seed}", bearing, "ratio_order1", 1, "benchmark", START_NS)
