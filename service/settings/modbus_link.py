@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from service.settings.base import MisfitError, Settings
+from service.settings.modbus_identity import IdentitySettings
 
 
 class ModbusLinkSettings(Settings):
@@ -35,6 +36,10 @@ class ModbusLinkSettings(Settings):
     timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
     """Longest wait for one reply in seconds, 0.05 to 60; a link that is silent for longer is
     lost. Two poll periods or less notice that within three."""
+
+    identity: IdentitySettings | None = None
+    """What the device must answer to be the right one, asked on each connection: kind "signature"
+    (registers) or "identification" (function 43/14). Without it only the data's own form tells."""
 
     @model_validator(mode="after")
     def _check_link(self) -> Self:

@@ -4,8 +4,7 @@ from typing import Any
 
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from service.settings.modbus_link import ModbusLinkSettings
-
-_TRANSPORT_KEYS = {"host", "port", "device", "baudrate", "parity", "stop_bits"}
+from service.wiring.modbus_identity import identity_of
 
 
 def transport_of(source: ModbusLinkSettings) -> Transport:
@@ -20,6 +19,11 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
     )
 
 
-def fields_of(source: ModbusLinkSettings) -> dict[str, Any]:
-    """All other settings of a source, by name."""
-    return source.model_dump(exclude={"kind", *_TRANSPORT_KEYS})
+def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
+    """How a device is reached and known, as every source's settings take it."""
+    return {
+        "transport": transport_of(source),
+        "device_id": source.device_id,
+        "timeout_s": source.timeout_s,
+        "identity": identity_of(source.identity),
+    }

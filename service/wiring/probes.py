@@ -9,14 +9,12 @@ from acquisition.registers.cells import BIT_FUNCTIONS
 from acquisition.registers.decoding import MapDecoder
 from acquisition.registers.register_map import RegisterMap
 from service.settings.modbus_link import ModbusLinkSettings
-from service.wiring.modbus import transport_of
+from service.wiring.modbus import link_fields
 
 
 def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
     """How a device is reached."""
-    return LinkSettings(
-        transport=transport_of(device), device_id=device.device_id, timeout_s=device.timeout_s
-    )
+    return LinkSettings(**link_fields(device))
 
 
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:

@@ -20,15 +20,13 @@ from service.settings.modbus_sources import (
     ModbusVectorSettings,
     SlowDeviceSettings,
 )
-from service.wiring.modbus import transport_of
+from service.wiring.modbus import link_fields
 
 
 def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
     """How a mapped device is asked."""
     return PolledSettings(
-        transport=transport_of(device),
-        device_id=device.device_id,
-        timeout_s=device.timeout_s,
+        **link_fields(device),
         poll_period_s=device.poll_period_s,
         stale_after_s=device.stale_after_s,
     )
@@ -74,9 +72,7 @@ def fifo_source(
 ) -> SampleSource:
     """Queues as a source."""
     settings = FifoSettings(
-        transport=transport_of(source),
-        device_id=source.device_id,
-        timeout_s=source.timeout_s,
+        **link_fields(source),
         poll_period_s=source.poll_period_s,
         stale_after_s=source.stale_after_s,
         loss_tolerance_s=source.loss_tolerance_s,

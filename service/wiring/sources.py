@@ -17,7 +17,7 @@ from service.settings.can import CanSettings
 from service.settings.plant import AnalysisModel, PlantFile
 from service.settings.units import UnitSettings
 from service.wiring.can import can_settings_of
-from service.wiring.modbus import fields_of, transport_of
+from service.wiring.modbus import link_fields
 from service.wiring.registers import (
     at_poll_rate,
     fifo_source,
@@ -88,8 +88,7 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
     source = unit.source
     match source:
         case sources.ModbusRingSettings():
-            ring = ModbusRingSettings(transport=transport_of(source), **fields_of(source))
-            return ModbusRingSource(ring, calibration, clock)
+            return ModbusRingSource(_ring_settings(source), calibration, clock)
         case modbus_sources.ModbusFifoSettings():
             return fifo_source(source, calibration, clock)
         case modbus_sources.ModbusPolledSettings():
@@ -100,3 +99,13 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
             return CanSource(can_settings_of(unit, source), calibration, clock)
         case sources.SimulatedSettings():
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
+
+
+def _ring_settings(source: sources.ModbusRingSettings) -> ModbusRingSettings:
+    return ModbusRingSettings(
+        **link_fields(source),
+        function=source.function,
+        base_address=source.base_address,
+        poll_period_s=source.poll_period_s,
+        stale_after_s=source.stale_after_s,
+    )
