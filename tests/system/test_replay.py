@@ -12,6 +12,7 @@ import pytest
 RECORDINGS = Path(__file__).parents[1] / "recordings"
 RUNS = {"U1": "part_load", "U2": "full_load"}
 YEAR = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
+N_ALARM_EVENTS = 3
 LONGEST_RUN_S = 100.0
 MOST_QUANTITIES = 40
 WIRES = ["modbus_tcp", "modbus_rtu", "can", "can_fd"]
@@ -40,11 +41,12 @@ async def played(start: Callable, *options: str, runs: tuple[str, ...] = tuple(R
 
 async def trends(program: Any, unit: str) -> dict[str, Any]:
     """All quantities of a unit's bearing, once all results are on the disk."""
-    n_known, names = len(known(unit)["time_ns"]), list(known(unit)["series"])
+    last_s = known(unit)["time_ns"][-1] / 1_000_000_000
+    names = list(known(unit)["series"])
     parts = [
         await program.until(
             f"/api/v1/units/{unit}/bearings/UJB/trends",
-            lambda answer: len(answer["time"]) >= n_known,
+            lambda answer: last_s in answer["time"],
             **YEAR,
             quantity=names[first : first + MOST_QUANTITIES],
         )
@@ -52,6 +54,15 @@ async def trends(program: Any, unit: str) -> dict[str, Any]:
     ]
     series = {name: found for part in parts for name, found in part["series"].items()}
     return {"time": parts[0]["time"], "series": series}
+
+
+async def alarm_events(program: Any) -> list[dict[str, Any]]:
+    """What became of every alarm, once all of it is on the disk; units come in any order."""
+    answer = await program.until(
+        "/api/v1/alarms/events", lambda found: len(found["events"]) >= N_ALARM_EVENTS
+    )
+    events = [{k: v for k, v in event.items() if k != "id"} for event in answer["events"]]
+    return sorted(events, key=lambda event: (event["alarm"], event["number"]))
 
 
 def bits(answer: dict[str, Any]) -> str:
@@ -99,6 +110,13 @@ async def test_every_wire_gives_the_same_results_to_the_last_bit(
         assert bits(await trends(over_wire, unit)) == bits(await trends(straight, unit))
         path = f"/api/v1/units/{unit}/gaps"
         assert await over_wire.get(path, **YEAR) == await straight.get(path, **YEAR)
+    events = await alarm_events(straight)
+    assert await alarm_events(over_wire) == events
+    assert [(event["alarm"], event["change"]) for event in events] == [
+        ("U1:ujb_shaft_y:channel_not_ok", "raised"),
+        ("U1:ujb_shaft_y:channel_not_ok", "returned"),
+        ("U2:ujb_shaft_x:channel_not_ok", "raised"),
+    ]
 
 
 @pytest.mark.parametrize("speed", ["1", "50"])
