@@ -134,6 +134,7 @@ class CanDaqServer:
                 continue
             await self._send(self._faults.applied(self.device.next_frames()))
             self._taken.set()
+            await asyncio.sleep(0)  # a socket that takes everything would never let others in
 
     async def _pace(self, clock: Clock) -> None:
         if self._origin_s is None:
