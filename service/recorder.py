@@ -71,6 +71,13 @@ class Recorder:
         async with self._progress:
             await self._progress.wait_for(lambda: all(news is not mine for news in self._alarms))
 
+    async def settled(self) -> None:
+        """Wait until everything is on the disk, or the store has refused to take it."""
+        async with self._progress:
+            await self._progress.wait_for(
+                lambda: self._live.store_error or not (self._waiting or self._alarms)
+            )
+
     async def run(self) -> None:
         """Write whatever is queued, for ever."""
         while True:
@@ -97,15 +104,19 @@ class Recorder:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
             self._live.store_error = str(error)
+            await self._tell_progress()
             return False
         if self._live.store_error is not None:
             log.info("results are being stored again")
         self._live.store_error = None
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
+        await self._tell_progress()
+        return True
+
+    async def _tell_progress(self) -> None:
         async with self._progress:
             self._progress.notify_all()
-        return True
 
 
 def _drop(queue: deque[T], written: Sequence[T]) -> None:

@@ -72,6 +72,7 @@ class Runner:
                     sources.create_task(self._acquire(unit, watched), name=f"acquire {unit}")
             await self._bus.drained()
             analysis.cancel()
+            await self._recorder.settled()
             recording.cancel()
 
     async def _acquire(self, unit: str, watched: WatchedUnit) -> None:
