@@ -5,9 +5,11 @@ from typing import Annotated
 
 import typer
 
+from acquisition.errors import ConfigError
 from service.cli.examples import EXAMPLE, example_path
-from service.cli.plant_file import PlantPath, read_plant_file
+from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.schema import plant_file_schema
+from service.wiring.can import require_dbc_fits
 
 app = typer.Typer(no_args_is_help=True, help="Check a plant file, print its schema or an example.")
 
@@ -19,6 +21,11 @@ def check(
 ) -> None:
     """Check a plant file; every mistake is named with its line, exit code 2."""
     plant = read_plant_file(plant_file)
+    try:
+        for unit in plant.unit:
+            require_dbc_fits(unit)
+    except ConfigError as error:
+        fail(f"{plant_file}: {error}", code=2)
     n_bearings = sum(len(unit.bearing) for unit in plant.unit)
     n_channels = sum(len(unit.channel) for unit in plant.unit)
     if json_output:
@@ -26,8 +33,8 @@ def check(
         typer.echo(json.dumps({"plant": plant.plant.name, **counts}))
         return
     typer.echo(
-        f"{plant_file} is fine: {plant.plant.name}, {len(plant.unit)} units,"
-        f" {n_bearings} bearings, {n_channels} waveform channels"
+        f"{plant_file} is fine: {plant.plant.name}; units: {len(plant.unit)},"
+        f" bearings: {n_bearings}, waveform channels: {n_channels}"
     )
 
 

@@ -14,6 +14,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.registers.cells import ByteOrder
 from core.machine import Measurand
 from service.cli.plant_file import fail, read_plant_file
+from service.cli.probe_can import can
 from service.cli.units import UnitOption, one_unit
 from service.probing import RegisterLook, ValueLook, looks, value_looks
 from service.settings.map_file import MapFileError, load_map_file
@@ -26,6 +27,8 @@ from service.wiring.probes import identify_once, read_map_once, read_once
 app = typer.Typer(
     no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."
 )
+
+app.command("can")(can)
 
 MAX_COUNT = 1000
 BIT_FUNCTIONS = (1, 2)

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
 from acquisition.daq.can_bus import CanBusServer
@@ -13,6 +14,7 @@ from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.daq.port import DaqServer
 from acquisition.raw import RawFeed
 from core.machine import Measurand
+from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings
 
@@ -146,3 +148,15 @@ def _factor(full_scale_v: float, floats: bool) -> float:
 
 def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
     return (signals,) if isinstance(signals, str) else signals
+
+
+def require_dbc_fits(unit: UnitSettings) -> None:
+    """Look into the DBC file of a unit that reads CAN, without opening a bus.
+
+    Raises
+    ------
+    ConfigError
+        Naming file, key, what was found and what is needed.
+    """
+    if isinstance(unit.source, settings.CanSettings):
+        compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))

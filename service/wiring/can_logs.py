@@ -7,6 +7,10 @@ from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
 from acquisition.importing.frames import FrameBatch
 from acquisition.raw import RawBlock
+from service.conversion import calibration_of
+from service.settings.can import CanSettings as CanSourceSettings
+from service.settings.units import UnitSettings
+from service.wiring.can import can_settings_of
 
 
 class CanLogDecoder:
@@ -43,3 +47,16 @@ class CanLogDecoder:
     def flush(self) -> list[RawBlock]:
         """Frames of a sample that never became complete are nothing."""
         return []
+
+
+def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
+    """The decoder of a unit that reads CAN; None for others, which cannot read CAN logs.
+
+    Raises
+    ------
+    ConfigError
+        If DBC, settings and calibration do not fit together.
+    """
+    if not isinstance(unit.source, CanSourceSettings):
+        return None
+    return CanLogDecoder(can_settings_of(unit, unit.source), calibration_of(unit))

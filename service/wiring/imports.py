@@ -30,6 +30,7 @@ from service.settings.import_mapping import (
     TimeSettings,
 )
 from service.settings.units import UnitSettings
+from service.wiring.can_logs import log_decoder_of
 from service.wiring.recorded_units import recorded_unit
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -72,15 +73,12 @@ def import_recording(
     folder: Path,
     made_by: str,
     *,
-    decoder: FrameDecoder | None = None,
     advanced: Callable[[float], None] = lambda _: None,
 ) -> Manifest:
     """Read a foreign file into a recording of a unit.
 
     Parameters
     ----------
-    decoder
-        For CAN logs: what makes raw blocks of frames.
     advanced
         Told the share of the file that has been read.
 
@@ -91,6 +89,7 @@ def import_recording(
         behind then.
     """
     job = import_job(mapping, unit)
+    decoder = None if job.channels else log_decoder_of(unit)
     if not job.channels and decoder is None:
         raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is needed')
     with reading(path, job) as found:
