@@ -1,4 +1,4 @@
-"""What monitoring without conditions does: one band around the usual stiffness, whatever happens."""
+"""What monitoring without conditions does: one band around the usual stiffness, come what may."""
 
 from dataclasses import dataclass
 

@@ -11,16 +11,20 @@ from acquisition.simulated.life.damage import Damage
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.life_truth import UnitLife
 from benchmarks.detection_fixed import BANDS, FixedThreshold
+from core.arrays import FloatArray
 from core.baseline.baseline import Origin, QuantityBaseline, Watched
 from core.baseline.learning import learn
+from core.baseline.response import MEAN_READINGS, Place, learn_response, place_columns
 from core.baseline.settings import BaselineSettings
+from core.baseline.watched import watched_values
+from core.condition.film_conditions import FilmConditions
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
-from core.decision.attribution import Attribution, Place, attribute
+from core.decision.attribution import Attribution, attribute
 from core.decision.back_test import DecisionHistory, back_test
 from core.decision.limits import ChangeLimits
-from core.decision.movement import movements_at
 from core.decision.verdict import JUDGED
+from core.rotor_parameters import RotorParameters
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
 
 DAY_NS = 86_400 * 10**9
@@ -29,6 +33,7 @@ START_NS = 19_723 * DAY_NS
 
 YEARS = 2.0
 LEARNING_DAYS = 365
+BRACKETS_N_PER_M = {b.bearing: b.stiffness_n_per_m for b in RotorParameters().brackets}
 SETTINGS = BaselineSettings()
 LIMITS = ChangeLimits()
 
@@ -56,10 +61,12 @@ class LearnedUnit:
         self.seed = seed
         life = live(seed, START_NS, YEARS)
         settled, n = _settled(life), _n_learning(life)
+        learning = {bearing: history.rows(0, n) for bearing, history in life.readings.items()}
         self.baselines = {
-            bearing: learn(history.rows(0, n), settled[:n], _origin(seed, bearing), SETTINGS)
-            for bearing, history in life.readings.items()
+            bearing: learn(history, settled[:n], _origin(seed, bearing), SETTINGS)
+            for bearing, history in learning.items()
         }
+        self.response = learn_response(learning, settled[:n])
         self.fixed = _fixed(life, settled, n)
         self.healthy = _later(life)
 
@@ -89,18 +96,19 @@ class LearnedUnit:
 
     def attribution(self, later: Later, place: Place, row: int) -> Attribution:
         """What a change at a place is put down to after a row."""
-        decided = self.decide(later, *place)
-        movements = {
-            (bearing, direction): movements_at(
-                later.histories[bearing].rows(0, row + 1),
-                later.is_settled[: row + 1],
-                self.baselines[bearing],
-                direction,
-                float(decided.time_scale_h[row]),
-            )
-            for bearing, direction in self.places()
-        }
-        return attribute(place, movements)
+        ln_k, ln_shaft = place_columns(later.histories)
+        deviation = np.stack([self._deviation(later, *other) for other in self.places()])
+        known = np.isfinite(deviation[self.places().index(place), : row + 1])
+        newest = np.flatnonzero(known)[-MEAN_READINGS:]
+        readings = (column[:, newest] for column in (ln_k, ln_shaft, deviation))
+        brackets = np.array([BRACKETS_N_PER_M[bearing] for bearing, _ in self.places()])
+        return attribute(place, self.response, *readings, brackets)
+
+    def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:
+        history, baseline = later.histories[bearing], self.stiffness(bearing, direction)
+        value, u_random = watched_values(history, Watched.STIFFNESS, direction)
+        found = baseline.compare(FilmConditions.of(history), value, u_random)
+        return np.where(later.is_settled, found.deviation, np.nan)
 
 
 def fixed_false_alarms(seed: int) -> tuple[float, list[int]]:

@@ -31,7 +31,7 @@ def learn(
     is_settled: npt.NDArray[np.bool_],
     origin: Origin,
     settings: BaselineSettings,
-    watched: tuple[Watched, ...] = tuple(Watched),
+    watched: tuple[Watched, ...] = (Watched.STIFFNESS,),
 ) -> BearingBaseline:
     """Learn what a bearing is like under each condition.
 

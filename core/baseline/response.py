@@ -1,0 +1,159 @@
+"""How shaft motion at 1× answers to stiffness, learned from a healthy machine.
+
+Which conditions it meets makes a machine's films four times stiffer or softer and back, so that its
+healthy readings show how far the shaft moves for any stiffness of its bearings. A film that is
+damaged moves it as any film of its stiffness does; a bracket or transducer that changes what is
+measured does not. What unbalance does is common to all places: only the share of each place in the
+geometric mean of all is learned.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.baseline.robust import bisquare, robust_std
+from core.stiffness_history import DIRECTIONS, StiffnessHistory
+
+Place: TypeAlias = tuple[str, str]
+"""Bearing and direction."""
+
+MEAN_READINGS = 24
+"""Readings that are averaged before a response is judged: four hours."""
+
+LEAST_MEANS = 50
+"""Averages that must be there to learn from."""
+
+ROUNDS = 6
+RIDGE = 1e-6
+LEAST_STD = 1e-4
+
+
+@dataclass(frozen=True)
+class ShaftResponse:
+    """Share of each place in the shaft's motion, as a quadratic function of all stiffnesses.
+
+    Parameters
+    ----------
+    places
+        Bearings and directions, in the order of everything else.
+    centre
+        ln of a typical stiffness of each.
+    coefficients
+        (n_places, n_terms)
+    std
+        What means of `MEAN_READINGS` of each place scatter by, in ln.
+    """
+
+    places: tuple[Place, ...]
+    centre: tuple[float, ...]
+    coefficients: tuple[tuple[float, ...], ...]
+    std: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.places)
+        shape = [len(row) for row in self.coefficients]
+        if len(self.centre) != n or len(self.std) != n or shape != [_n_terms(n)] * n:
+            raise ValueError(f"coefficients: not {n} by {_n_terms(n)}, or centre or std not {n}")
+        if not all(std > 0.0 for std in self.std):
+            raise ValueError(f"std: {self.std} must be above 0")
+
+    @cached_property
+    def _coefficients(self) -> FloatArray:
+        return np.array(self.coefficients)
+
+    def expected(self, ln_k: FloatArray) -> FloatArray:
+        """Ln of the shaft's motion at each place over the geometric mean of all.
+
+        Parameters
+        ----------
+        ln_k : (n_places, n)
+
+        Returns
+        -------
+        (n_places, n)
+        """
+        return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
+
+
+def learn_response(
+    histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
+) -> ShaftResponse | None:
+    """Learn from all bearings of a unit together.
+
+    Parameters
+    ----------
+    histories
+        By bearing, all at the same times.
+    is_settled : (n,)
+
+    Returns
+    -------
+    None if there are too few readings with stiffness and amplitude at every place.
+    """
+    places = tuple((bearing, direction) for bearing in histories for direction in DIRECTIONS)
+    ln_k, ln_shaft = place_columns(histories)
+    usable = is_settled & np.all(np.isfinite(ln_k) & np.isfinite(ln_shaft), axis=0)
+    if np.sum(usable) < LEAST_MEANS * MEAN_READINGS:
+        return None
+    ln_k, ln_shaft = ln_k[:, usable], ln_shaft[:, usable]
+    centre = np.median(ln_k, axis=1)
+    terms = _terms(ln_k - centre[:, np.newaxis])
+    shares = ln_shaft - np.mean(ln_shaft, axis=0)
+    fitted = [_fit(terms, share) for share in shares]
+    residual = shares - np.array(fitted) @ terms
+    return ShaftResponse(
+        places,
+        tuple(centre.tolist()),
+        tuple(tuple(row.tolist()) for row in fitted),
+        tuple(max(_mean_std(row), LEAST_STD) for row in residual),
+    )
+
+
+def place_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
+    """Ln of stiffness and of shaft motion at every place: (n_places, n) each.
+
+    Raises
+    ------
+    ValueError
+        If the histories are not all at the same times.
+    """
+    first = next(iter(histories.values()))
+    for bearing, history in histories.items():
+        if not np.array_equal(history.time_ns, first.time_ns):
+            raise ValueError(f"readings of {bearing} are not at the times of the other bearings")
+    ln_k = np.concatenate([history.ln_k for history in histories.values()])
+    shaft = np.concatenate([history.shaft_um_pk for history in histories.values()])
+    return ln_k, np.log(np.where(shaft > 0.0, shaft, np.nan))
+
+
+def _n_terms(n_places: int) -> int:
+    return 1 + n_places + n_places * (n_places + 1) // 2
+
+
+def _terms(x: FloatArray) -> FloatArray:
+    """(n_terms, n): 1, every x, every product of two."""
+    first, second = np.triu_indices(x.shape[0])
+    return np.concatenate([np.ones((1, x.shape[1])), x, x[first] * x[second]])
+
+
+def _fit(terms: FloatArray, share: FloatArray) -> FloatArray:
+    weight = np.ones(share.size)
+    coefficients = np.zeros(terms.shape[0])
+    for _ in range(ROUNDS):
+        weighted = terms * weight
+        normal = weighted @ terms.T + RIDGE * share.size * np.eye(terms.shape[0])
+        coefficients = np.asarray(np.linalg.solve(normal, weighted @ share), np.float64)
+        residual = share - coefficients @ terms
+        weight = bisquare(residual / max(robust_std(residual), LEAST_STD))
+    return coefficients
+
+
+def _mean_std(residual: FloatArray) -> float:
+    n = residual.size // MEAN_READINGS
+    means = residual[: n * MEAN_READINGS].reshape(n, MEAN_READINGS).mean(axis=1)
+    return robust_std(np.asarray(means))
