@@ -22,7 +22,7 @@ class ModbusLinkSettings(Settings):
     simulated DAQ, which then makes one."""
 
     baudrate: Annotated[int, Field(ge=1200, le=4_000_000)] = 115_200
-    """Bits per second of the serial line; 12 channels of 600 Hz need at least 230400."""
+    """Bits per second of the serial line; 12 channels at 600 Hz need 460800."""
 
     parity: Literal["none", "even", "odd"] = "even"
     """Parity of the serial line."""
