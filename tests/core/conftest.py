@@ -97,7 +97,8 @@ def film_life() -> FilmLife:
         bearing = shaft + film - np.log(1.18e9) + ln_gain
         one, pair = np.ones(hours.size), np.ones((2, hours.size))
         columns = {
-            "time_ns": np.int64(1_700_000_000_000_000_000) + np.arange(hours.size) * 600_000_000_000,
+            "time_ns": np.int64(1_700_000_000_000_000_000)
+            + np.arange(hours.size) * 600_000_000_000,
             "speed_rpm": 92.3 * one,
             "power_mw": power_mw,
             "eccentricity_ratio": e + random.normal(0.0, 0.003, hours.size),
