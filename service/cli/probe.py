@@ -17,10 +17,11 @@ from service.cli.plant_file import fail, read_plant_file
 from service.cli.probe_can import can
 from service.cli.units import UnitOption, one_unit
 from service.probing import RegisterLook, ValueLook, looks, value_looks
-from service.settings.map_file import MapFileError, load_map_file
+from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_map import RegisterMapSettings
 from service.settings.modbus_sources import MappedDeviceSettings
+from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 from service.wiring.probes import identify_once, read_map_once, read_once
 
@@ -158,7 +159,7 @@ def _place(
 def _map_of(path: Path) -> RegisterMapSettings:
     try:
         return load_map_file(path)
-    except MapFileError as error:
+    except TomlFileError as error:
         fail(str(error), code=2)
 
 

@@ -12,10 +12,11 @@ from acquisition.registers.register_map import RegisterMap
 from core.vector_rows import VectorPart, VectorRow
 from core.vector_settings import VectorSettings
 from service.settings.base import MisfitError
-from service.settings.map_file import MapFileError, load_map_file
+from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_map import RegisterMapSettings
 from service.settings.response import FOLDER
+from service.settings.toml_file import TomlFileError
 
 MIN_STALE_POLLS = 2
 
@@ -56,7 +57,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
             raise MisfitError('give either a [map] table or "map_file"', "map_file")
         try:
             return load_map_file(folder / self.map_file)
-        except MapFileError as error:
+        except TomlFileError as error:
             mistakes = str(error).replace("\n", "; ")
             raise MisfitError(f"names a map that cannot be used: {mistakes}", "map_file") from error
 

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,8 +22,13 @@ class TomlFileError(Exception):
     """A file that cannot be used; the message has one line for each mistake."""
 
 
-def load_toml(path: Path, model: type[Model]) -> Model:
+def load_toml(path: Path, model: type[Model], tags: Sequence[str] = ()) -> Model:
     """Read and check a file.
+
+    Parameters
+    ----------
+    tags
+        What pydantic puts into a place for the kinds of a union, and the file does not have.
 
     Raises
     ------
@@ -39,7 +45,7 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
-        raise TomlFileError("\n".join(_line(path, text, e) for e in mistakes)) from error
+        raise TomlFileError("\n".join(_line(path, text, e, tags) for e in mistakes)) from error
 
 
 def _read(path: Path) -> str:
@@ -56,12 +62,13 @@ def _read(path: Path) -> str:
         raise TomlFileError(f"{path}: not UTF-8 text at byte {error.start}") from error
 
 
-def _line(path: Path, text: str, error: ErrorDetails) -> str:
-    at: Location = tuple(error["loc"])
+def _line(path: Path, text: str, error: ErrorDetails, tags: Sequence[str]) -> str:
+    at: Location = tuple(part for part in error["loc"] if part not in tags)
     reason: Any = error.get("ctx", {}).get("error")
     at += reason.at if isinstance(reason, MisfitError) else ()
     key = "".join(f"[{p + 1}]" if isinstance(p, int) else f".{p}" for p in at).lstrip(".")
     words = str(reason) if isinstance(reason, MisfitError) else error["msg"]
     value = error["input"]
     shown = f" = {value!r}"[:_MAX_SHOWN] if isinstance(value, int | float | str) else ""
-    return f"{path}:{line_of(at, text)}: {key}{shown}: {words}"
+    said = f"{key}{shown}: {words}".replace("\n", "\\n")  # a key may hold anything
+    return f"{path}:{line_of(at, text)}: {said}"

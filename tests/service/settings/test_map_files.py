@@ -7,7 +7,8 @@ import pytest
 
 from acquisition.registers.decoding import MapDecoder
 from core.vector_rows import VectorPart, VectorRow
-from service.settings.map_file import MapFileError, load_map_file
+from service.settings.map_file import load_map_file
+from service.settings.toml_file import TomlFileError
 
 MAPS = Path(__file__).parents[3] / "deploy" / "maps"
 
@@ -50,7 +51,7 @@ def mistakes(tmp_path: Path) -> Callable[[str], str]:
     def load(text: str) -> str:
         path = tmp_path / "map.toml"
         path.write_text(text)
-        with pytest.raises(MapFileError) as refusal:
+        with pytest.raises(TomlFileError) as refusal:
             load_map_file(path)
         return str(refusal.value).replace(f"{tmp_path}/", "")
 
@@ -117,12 +118,12 @@ def test_a_wrong_map_is_refused_with_line_key_and_fix(mistakes, text: str, said:
 
 
 def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(MapFileError, match="No such file"):
+    with pytest.raises(TomlFileError, match="No such file"):
         load_map_file(tmp_path / "absent.toml")
     path = tmp_path / "map.toml"
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(MapFileError, match="not UTF-8"):
+    with pytest.raises(TomlFileError, match="not UTF-8"):
         load_map_file(path)
     path.write_bytes(b"#" * 1_000_001)
-    with pytest.raises(MapFileError, match="larger than"):
+    with pytest.raises(TomlFileError, match="larger than"):
         load_map_file(path)
