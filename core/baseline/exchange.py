@@ -5,20 +5,16 @@ from dataclasses import asdict
 from typing import Any
 
 from core.baseline.baseline import BearingBaseline
+from core.baseline.response import ShaftResponse
 from core.baseline.strict import decode
 
-FORMAT = "padwatch-baseline"
+BASELINE, RESPONSE = "padwatch-baseline", "padwatch-shaft-response"
 FORMAT_VERSION = 1
 
 
 def to_json(baseline: BearingBaseline) -> str:
     """Write a baseline; `from_json` gives an equal one."""
-    content = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "baseline": asdict(baseline),
-    }
-    return json.dumps(content, allow_nan=False)
+    return _written(BASELINE, baseline)
 
 
 def from_json(text: str) -> BearingBaseline:
@@ -30,19 +26,39 @@ def from_json(text: str) -> BearingBaseline:
         If it is not JSON, of another format, or a key is missing, unknown, twice there or of the
         wrong kind; the message says where.
     """
-    try:
-        content = json.loads(text, object_pairs_hook=_no_twice, parse_constant=_no_constant)
-    except RecursionError as error:
-        raise ValueError("nested too deeply for a baseline") from error
-    if not isinstance(content, dict) or set(content) != {"format", "format_version", "baseline"}:
-        raise ValueError("not a baseline: expected keys format, format_version and baseline")
-    if (content["format"], content["format_version"]) != (FORMAT, FORMAT_VERSION):
-        raise ValueError(
-            f"format {content['format']!r} version {content['format_version']!r}:"
-            f" expected {FORMAT!r} version {FORMAT_VERSION}"
-        )
-    baseline: BearingBaseline = decode(BearingBaseline, content["baseline"], "baseline")
+    baseline: BearingBaseline = decode(BearingBaseline, _content(text, BASELINE), "content")
     return baseline
+
+
+def response_to_json(response: ShaftResponse) -> str:
+    """Write the response of a shaft; `response_from_json` gives an equal one."""
+    return _written(RESPONSE, response)
+
+
+def response_from_json(text: str) -> ShaftResponse:
+    """Read the response of a shaft; raises as `from_json` does."""
+    response: ShaftResponse = decode(ShaftResponse, _content(text, RESPONSE), "content")
+    return response
+
+
+def _written(name: str, value: Any) -> str:
+    content = {"format": name, "format_version": FORMAT_VERSION, "content": asdict(value)}
+    return json.dumps(content, allow_nan=False)
+
+
+def _content(text: str, name: str) -> object:
+    try:
+        whole = json.loads(text, object_pairs_hook=_no_twice, parse_constant=_no_constant)
+    except RecursionError as error:
+        raise ValueError(f"nested too deeply for a {name}") from error
+    if not isinstance(whole, dict) or set(whole) != {"format", "format_version", "content"}:
+        raise ValueError(f"not a {name}: expected keys format, format_version and content")
+    if (whole["format"], whole["format_version"]) != (name, FORMAT_VERSION):
+        raise ValueError(
+            f"format {whole['format']!r} version {whole['format_version']!r}:"
+            f" expected {name!r} version {FORMAT_VERSION}"
+        )
+    return whole["content"]
 
 
 def _no_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

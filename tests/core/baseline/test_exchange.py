@@ -33,7 +33,7 @@ def change(content: Any, path: list[str | int], value: object) -> None:
         content[path[-1]] = value
 
 
-FIRST = ["baseline", "quantities", 0]
+FIRST = ["content", "quantities", 0]
 
 
 @pytest.mark.parametrize(
@@ -41,10 +41,10 @@ FIRST = ["baseline", "quantities", 0]
     [
         (["format"], "spectrum", "expected 'padwatch-baseline'"),
         (["format_version"], 2, "expected 'padwatch-baseline' version 1"),
-        (["baseline", "origin", "author"], KeyError, "baseline.origin: expected .* author"),
-        (["baseline", "origin", "auther"], "Ada", "baseline.origin: expected"),
-        (["baseline", "origin", "version"], "3", "baseline.origin.version: '3'"),
-        (["baseline", "origin", "version"], True, "baseline.origin.version: True"),
+        (["content", "origin", "author"], KeyError, "content.origin: expected .* author"),
+        (["content", "origin", "auther"], "Ada", "content.origin: expected"),
+        (["content", "origin", "version"], "3", "content.origin.version: '3'"),
+        (["content", "origin", "version"], True, "content.origin.version: True"),
         ([*FIRST, "direction"], "z", r"quantities\[0\]: direction = 'z'"),
         ([*FIRST, "quantity"], "colour", r"quantities\[0\].quantity: 'colour' is not one of"),
         ([*FIRST, "scatter"], -1.0, r"quantities\[0\]: scatter = -1"),
