@@ -85,7 +85,8 @@ def _slow_value(reading: Reading | None, channel: SlowCalibration) -> float:
     if reading is None or reading.quality.reason is Reason.NOT_MEASURED:
         return math.nan
     if reading.value is None:
-        return math.nextafter(channel.maximum, math.inf)
+        # the next one that single precision, in which slow values travel, can tell from it
+        return float(np.nextafter(np.float32(channel.maximum), np.float32(np.inf)))
     return reading.value
 
 
