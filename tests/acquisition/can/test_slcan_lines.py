@@ -25,13 +25,20 @@ class Wire:
         path = os.ttyname(self._slave)
         self.bus = open_slcan(path, ids, listen_only=True, sleep_after_open=0.0)
         os.read(self._master, 100)
+        os.set_blocking(self._master, False)
+        self._early: list[can.Message] = []
         self.say(answer)
 
     def say(self, data: bytes) -> None:
-        os.write(self._master, data)
+        """Write all of it; a line that is full is read meanwhile."""
+        while data:
+            try:
+                data = data[os.write(self._master, data) :]
+            except BlockingIOError:
+                self._early = self.heard()
 
     def heard(self) -> list[can.Message]:
-        messages = []
+        messages, self._early = self._early, []
         while (message := self.bus.recv(0.01)) is not None:
             messages.append(message)
         return messages
