@@ -52,7 +52,7 @@ def transport_of(server) -> TcpTransport | SerialTransport:
 
 def source_of(server, calibration: UnitCalibration) -> ModbusRingSource:
     transport = transport_of(server)
-    timeout_s = 5.0 if isinstance(transport, TcpTransport) else 0.3
+    timeout_s = 5.0 if isinstance(transport, TcpTransport) else 0.6
     settings = ModbusRingSettings(transport=transport, poll_period_s=0.0001, timeout_s=timeout_s)
     return ModbusRingSource(settings, calibration, SystemClock())
 

@@ -92,7 +92,7 @@ class _OnTcp(_Rig):
 
 class _OnRtu(_Rig):
     absence = r"/line: No such file or directory"
-    timeout_s = 0.3
+    timeout_s = 0.6
 
     def _serve(self, device: ModbusDevice) -> ModbusServer:
         return ModbusRtuServer(device, link=Path(self._folder.name) / "line")
