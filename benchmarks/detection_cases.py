@@ -191,7 +191,7 @@ class Outside:
     no_baseline_share: float
 
 
-OUTSIDE_DAYS, OIL_OFFSET_C = 8.0, 12.0
+OUTSIDE_DAYS, OIL_OFFSET_C = 8.0, 20.0
 
 
 def leave_support(

@@ -179,7 +179,7 @@ class QuantityBaseline:
         std = self.table.surface_std[cell]
         if not self.surface.shape.has_attitude:
             return std
-        then = replace(conditions, attitude_deg=self.table.attitude_deg[cell])
+        then = replace(conditions, attitude_deg=self.table.middle.attitude_deg[cell])
         turned = attitude_terms(conditions) - attitude_terms(then)
         covariance = np.array(self.attitude_covariance)
         variance = std**2 + np.maximum(np.sum(turned * (covariance @ turned), axis=0), 0.0)

@@ -1,63 +1,75 @@
-"""How far readings stray in each cell.
+"""How far means of a day stray in each cell.
 
 From a surface that has not seen them, and not alike everywhere: an error of the shaft's position
-counts for more where stiffness rises steeply with eccentricity. A cell with few days leans on those
-of the same eccentricity, and these on all.
+counts for more where stiffness rises steeply with eccentricity. A cell with few days leans on what
+the slope of the surface makes of it: a² + b² slope², with a and b from all cells.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import nnls
 
 from core.arrays import FloatArray
 from core.baseline.cell_table import CellTable
 from core.baseline.groups import group_medians
-from core.baseline.robust import STD_PER_MAD
+from core.baseline.robust import STD_PER_MAD, robust_std
 
 PRIOR_DAYS = 20.0
-"""Days that the wider scatter counts for. What strays, strays for days: twenty are few."""
+"""Days that the slope's word counts for. What strays, strays for days: twenty are few."""
+
+MOST_STDS = 3.0
+"""Deviations beyond this are taken for this, that wrong ones decide nothing."""
 
 LEAST_SCATTER = 1e-6
 
 
 def with_scatter(
-    table: CellTable, place: npt.NDArray[np.int64], deviation: FloatArray
+    table: CellTable,
+    slope: FloatArray,
+    place: npt.NDArray[np.int64],
+    day: npt.NDArray[np.int64],
+    deviation: FloatArray,
 ) -> CellTable:
     """The table with the scatter of every cell.
 
     Parameters
     ----------
-    place, deviation : (n,)
-        Of readings: cell in the table, and deviation.
+    slope : (n_cells,)
+        Of the surface with eccentricity, in the middle of each cell.
+    place, day, deviation : (n,)
+        Of readings: cell in the table, day and deviation.
     """
     if place.size == 0:
         return table
-    size = np.abs(deviation)
-    n_days = np.array([cell.n_days for cell in table.cells], np.float64)
-    bins, of_cell = np.unique([cell.cell[0] for cell in table.cells], return_inverse=True)
-    alike_days = np.bincount(of_cell, n_days).astype(np.float64)
-    overall = np.full(bins.size, STD_PER_MAD * float(np.median(size)))
-    alike = _drawn(_stds(size, of_cell[place], bins.size), alike_days, overall)
-    each = _drawn(_stds(size, place, n_days.size), n_days, alike[of_cell])
+    place, mean = _daily(place, day, deviation)
+    expected = _by_slope(slope, place, mean)
+    own, n_days = np.zeros(slope.size), np.zeros(slope.size)
+    seen, numbered = np.unique(place, return_inverse=True)
+    own[seen] = STD_PER_MAD * group_medians(np.abs(mean), numbered)
+    n_days[seen] = np.bincount(numbered)
+    variance = (n_days * own**2 + PRIOR_DAYS * expected**2) / (n_days + PRIOR_DAYS)
     return CellTable(
         tuple(
             replace(cell, scatter=max(float(scatter), LEAST_SCATTER))
-            for cell, scatter in zip(table.cells, each, strict=True)
+            for cell, scatter in zip(table.cells, np.sqrt(variance), strict=True)
         )
     )
 
 
-def _stds(size: FloatArray, group: npt.NDArray[np.int64], n_groups: int) -> FloatArray:
-    """(n_groups,) robust standard deviation; NaN of a group without readings."""
-    found = np.full(n_groups, np.nan)
-    present, numbered = np.unique(group, return_inverse=True)
-    found[present] = STD_PER_MAD * group_medians(size, numbered)
-    return found
+def _daily(
+    place: npt.NDArray[np.int64], day: npt.NDArray[np.int64], deviation: FloatArray
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Cell and mean deviation of each day in each cell: what averaging leaves."""
+    keys, group = np.unique(np.vstack([place, day]), axis=1, return_inverse=True)
+    group = group.reshape(-1)
+    return keys[0], np.asarray(np.bincount(group, deviation) / np.bincount(group))
 
 
-def _drawn(std: FloatArray, days: FloatArray, wider: FloatArray) -> FloatArray:
-    """Scatter drawn towards the wider one, the more the fewer days there are."""
-    days = np.where(np.isnan(std), 0.0, days)
-    own = np.nan_to_num(std)
-    return np.asarray(np.sqrt((days * own**2 + PRIOR_DAYS * wider**2) / (days + PRIOR_DAYS)))
+def _by_slope(slope: FloatArray, place: npt.NDArray[np.int64], mean: FloatArray) -> FloatArray:
+    """(n_cells,) scatter as a function of the slope alone."""
+    most = MOST_STDS * robust_std(mean)
+    design = np.stack([np.ones(mean.size), slope[place] ** 2], axis=1)
+    (constant, per_slope), _ = nnls(design, np.minimum(np.abs(mean), most) ** 2)
+    return np.asarray(np.sqrt(constant + per_slope * slope**2))

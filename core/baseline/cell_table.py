@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.condition.cells import Cell, CellArray
+from core.condition.film_conditions import FilmConditions
 
 
 class Support(StrEnum):
@@ -33,8 +34,8 @@ class CellStatistics:
         where there are few days.
     surface_std
         Standard uncertainty of the surface in the middle of what the cell has seen.
-    attitude_deg
-        Mean attitude angle there; zero where it is not known.
+    eccentricity_ratio, oil_temperature_c, attitude_deg
+        That middle; an attitude of zero where it is not known.
     """
 
     cell: Cell
@@ -43,6 +44,8 @@ class CellStatistics:
     location: float
     scatter: float
     surface_std: float
+    eccentricity_ratio: float
+    oil_temperature_c: float
     attitude_deg: float
     support: Support
 
@@ -88,9 +91,10 @@ class CellTable:
         return np.array([cell.surface_std for cell in self.cells], np.float64)
 
     @cached_property
-    def attitude_deg(self) -> FloatArray:
-        """(n_cells,)."""
-        return np.array([cell.attitude_deg for cell in self.cells], np.float64)
+    def middle(self) -> FilmConditions:
+        """The middle of what each cell has seen, (n_cells,)."""
+        rows = [(c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in self.cells]
+        return FilmConditions(*np.array(rows, np.float64).reshape(-1, 3).T)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

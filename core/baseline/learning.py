@@ -13,7 +13,7 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
 from core.baseline.cell_scatter import LEAST_SCATTER, with_scatter
 from core.baseline.fit import Fit, fit_surface, surface_shape
-from core.baseline.groups import Groups, group_readings
+from core.baseline.groups import DAY_NS, Groups, group_readings
 from core.baseline.held_out import held_out_deviations
 from core.baseline.settings import BaselineSettings
 from core.baseline.tabulate import tabulate
@@ -101,7 +101,8 @@ def _fitted(
     deviation = held_out_deviations(time_ns, conditions, value, groups, fit, table, settings)
     counted = np.isfinite(deviation)
     deviation, place = deviation[counted], table.find(grid.cells(conditions))[counted]
-    table = with_scatter(table, place, deviation)
+    slope = fit.surface.slope(table.middle, grid.eccentricity_width / 2.0)
+    table = with_scatter(table, slope, place, time_ns[counted] // DAY_NS, deviation)
     scatter = table.scatter[place]
     return QuantityBaseline(
         quantity=quantity,

@@ -60,7 +60,7 @@ class BaselineSettings:
     min_learning_days: int = 20
     knot_cells: float = 2.0
     bend_std: float = 0.1
-    time_scales_h: tuple[float, ...] = (4.0, 16.0, 64.0, 192.0)
+    time_scales_h: tuple[float, ...] = (4.0, 16.0, 64.0, 128.0)
     reading_h: float = 1.0 / 6.0
 
     def __post_init__(self) -> None:

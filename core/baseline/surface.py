@@ -1,6 +1,6 @@
 """A smooth surface over eccentricity and oil temperature: cubic B-splines on uniform knots."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -125,6 +125,14 @@ class Surface:
     @cached_property
     def _coefficients(self) -> FloatArray:
         return np.array(self.coefficients)
+
+    def slope(self, conditions: FilmConditions, step: float) -> FloatArray:
+        """(n,) rise with eccentricity ratio, over a step either way."""
+        up, down = (
+            self.at(replace(conditions, eccentricity_ratio=conditions.eccentricity_ratio + by))
+            for by in (step, -step)
+        )
+        return np.asarray((up - down) / (2.0 * step))
 
     def at(self, conditions: FilmConditions) -> FloatArray:
         """(n,) height at each point."""

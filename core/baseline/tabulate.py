@@ -71,6 +71,8 @@ def tabulate(
                 location=content.location,
                 scatter=max(fit.group_std, LEAST_SCATTER),  # until it is known
                 surface_std=float(std[row]),
+                eccentricity_ratio=content.eccentricity_ratio,
+                oil_temperature_c=content.oil_temperature_c,
                 attitude_deg=content.attitude_deg,
                 support=_support(cell, enough, between, std[row] <= settings.max_surface_std),
             )

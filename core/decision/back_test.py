@@ -118,8 +118,10 @@ def _level(
     findings: FindingHistory, limit: float, baseline: QuantityBaseline, limits: ChangeLimits
 ) -> _Bools:
     size, significance = np.abs(findings.change), findings.significance
-    is_passed = (size >= limit) & (significance >= limits.significance)
-    is_held = (size > limit - limits.deadband) & (significance > limits.holding_significance)
+    sure = np.array([[limits.sure_from(time_h)] for time_h in findings.time_scales_h])
+    sure = sure.reshape(-1, 1)
+    is_passed = (size >= limit) & (significance >= sure)
+    is_held = (size > limit - limits.deadband) & (significance > sure * limits.holding_share)
     return level_history(
         np.asarray(is_passed.any(axis=0)),
         np.asarray(is_held.any(axis=0)),

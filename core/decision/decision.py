@@ -159,8 +159,8 @@ def _judged(
     n_off = readings_of(limits.off_delay_h, baseline.reading_h)
     alert, danger = (
         timer.step(
-            any(is_passed(f.change, f.significance, change, limits) for f in findings),
-            any(is_held(f.change, f.significance, change, limits) for f in findings),
+            any(_is_passed(finding, change, limits) for finding in findings),
+            any(_is_held(finding, change, limits) for finding in findings),
             n_on,
             n_off,
             limits.is_latching,
@@ -175,14 +175,16 @@ def _judged(
     return replace(decision, verdict=_verdict(decision, baseline, limits))
 
 
-def is_passed(change: float, significance: float, limit: float, limits: ChangeLimits) -> bool:
+def _is_passed(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
     """Whether a change is large enough and sure."""
-    return abs(change) >= limit and significance >= limits.significance
+    is_sure = finding.significance >= limits.sure_from(finding.time_scale_h)
+    return is_sure and abs(finding.change) >= limit
 
 
-def is_held(change: float, significance: float, limit: float, limits: ChangeLimits) -> bool:
+def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
     """Whether it still is, with the deadband."""
-    return abs(change) > limit - limits.deadband and significance > limits.holding_significance
+    sure = limits.sure_from(finding.time_scale_h) * limits.holding_share
+    return finding.significance > sure and abs(finding.change) > limit - limits.deadband
 
 
 def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:

@@ -3,10 +3,14 @@
 import math
 from dataclasses import dataclass, fields
 
+REFERENCE_H = 4.0
+LEAST_SIGNIFICANCE = 3.0
+"""However long the time scale."""
+
 
 @dataclass(frozen=True)
 class ChangeLimits:
-    """Limits of the change of a film, in ln (0.03 is 3 %), either way.
+    """Limits of the change of a film, in ln (0.04 is 4 %), either way.
 
     Parameters
     ----------
@@ -15,8 +19,10 @@ class ChangeLimits:
     deadband
         How far below its limit a change must fall for a level to be left; significance must fall by
         the same share.
-    significance
-        Standard uncertainties that a mean deviation must be away from zero to be sure.
+    significance, significance_fall
+        Standard uncertainties that a mean deviation over four hours must be away from zero to be
+        sure, and by how much fewer are enough whenever the time is four times longer: long means
+        have fewer occasions to stray.
     min_evidence_h
         Running hours with a baseline before anything is called normal. A time scale counts from its
         own length on.
@@ -32,10 +38,11 @@ class ChangeLimits:
         deadband is not below the alert limit.
     """
 
-    alert_change: float = 0.03
+    alert_change: float = 0.04
     danger_change: float = 0.15
     deadband: float = 0.01
-    significance: float = 6.0
+    significance: float = 6.5
+    significance_fall: float = 0.7
     min_evidence_h: float = 4.0
     on_delay_h: float = 1.0
     off_delay_h: float = 8.0
@@ -57,6 +64,11 @@ class ChangeLimits:
             )
 
     @property
-    def holding_significance(self) -> float:
-        """Significance below which a level is left."""
-        return self.significance * (1.0 - self.deadband / self.alert_change)
+    def holding_share(self) -> float:
+        """Share of the significance below which a level is left."""
+        return 1.0 - self.deadband / self.alert_change
+
+    def sure_from(self, time_scale_h: float) -> float:
+        """Significance from which a mean over a time scale is sure."""
+        fall = self.significance_fall * math.log(time_scale_h / REFERENCE_H, 4.0)
+        return max(self.significance - fall, LEAST_SIGNIFICANCE)
