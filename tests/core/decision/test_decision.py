@@ -197,7 +197,7 @@ def test_time_cannot_stand_still(
         ("alert_change", 0.15),
         ("alert_change", float("nan")),
         ("danger_change", 0.0),
-        ("deadband", 0.03),
+        ("deadband", 0.04),
         ("deadband", -0.01),
         ("significance", float("inf")),
         ("on_delay_h", 0.0),
