@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from core.arrays import SampleArray
+from core.condition.bearing_condition import BearingCondition
 from core.cross_spectrum import CrossSpectrum
 from core.estimators import Estimator
 from core.quality import Quality, Reading
@@ -89,6 +90,8 @@ class Assessment:
     evidence
         Waveforms, or what a rack has made of them: then there is no coherence, and equation (5)
         cannot tell noise from motion.
+    condition
+        Under which condition it was found; None until the unit's operation has been looked at.
     """
 
     unit: str
@@ -104,3 +107,4 @@ class Assessment:
     orbit: OrbitTrace | None
     runout: Mapping[str, RunoutVerdict]
     evidence: Evidence = Evidence.WAVEFORMS
+    condition: BearingCondition | None = None
