@@ -1,0 +1,182 @@
+"""How films are compared with what they were like: conditions, baselines, limits of change."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from core.baseline.settings import BaselineSettings
+from core.condition.cells import CellGrid
+from core.condition.operating_limits import OperatingLimits
+from core.decision.limits import ChangeLimits
+from service.settings.base import MisfitError, Settings
+
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+"""Between 0 and 1, both excluded."""
+
+
+class ChangeLimitSettings(Settings):
+    """How large, how sure and how lasting a change of stiffness must be to be an alarm."""
+
+    alert_change: Share = ChangeLimits.alert_change
+    """Change of stiffness, either way, from which on it is an alert: 0.04 is 4 %, in ln."""
+
+    danger_change: Share = ChangeLimits.danger_change
+    """Change from which on it is a danger; must be above alert_change; example: 0.15."""
+
+    deadband: Share = ChangeLimits.deadband
+    """How far below its limit a change must fall for a level to be left; example: 0.01."""
+
+    significance: Annotated[float, Field(gt=0.0, le=100.0)] = ChangeLimits.significance
+    """Standard uncertainties that a mean change over four hours must be away from none."""
+
+    significance_fall: Annotated[float, Field(gt=0.0, le=10.0)] = ChangeLimits.significance_fall
+    """By how many fewer are enough whenever the time is four times as long."""
+
+    min_evidence_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.min_evidence_h
+    """Running hours with a baseline before a film is called normal."""
+
+    on_delay_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.on_delay_h
+    """Running hours that a change must last to count."""
+
+    off_delay_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.off_delay_h
+    """Running hours that it must be gone for to count no longer."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.alert_change >= self.danger_change:
+            raise MisfitError(f"must be above alert_change, {self.alert_change:g}", "danger_change")
+        if self.deadband >= self.alert_change:
+            raise MisfitError(f"must be below alert_change, {self.alert_change:g}", "deadband")
+        return self
+
+    def limits(self) -> ChangeLimits:
+        """As the decision takes them; the latch is the alarm's."""
+        return ChangeLimits(**self.model_dump())
+
+
+class BaselineModel(Settings):
+    """What a baseline needs to be learned."""
+
+    eccentricity_width: Annotated[float, Field(ge=0.005, le=0.5)] = CellGrid.eccentricity_width
+    """Width of a cell in eccentricity ratio; example: 0.05."""
+
+    temperature_width_c: Annotated[float, Field(ge=0.1, le=50.0)] = CellGrid.temperature_width_c
+    """Width of a cell in oil temperature, K; example: 2.5."""
+
+    attitude_width_deg: Annotated[float, Field(ge=1.0, le=360.0)] | None = None
+    """Width of a cell in attitude angle, degrees, a divisor of 360; without it the attitude does
+    not part cells."""
+
+    uses_attitude: bool = BaselineSettings.uses_attitude
+    """Whether stiffness may depend on the attitude angle, too."""
+
+    min_readings: Annotated[int, Field(ge=1, le=100_000)] = BaselineSettings.min_readings
+    """Readings below which a cell knows nothing by itself."""
+
+    min_days: Annotated[int, Field(ge=1, le=1000)] = BaselineSettings.min_days
+    """Days with readings below which a cell knows nothing by itself."""
+
+    min_learning_days: Annotated[int, Field(ge=1, le=3650)] = BaselineSettings.min_learning_days
+    """Days with readings before there is a baseline at all."""
+
+    max_surface_std: Annotated[float, Field(gt=0.0, le=1.0)] = BaselineSettings.max_surface_std
+    """Uncertainty of what is expected, in ln, above which a condition counts as never seen."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        turn = 360.0 / (self.attitude_width_deg or 360.0)
+        if abs(turn - round(turn)) > 1e-9:
+            raise MisfitError("must divide 360", "attitude_width_deg")
+        return self
+
+    def settings(self) -> BaselineSettings:
+        """As learning takes them."""
+        rest = self.model_dump(exclude=set(GRID_KEYS))
+        return BaselineSettings(grid=CellGrid(*(getattr(self, key) for key in GRID_KEYS)), **rest)
+
+
+GRID_KEYS = ("eccentricity_width", "temperature_width_c", "attitude_width_deg")
+"""Keys that shape the cells, in the order of `CellGrid`."""
+
+
+class OperatingModel(Settings):
+    """At which shares of rated speed and power an operating state begins."""
+
+    standing_below: Share = OperatingLimits.standing_below
+    """Share of the rated speed below which a unit stands still."""
+
+    at_speed_above: Share = OperatingLimits.at_speed_above
+    """Share of the rated speed above which it is at speed."""
+
+    loaded_above: Share = OperatingLimits.loaded_above
+    """Share of the rated power above which it is at part load."""
+
+    full_load_above: Share = OperatingLimits.full_load_above
+    """Share of the rated power above which it is at full load."""
+
+    speed_hysteresis: Share = OperatingLimits.speed_hysteresis
+    """How far beyond a limit a speed must be to count as beyond, as a share of the rated one."""
+
+    power_hysteresis: Share = OperatingLimits.power_hysteresis
+    """The same for power."""
+
+    settling_s: Annotated[float, Field(gt=0.0, le=86_400.0)] = OperatingLimits.settling_s
+    """Time in one state before films are compared, s."""
+
+    warm_up_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.warm_up_s
+    """Time at speed before they are, s: clearances close for hours after a start."""
+
+    longest_gap_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.longest_gap_s
+    """Time without results after which nothing is known of what the unit did, s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for lower, upper, band in BANDS:
+            low, high, width = (getattr(self, key) for key in (lower, upper, band))
+            if not (width < low and low + width < high - width):
+                limits = f"{lower} = {low:g} must be above {band} = {width:g} and below {upper}"
+                raise MisfitError(f"{limits} = {high:g} by more than twice that", lower)
+        return self
+
+    def limits(self, rated_speed_rpm: float, rated_power_mw: float) -> OperatingLimits:
+        """Limits of a machine."""
+        return OperatingLimits(rated_speed_rpm, rated_power_mw, **self.model_dump())
+
+
+BANDS = (
+    ("standing_below", "at_speed_above", "speed_hysteresis"),
+    ("loaded_above", "full_load_above", "power_hysteresis"),
+)
+
+
+class FilmAlarmSettings(Settings):
+    """Baselines of stiffness by operating condition, and alarms of its change."""
+
+    reading_period_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 600.0
+    """How often a reading is taken in, s; not less than averages take to be new ones."""
+
+    time_lapse: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
+    """For demonstrations only: how many times as fast running hours pass for the decision."""
+
+    learning_days: Annotated[float, Field(ge=1.0, le=3650.0)] = 365.0
+    """How long a baseline is learned after the first reading or a machine event, days: seasons
+    belong to what a healthy film is like. Afterwards it stands still until an engineer renews it."""
+
+    learn_every_days: Annotated[float, Field(ge=0.01, le=365.0)] = 7.0
+    """How often it is learned again in that time, days."""
+
+    acceptance: Literal["automatic", "by_engineer"] = "automatic"
+    """Whether a learned baseline is put in force by padwatch ("automatic"), as long as it agrees
+    with the one before, or only "by_engineer"."""
+
+    latching: bool = False
+    """Whether an alarm stays until it is reset after its change has gone."""
+
+    change: ChangeLimitSettings = ChangeLimitSettings()
+    """Limits of change."""
+
+    baseline: BaselineModel = BaselineModel()
+    """What learning needs."""
+
+    operating: OperatingModel = OperatingModel()
+    """Operating states."""
