@@ -33,6 +33,8 @@ class AlarmKind(StrEnum):
     SHAFT_X = "order1_shaft_x"
     SHAFT_Y = "order1_shaft_y"
     OIL_TEMPERATURE = "oil_temperature"
+    STIFFNESS_X = "stiffness_x"
+    STIFFNESS_Y = "stiffness_y"
     CLOCK_OFFSET = "clock_offset"
     CLOCK_DRIFT = "clock_drift"
     TIME_STAMPS = "time_stamps"

@@ -65,6 +65,8 @@ class UnitRules:
         Of slow channels that a limit needs; another device may deliver them, and later.
     bearings
         By bearing; one that is not there has no limits.
+    films
+        Of changes of each film's stiffness, which are decided elsewhere; None if they are not.
     clock, link
         None if the device's clock or its link is not judged, as in a replay.
     """
@@ -72,5 +74,6 @@ class UnitRules:
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
     slow_channel: AlarmRule = field(default_factory=lambda: rule_of(5.0, 10.0))
     bearings: dict[str, BearingRules] = field(default_factory=dict)
+    films: AlarmRule | None = None
     clock: ClockRules | None = field(default_factory=ClockRules)
     link: AlarmRule | None = field(default_factory=lambda: rule_of(10.0, 0.0))

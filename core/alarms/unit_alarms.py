@@ -1,6 +1,6 @@
 """`UnitAlarms`: all alarms of one unit, and what samples, results, links and people do to them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm, AlarmKind, AlarmRule, Condition, unknown
@@ -92,6 +92,26 @@ class UnitAlarms:
         for warmth in self._watched.temperatures:
             self._compare(warmth, block.slow.get(warmth.source, NOT_THERE), block.stop_ns)
         self._take_clock(block, host_ns)
+        return self._told()
+
+    def films(self, conditions: Mapping[str, Condition], now_ns: int) -> list[AlarmNews]:
+        """Take in what was decided about films.
+
+        Parameters
+        ----------
+        conditions
+            By alarm.
+        now_ns
+            Time of the samples that it was decided by.
+
+        Raises
+        ------
+        KeyError
+            If the unit has no such alarm about a film.
+        """
+        films = {watch.id: watch for watch in self._watched.films}
+        for id_, condition in conditions.items():
+            self._apply(films[id_], condition, now_ns)
         return self._told()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:

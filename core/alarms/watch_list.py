@@ -53,12 +53,15 @@ class WatchList:
         By bearing, to be compared with its readings.
     temperatures
         To be compared with slow channels.
+    films
+        Of each bearing and direction; somebody else judges them.
     """
 
     channels: tuple[Watch, ...]
     slow_channels: tuple[Watch, ...]
     amplitudes: dict[str, tuple[LimitWatch, ...]]
     temperatures: tuple[LimitWatch, ...]
+    films: tuple[Watch, ...]
     offset: LimitWatch | None
     drift: LimitWatch | None
     stamps: Watch | None
@@ -74,6 +77,7 @@ class WatchList:
             *self.slow_channels,
             *of_bearings,
             *self.temperatures,
+            *self.films,
             *of_unit,
         ]
 
@@ -87,6 +91,7 @@ def watch_list(unit: Unit, rules: UnitRules) -> WatchList:
         slow_channels=tuple(_channel(unit, source, rules.slow_channel) for source in sources),
         amplitudes={bearing.id: _amplitudes(unit, bearing.id, rules) for bearing in unit.bearings},
         temperatures=temperatures,
+        films=_films(unit, rules.films),
         offset=_offset(unit, rules.clock),
         drift=_drift(unit, rules.clock),
         stamps=_stamps(unit, rules.clock),
@@ -121,6 +126,16 @@ def _stamps(unit: Unit, clock: ClockRules | None) -> Watch | None:
 
 def _link(unit: Unit, rule: AlarmRule | None) -> Watch | None:
     return Watch(_identity(unit, LINK, AlarmKind.LINK_LOST), rule, LINK) if rule else None
+
+
+def _films(unit: Unit, rule: AlarmRule | None) -> tuple[Watch, ...]:
+    if rule is None:
+        return ()
+    return tuple(
+        Watch(_identity(unit, bearing.id, kind), rule, bearing.id)
+        for bearing in unit.bearings
+        for kind in (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
+    )
 
 
 def _amplitudes(unit: Unit, bearing: str, rules: UnitRules) -> tuple[LimitWatch, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState
+from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState, Condition
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Action
 from core.alarms.unit_alarms import UnitAlarms
@@ -86,6 +86,16 @@ class AlarmEngine:
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
         """Note whether samples of a unit arrive."""
         self._publish(self._units[unit].link(is_connected, reason, self._clock.now_ns()))
+
+    def films(self, unit: str, conditions: Mapping[str, Condition], now_ns: int) -> None:
+        """Take in what was decided about films of a unit, by alarm.
+
+        Parameters
+        ----------
+        now_ns
+            Time of the samples that it was decided by.
+        """
+        self._publish(self._units[unit].films(conditions, now_ns))
 
     async def run(self) -> None:
         """Let time pass for lost links and for what is shelved, for ever."""

@@ -23,6 +23,8 @@ AlarmKindName = Literal[
     "order1_shaft_x",
     "order1_shaft_y",
     "oil_temperature",
+    "stiffness_x",
+    "stiffness_y",
     "clock_offset",
     "clock_drift",
     "time_stamps",

@@ -20,6 +20,8 @@ VALUE_UNITS = {
     AlarmKind.SHAFT_X: "µm 0-pk",
     AlarmKind.SHAFT_Y: "µm 0-pk",
     AlarmKind.OIL_TEMPERATURE: "°C",
+    AlarmKind.STIFFNESS_X: "1",
+    AlarmKind.STIFFNESS_Y: "1",
     AlarmKind.CLOCK_OFFSET: "s",
     AlarmKind.CLOCK_DRIFT: "ppm",
 }

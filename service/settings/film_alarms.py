@@ -89,10 +89,11 @@ class BaselineModel(Settings):
             raise MisfitError("must divide 360", "attitude_width_deg")
         return self
 
-    def settings(self) -> BaselineSettings:
-        """As learning takes them."""
+    def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
+        """As learning takes them, for readings that stand for so many running hours."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
-        return BaselineSettings(grid=CellGrid(*(getattr(self, key) for key in GRID_KEYS)), **rest)
+        grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
+        return BaselineSettings(grid=grid, reading_h=reading_h, **rest)
 
 
 GRID_KEYS = ("eccentricity_width", "temperature_width_c", "attitude_width_deg")
@@ -160,7 +161,7 @@ class FilmAlarmSettings(Settings):
 
     learning_days: Annotated[float, Field(ge=1.0, le=3650.0)] = 365.0
     """How long a baseline is learned after the first reading or a machine event, days: seasons
-    belong to what a healthy film is like. Afterwards it stands still until an engineer renews it."""
+    belong to what a healthy film is like. Then it stands still until an engineer renews it."""
 
     learn_every_days: Annotated[float, Field(ge=0.01, le=365.0)] = 7.0
     """How often it is learned again in that time, days."""
@@ -180,3 +181,17 @@ class FilmAlarmSettings(Settings):
 
     operating: OperatingModel = OperatingModel()
     """Operating states."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        shortest_s = 3600.0 * BaselineSettings().time_scales_h[0] / self.time_lapse
+        if self.reading_period_s >= shortest_s:
+            raise MisfitError(
+                f"must be below {shortest_s:g}, the shortest mean", "reading_period_s"
+            )
+        return self
+
+    @property
+    def reading_h(self) -> float:
+        """Running hours that a reading stands for."""
+        return self.reading_period_s * self.time_lapse / 3600.0

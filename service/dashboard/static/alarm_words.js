@@ -8,6 +8,8 @@ const KINDS = {
   order1_shaft_x: "Shaft vibration 1×, x",
   order1_shaft_y: "Shaft vibration 1×, y",
   oil_temperature: "Oil temperature",
+  stiffness_x: "Film stiffness changed, x",
+  stiffness_y: "Film stiffness changed, y",
   clock_offset: "Device clock off",
   clock_drift: "Device clock drifts",
   time_stamps: "Wrong time stamps",
@@ -51,7 +53,7 @@ const REASONS = {
   stamp_jumped: "time jumped",
 };
 
-const DECIMALS = { "µm 0-pk": 1, "°C": 1, s: 2, ppm: 0 };
+const DECIMALS = { 1: 3, "µm 0-pk": 1, "°C": 1, s: 2, ppm: 0 };
 
 export const kindWords = (kind) => KINDS[kind] ?? kind.replaceAll("_", " ");
 export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
