@@ -1,0 +1,1 @@
+"""Films watched reading by reading: what is measured of each, and what is said of it."""
