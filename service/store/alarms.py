@@ -14,6 +14,8 @@ from core.alarms.alarm import (
     Hold,
 )
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from service.store.outbox import insert_letters
+from service.store.outbox_port import Address, nobody
 from service.store.port import AlarmQuery, StoredEvent, StoreError
 
 ALARM_COLUMNS = (
@@ -49,10 +51,14 @@ SELECT_EVENTS = f"""
 """  # noqa: S608
 
 
-def insert_alarms(writer: sqlite3.Connection, news: Iterable[AlarmNews]) -> None:
-    """Add events and bring the alarms to what they are after them."""
+def insert_alarms(
+    writer: sqlite3.Connection, news: Iterable[AlarmNews], address: Address = nobody
+) -> None:
+    """Add events, queue what tells of them, and bring the alarms to what they are after them."""
     for told in news:
-        writer.executemany(INSERT_EVENT, [_event_row(event) for event in told.events])
+        for event in told.events:
+            if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
+                insert_letters(writer, event, address(told.alarm, event))
         writer.execute(UPSERT, _alarm_row(told.alarm))
 
 

@@ -10,6 +10,7 @@ from core.alarms.event import AlarmEvent, AlarmNews
 from core.assessment import Assessment
 from core.quality import Level, Reading
 from service.store.gap_reference import GapReference
+from service.store.outbox_port import Outbox
 
 
 class StoreError(Exception):
@@ -124,6 +125,11 @@ class StoredEvent:
 
 class Store(Protocol):
     """Durable results. What `append` has returned from is on the disk."""
+
+    @property
+    def outbox(self) -> Outbox:
+        """What is to be told to receivers, queued as events of alarms are appended."""
+        ...
 
     def append(
         self,

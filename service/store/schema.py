@@ -3,6 +3,7 @@
 import sqlite3
 
 from service.origin import Origin
+from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.port import StoreError
 
 APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
@@ -123,6 +124,7 @@ MIGRATIONS = (
     CREATE TRIGGER alarm_event_kept BEFORE DELETE ON alarm_event
     BEGIN SELECT RAISE(ABORT, 'events of alarms are kept'); END;
     """,
+    OUTBOX_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -17,6 +17,8 @@ from service.store.buckets import bucket_width_ns, bucketed, single_points
 from service.store.codec import Layout, columns_of
 from service.store.gap_reference import GapReference
 from service.store.newest import select_newest
+from service.store.outbox import SqliteOutbox
+from service.store.outbox_port import Address, nobody
 from service.store.port import (
     AlarmQuery,
     StoredEvent,
@@ -49,6 +51,8 @@ class SqliteStore:
         Created, with its folder, if it does not exist.
     origin
         What it is to hold; a file that holds the other is refused.
+    address
+        Who is to be told of events of alarms.
 
     Raises
     ------
@@ -56,9 +60,10 @@ class SqliteStore:
         If the file cannot be opened, is not padwatch's, is damaged, or is newer than this program.
     """
 
-    def __init__(self, path: Path, origin: Origin = Origin.LIVE) -> None:
-        self._path, self._origin = path, origin
+    def __init__(self, path: Path, origin: Origin = Origin.LIVE, address: Address = nobody) -> None:
+        self._path, self._origin, self._address = path, origin, address
         self._lock = Lock()
+        self.outbox = SqliteOutbox(self._writing, self._reader)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -93,7 +98,7 @@ class SqliteStore:
             rows = [self._row(assessment) for assessment in assessments]
             self._writer.executemany(INSERT_ASSESSMENT, rows)
             self._writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
-            insert_alarms(self._writer, alarms)
+            insert_alarms(self._writer, alarms, self._address)
 
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
@@ -208,6 +213,11 @@ class SqliteStore:
             # a full disk has rolled back already; a refused commit leaves the transaction open
             if self._writer.in_transaction:
                 self._writer.execute("ROLLBACK")
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with self._lock, self._renamed_errors(), self._transaction():
+            yield self._writer
 
     @contextmanager
     def _reader(self) -> Iterator[sqlite3.Connection]:

@@ -1,0 +1,220 @@
+"""Who is told of alarms: webhooks and e-mail in the plant file."""
+
+import re
+from typing import Annotated, Literal, Self
+from urllib.parse import urlsplit
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+from pydantic import Field, StringConstraints, model_validator
+
+from core.alarms.alarm import AlarmKind
+from core.alarms.event import AlarmChange
+from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
+
+TimeOfDay = Annotated[str, StringConstraints(pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$")]
+"""Hours and minutes, as in "22:00"."""
+
+MailAddress = Annotated[
+    str,
+    StringConstraints(
+        pattern=r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]{1,64}@[A-Za-z0-9]([A-Za-z0-9.-]{0,252})$"
+    ),
+]
+"""A plain address, without a name."""
+
+HostName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.:-]{1,253}$")]
+
+TimeoutS = Annotated[float, Field(gt=0.0, le=600.0)]
+
+PRINTABLE_URL = re.compile(r"^[!-~]+$")
+
+TOLD = (AlarmChange.RAISED, AlarmChange.ESCALATED, AlarmChange.EASED, AlarmChange.RETURNED)
+
+
+class SecretSettings(Settings):
+    """Where a secret is: it never stands in the plant file itself."""
+
+    file: Annotated[str, StringConstraints(min_length=1)] | None = None
+    """File that holds it and nothing else; read before every message, so that a new one is taken
+    over without a restart. Example: "/etc/padwatch/webhook.key"."""
+
+    env: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
+    """Environment variable that holds it; example: "PADWATCH_WEBHOOK_KEY"."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.file is None) == (self.env is None):
+            raise MisfitError("give either file or env", "file")
+        return self
+
+
+class QuietSettings(Settings):
+    """Hours in which what is no danger waits, every day; from start to end over midnight too."""
+
+    start: TimeOfDay
+    """When they begin; example: "22:00"."""
+
+    end: TimeOfDay
+    """When they end; example: "06:00"."""
+
+    time_zone: Annotated[str, StringConstraints(min_length=1, max_length=64)]
+    """Whose hours these are, by the IANA's name; example: "America/Asuncion"."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.start == self.end:
+            raise MisfitError("must differ from start", "end")
+        try:
+            ZoneInfo(self.time_zone)
+        except (ZoneInfoNotFoundError, ValueError, OSError) as error:
+            raise MisfitError('is no known time zone; "UTC" always is', "time_zone") from error
+        return self
+
+
+class _ReceiverSettings(Settings):
+    """What every receiver has."""
+
+    id: Identifier
+    """Shown with its backlog; what waits for it is kept under this name."""
+
+    units: tuple[str, ...] | None = None
+    """Units whose alarms it is told of; all unless given."""
+
+    kinds: tuple[AlarmKind, ...] | None = None
+    """Kinds of alarms that it is told of; all unless given. Example: ["link_lost"]."""
+
+    changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = TOLD
+    """What must happen to an alarm for it to be told."""
+
+    lowest_priority: Literal["alert", "danger"] = "alert"
+    """"alert" tells of everything, "danger" only of alarms that are, or have ceased to be, one."""
+
+    quiet: QuietSettings | None = None
+    """Hours in which what is no danger waits."""
+
+    connect_timeout_s: TimeoutS = 10.0
+    """Longest time to look its name up and reach it, s."""
+
+    answer_timeout_s: TimeoutS = 30.0
+    """Longest silence while it is talked to, s."""
+
+    total_timeout_s: TimeoutS = 60.0
+    """Longest time that one attempt may take in all, s."""
+
+    max_retry_s: Annotated[float, Field(ge=1.0, le=86_400.0)] = 900.0
+    """Longest wait between two attempts, s; the first is after about one second, then twice as long
+    each time. A receiver that asks for a longer one does not get it."""
+
+    max_age_h: Annotated[float, Field(ge=0.1, le=8760.0)] = 72.0
+    """What is older than this when an attempt fails is given up, hours."""
+
+    ca_file: Annotated[str, StringConstraints(min_length=1)] | None = None
+    """Certificates (PEM) to trust instead of the system's; for a plant with a CA of its own."""
+
+
+class WebhookSettings(_ReceiverSettings):
+    """A web server that takes each event as a POST of JSON."""
+
+    kind: Literal["webhook"]
+    """"webhook"."""
+
+    url: Annotated[str, StringConstraints(min_length=1, max_length=2000)]
+    """Where to; redirects are not followed. Example: "https://alarms.example/padwatch"."""
+
+    secret: SecretSettings | None = None
+    """Key that signs each message (HMAC-SHA-256); unsigned without."""
+
+    authorization: SecretSettings | None = None
+    """Value of the Authorization header, such as "Bearer …"; none without."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        fault = url_fault(self.url)
+        if fault is not None:
+            raise MisfitError(fault, "url")
+        if self.authorization is not None and not self.url.lower().startswith("https:"):
+            raise MisfitError("would show it to everyone on the way; use https", "authorization")
+        return self
+
+
+class SmtpSettings(_ReceiverSettings):
+    """A mail server that takes each event as a mail to every recipient."""
+
+    kind: Literal["smtp"]
+    """"smtp"."""
+
+    host: HostName
+    """Mail server; example: "mail.plant.example"."""
+
+    port: Annotated[int, Field(ge=1, le=65535)] = 587
+    """Its port: 587 for STARTTLS, 465 for TLS from the start, 25 between servers."""
+
+    tls: Literal["starttls", "implicit", "none"] = "starttls"
+    """"starttls" (refused if the server does not offer it), "implicit" from the start, "none"."""
+
+    username: Annotated[str, StringConstraints(min_length=1, max_length=200)] | None = None
+    """To log in with; no login without."""
+
+    password: SecretSettings | None = None
+    """Password that goes with it."""
+
+    sender: MailAddress
+    """Who the mails are from; example: "padwatch@plant.example"."""
+
+    recipients: Annotated[tuple[MailAddress, ...], Field(min_length=1, max_length=50)]
+    """Who gets them; each is served apart, so that no mailbox waits for another."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.username is None) != (self.password is None):
+            raise MisfitError("username and password go together", "username")
+        if self.username is not None and self.tls == "none":
+            raise MisfitError("would send the password in the clear", "tls")
+        refuse_twice(("recipients", n, each) for n, each in enumerate(self.recipients))
+        return self
+
+
+ReceiverSettings = Annotated[WebhookSettings | SmtpSettings, Field(discriminator="kind")]
+
+
+class DeliverySettings(Settings):
+    """Who is told of alarms, beside the dashboard."""
+
+    dashboard_url: Annotated[str, StringConstraints(max_length=2000)] | None = None
+    """Where people reach the dashboard, for the link in each message; the service's own host and
+    port unless given. Example: "https://padwatch.plant.example/"."""
+
+    receiver: Annotated[tuple[ReceiverSettings, ...], Field(max_length=50)] = ()
+    """Receivers."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        fault = None if self.dashboard_url is None else url_fault(self.dashboard_url)
+        if fault is not None:
+            raise MisfitError(fault, "dashboard_url")
+        refuse_twice(("receiver", n, "id", each.id) for n, each in enumerate(self.receiver))
+        return self
+
+    def require_units(self, known: tuple[str, ...]) -> None:
+        """Refuse a receiver that wants to be told of a unit that there is not."""
+        for number, receiver in enumerate(self.receiver):
+            for place, unit in enumerate(receiver.units or ()):
+                if unit not in known:
+                    words = f"is no unit of this plant, it has {', '.join(known)}"
+                    raise MisfitError(words, "delivery", "receiver", number, "units", place)
+
+
+def url_fault(url: str) -> str | None:
+    """What is wrong with an address; None if it can be used."""
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:
+        return "is no URL"
+    if PRINTABLE_URL.match(url) is None or port == 0 or not parts.hostname:
+        return "is no URL of printable ASCII with a host"
+    if parts.scheme.lower() not in ("http", "https"):
+        return "must begin with https:// or http://"
+    if "@" in parts.netloc:
+        return "must not hold a name or password; use authorization"
+    return None
