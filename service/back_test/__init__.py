@@ -1,0 +1,1 @@
+"""Baseline and decision over years of readings in files: what would have been alarmed."""

@@ -1,0 +1,161 @@
+"""One bearing: what is learned in each period, and what is decided after it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
+from core.condition.operating_limits import OperatingLimits
+from core.condition.operation_history import (
+    OperationHistory,
+    operation_history,
+    operation_of_states,
+)
+from core.decision.back_test import DecisionHistory, back_test
+from core.decision.limits import ChangeLimits
+from core.decision.verdict import OF_EVIDENCE, Verdict
+from core.history_rows import BearingRows, Place
+from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from service.back_test.file_columns import ReadingsError
+from service.back_test.periods import Learning, MachineEvent, Period, periods_of
+
+_Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class BackTestRules:
+    """By what rules it is learned and decided.
+
+    Parameters
+    ----------
+    operating
+        Shares and times; rated figures are those of `rated`.
+    rated
+        Speed in r/min and power in MW by unit; needed only where files do not tell states.
+    bracket_n_per_m
+        Stiffness of brackets, where it is known.
+    author, created_ns, estimator
+        For the baselines.
+    """
+
+    learning: Learning
+    change: ChangeLimits = field(default_factory=ChangeLimits)
+    baseline: BaselineSettings = field(default_factory=BaselineSettings)
+    operating: OperatingLimits = field(default_factory=lambda: OperatingLimits(1.0, 1.0))
+    rated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    bracket_n_per_m: Mapping[Place, float] = field(default_factory=dict)
+    events: Sequence[MachineEvent] = ()
+    author: str = "back-test"
+    created_ns: int = 0
+    estimator: str = "not told"
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodRun:
+    """A period with what was learned, and what was decided by direction.
+
+    Parameters
+    ----------
+    baseline
+        None if there was no reading to learn from.
+    decided
+        Rows from `period.learned` on.
+    """
+
+    period: Period
+    baseline: BearingBaseline | None
+    decided: Mapping[str, DecisionHistory]
+
+    def stiffness(self, direction: str) -> QuantityBaseline | None:
+        """What was learned of a film."""
+        return self.baseline.of(Watched.STIFFNESS, direction) if self.baseline else None
+
+
+@dataclass(frozen=True, eq=False)
+class BearingRun:
+    """All of one bearing."""
+
+    place: Place
+    rows: BearingRows
+    operation: OperationHistory
+    periods: Sequence[PeriodRun]
+
+
+def run_bearing(place: Place, rows: BearingRows, rules: BackTestRules) -> BearingRun:
+    """Learn and decide.
+
+    Raises
+    ------
+    ReadingsError
+        If operating states can be neither read nor followed.
+    """
+    operation = _operation(place, rows, rules)
+    events = [event for event in rules.events if event.is_about(*place)]
+    periods = periods_of(rows.history.time_ns, events, rules.learning)
+    runs = [_run(place, rows.history, operation.is_settled, p, rules) for p in periods]
+    return BearingRun(place, rows, operation, runs)
+
+
+def _operation(place: Place, rows: BearingRows, rules: BackTestRules) -> OperationHistory:
+    history = rows.history
+    if rows.state is not None:
+        return operation_of_states(history.time_ns, rows.state, rules.operating)
+    if place[0] not in rules.rated:
+        raise ReadingsError(
+            f"unit {place[0]}: operating states are not known: give a column state, or columns"
+            " speed_rpm and power_mw and a plant file with the unit's rated speed and power"
+        )
+    speed_rpm, power_mw = rules.rated[place[0]]
+    limits = replace(rules.operating, rated_speed_rpm=speed_rpm, rated_power_mw=power_mw)
+    return operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits)
+
+
+def _run(
+    place: Place,
+    history: StiffnessHistory,
+    is_settled: _Bools,
+    period: Period,
+    rules: BackTestRules,
+) -> PeriodRun:
+    begin, learned, end = period.begin, period.learned, period.end
+    baseline = None
+    if learned > begin:
+        healthy = history.rows(begin, learned)
+        baseline = learn(
+            healthy, is_settled[begin:learned], _origin(place, period, rules), rules.baseline
+        )
+    later, settled = history.rows(learned, end), is_settled[learned:end]
+    run = PeriodRun(period, baseline, {})
+    decided = {
+        direction: _decided(later, settled, run.stiffness(direction), direction, rules.change)
+        for direction in DIRECTIONS
+    }
+    return replace(run, decided=decided)
+
+
+def _origin(place: Place, period: Period, rules: BackTestRules) -> Origin:
+    return Origin(
+        *place, rules.estimator, period.version, rules.author, rules.created_ns, period.event
+    )
+
+
+def _decided(
+    history: StiffnessHistory,
+    is_settled: _Bools,
+    baseline: QuantityBaseline | None,
+    direction: str,
+    limits: ChangeLimits,
+) -> DecisionHistory:
+    if baseline is not None:
+        return back_test(history, is_settled, baseline, limits)
+    evidence = history.evidence[DIRECTIONS.index(direction)]
+    verdict = np.full(len(history), Verdict.NO_BASELINE, np.int8)
+    for said, unusable in OF_EVIDENCE.items():
+        verdict[evidence == said] = unusable
+    verdict[~is_settled] = Verdict.TRANSIENT
+    nothing = np.full(len(history), np.nan)
+    return DecisionHistory(verdict, np.zeros_like(verdict), nothing, nothing, nothing)
