@@ -14,7 +14,7 @@ FORMAT_VERSION = 1
 
 def to_json(baseline: BearingBaseline) -> str:
     """Write a baseline; `from_json` gives an equal one."""
-    return _written(BASELINE, baseline)
+    return written(BASELINE, baseline)
 
 
 def from_json(text: str) -> BearingBaseline:
@@ -26,27 +26,35 @@ def from_json(text: str) -> BearingBaseline:
         If it is not JSON, of another format, or a key is missing, unknown, twice there or of the
         wrong kind; the message says where.
     """
-    baseline: BearingBaseline = decode(BearingBaseline, _content(text, BASELINE), "content")
+    baseline: BearingBaseline = decode(BearingBaseline, content(text, BASELINE), "content")
     return baseline
 
 
 def response_to_json(response: ShaftResponse) -> str:
     """Write the response of a shaft; `response_from_json` gives an equal one."""
-    return _written(RESPONSE, response)
+    return written(RESPONSE, response)
 
 
 def response_from_json(text: str) -> ShaftResponse:
     """Read the response of a shaft; raises as `from_json` does."""
-    response: ShaftResponse = decode(ShaftResponse, _content(text, RESPONSE), "content")
+    response: ShaftResponse = decode(ShaftResponse, content(text, RESPONSE), "content")
     return response
 
 
-def _written(name: str, value: Any) -> str:
-    content = {"format": name, "format_version": FORMAT_VERSION, "content": asdict(value)}
-    return json.dumps(content, allow_nan=False)
+def written(name: str, value: Any) -> str:
+    """Write a frozen dataclass as a document of a format.
+
+    Raises
+    ------
+    ValueError
+        If a number in it is not finite.
+    """
+    whole = {"format": name, "format_version": FORMAT_VERSION, "content": asdict(value)}
+    return json.dumps(whole, allow_nan=False)
 
 
-def _content(text: str, name: str) -> object:
+def content(text: str, name: str) -> object:
+    """What is in a document of a format; raises as `from_json` does."""
     try:
         whole = json.loads(text, object_pairs_hook=_no_twice, parse_constant=_no_constant)
     except RecursionError as error:

@@ -71,11 +71,10 @@ class FilmJudge:
         for place, decision in self._decisions.items():
             self._decisions[place] = replace(decision, last_ns=None, last_counted_ns=None)
 
-    def remember(
-        self, readings: Sequence[FilmReading], findings: Mapping[Place, FilmFinding]
-    ) -> None:
-        """Take readings of one moment as recent ones, which tell what changed a film."""
-        self._recent.add(readings, {place: found.deviation for place, found in findings.items()})
+    @property
+    def recent(self) -> RecentReadings:
+        """The newest readings of all places, which tell what changed a film."""
+        return self._recent
 
     def judge(self, readings: Sequence[FilmReading]) -> list[FilmNews]:
         """Say what readings of one moment mean, those of all bearings together."""
@@ -84,7 +83,8 @@ class FilmJudge:
             for reading in readings
             for direction in DIRECTIONS
         }
-        self.remember(readings, found)
+        deviations = {place: finding.deviation for place, finding in found.items()}
+        self._recent.add(readings, deviations)
         return [self._news(reading, found) for reading in readings]
 
     def _news(self, reading: FilmReading, found: Mapping[Place, FilmFinding]) -> FilmNews:

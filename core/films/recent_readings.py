@@ -9,6 +9,7 @@ from core.arrays import FloatArray
 from core.baseline.response import MEAN_READINGS, Place, ShaftResponse
 from core.decision.attribution import Attribution, attribute
 from core.films.film_reading import FilmReading
+from core.stiffness_history import DIRECTIONS
 
 KEPT = 4 * MEAN_READINGS
 """Readings: some say nothing of a place."""
@@ -25,14 +26,15 @@ class RecentReadings:
 
     def __init__(self, brackets_n_per_m: Mapping[str, float]) -> None:
         self._places = tuple(
-            (bearing, direction) for bearing in brackets_n_per_m for direction in "xy"
+            (bearing, direction) for bearing in brackets_n_per_m for direction in DIRECTIONS
         )
         self._brackets = np.repeat(list(brackets_n_per_m.values()), 2)
         self._columns: deque[FloatArray] = deque(maxlen=KEPT)
 
-    def clear(self) -> None:
-        """Forget all."""
-        self._columns.clear()
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """Bearings and directions, in the order of rows."""
+        return self._places
 
     def add(
         self, readings: Sequence[FilmReading], deviations: Mapping[Place, float | None]
@@ -41,7 +43,7 @@ class RecentReadings:
         values = {
             (reading.bearing, direction): value
             for reading in readings
-            for direction, value in zip("xy", reading.values, strict=True)
+            for direction, value in zip(DIRECTIONS, reading.values, strict=True)
             if reading.condition.is_settled
         }
         if set(values) != set(self._places):
@@ -50,7 +52,11 @@ class RecentReadings:
             (value.ln_k, value.shaft_um_pk, _or_nan(deviations.get(place)))
             for place, value in ((place, values[place]) for place in self._places)
         ]
-        self._columns.append(np.array(rows).T)
+        self.append(np.array(rows).T)
+
+    def append(self, column: FloatArray) -> None:
+        """Take in one moment: (3, n_places) ln stiffness, 1× shaft motion in µm, deviation."""
+        self._columns.append(column)
 
     def attribution(self, place: Place, response: ShaftResponse | None) -> Attribution:
         """What a change at a place is put down to now."""
