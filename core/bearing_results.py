@@ -11,6 +11,7 @@ from core.estimators import Estimator, preferred_stiffness
 from core.film_results import film_results
 from core.line_results import OrderLine
 from core.machine import Bearing, Unit
+from core.overall_results import overall_results, phase_results
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import (
@@ -101,6 +102,8 @@ class BearingResults:
             "oil_temperature_c": self._slow(self._bearing.oil_temperature),
             **position,
             **order1,
+            **phase_results(self._segments, self._rows, self._line_quality),
+            **overall_results(self._segments, self._rows, self._unit.bearings.index(self._bearing)),
             **vortex,
             **film,
         }

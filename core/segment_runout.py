@@ -25,16 +25,12 @@ def without_runout(
         (n_channels,) phasors at exactly `speed`, relative to the segment's first sample.
     rows
         Of the shaft channels.
-    speed
-        A shaft angle without the undoubted speed of the same pulses is none: the phasors' phase
-        would drift away from it.
 
     Returns
     -------
     The phasors, and what was done to each shaft channel, by id.
     """
-    agreed = speed.source is SpeedSource.KEY_PHASE and speed.rpm.quality == GOOD
-    angle_rad = key_phase.shaft_angle_rad if key_phase is not None and agreed else None
+    angle_rad = shaft_angle_rad(speed, key_phase)
     cleaned, verdicts = order1_um_pk.copy(), {}
     for row in rows:
         channel = unit.channels[row]
@@ -47,3 +43,13 @@ def without_runout(
         )
         cleaned[row], verdicts[channel.id] = line.phasor_um_pk, line.verdict
     return cleaned, verdicts
+
+
+def shaft_angle_rad(speed: Speed, key_phase: KeyPhase | None) -> float | None:
+    """Angle of the shaft at a segment's first sample, where phasors can be told by it.
+
+    A shaft angle without the undoubted speed of the same pulses is none: the phasors' phase would
+    drift away from it.
+    """
+    agreed = speed.source is SpeedSource.KEY_PHASE and speed.rpm.quality == GOOD
+    return key_phase.shaft_angle_rad if key_phase is not None and agreed else None

@@ -13,9 +13,10 @@ from core.cross_spectrum import average
 from core.key_phase import KeyPhase, read_key_phase
 from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
+from core.overall import Overall, OverallTransform
 from core.quality import Level, Quality, Reading, Reason, bad, worst
 from core.runout import RunoutVerdict
-from core.segment_runout import without_runout
+from core.segment_runout import shaft_angle_rad, without_runout
 from core.sensor_checks import quietest_rms, signal_quality
 from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
@@ -46,6 +47,11 @@ class Segment:
         taken off.
     runout
         Whether it was, by shaft channel.
+    overall
+        Broad-band vibration.
+    shaft_angle_rad
+        Angle that the shaft has turned at the first sample since its mark passed the pick-up; None
+        where no key-phase says so.
     """
 
     epoch: int
@@ -60,6 +66,8 @@ class Segment:
     order_frequency_hz: FloatArray
     order_phasors_um_pk: ComplexArray
     runout: Mapping[str, RunoutVerdict]
+    overall: Overall
+    shaft_angle_rad: float | None = None
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
@@ -82,6 +90,7 @@ class SegmentTransform:
         bin_hz = unit.rate_hz / settings.segment_samples
         n_lines = min(int(settings.max_frequency_hz / bin_hz), settings.segment_samples // 2 - 1)
         self.frequency_hz: FloatArray = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
+        self._overall = OverallTransform(unit, settings)
         self._bin_factor = _factors(unit.channels, self.frequency_hz)
         shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
         self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
@@ -103,7 +112,8 @@ class SegmentTransform:
         )
         samples = np.where(finite[:, np.newaxis], window.samples, 0.0).astype(np.float64)
         prepared = tapered(samples)
-        bins = bin_phasors(prepared, self.frequency_hz.size) * self._bin_factor
+        lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
+        bins = lines[:, : self.frequency_hz.size] * self._bin_factor
         mean = samples.mean(axis=1)
         key_phase = self._key_phase(samples, window.rate_hz, _usable(quality))
         speed = self._speed(window, bins, _usable(quality), key_phase)
@@ -123,6 +133,8 @@ class SegmentTransform:
             order_frequency_hz=order_hz,
             order_phasors_um_pk=orders,
             runout=runout,
+            overall=self._overall.of(samples, lines),
+            shaft_angle_rad=shaft_angle_rad(speed, key_phase),
         )
         self._keep(segment)
         return segment

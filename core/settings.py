@@ -42,6 +42,9 @@ class AnalysisSettings:
         What counts as a failed transducer or an unsteady record.
     dynamic
         How all eight coefficients are sought.
+    velocity_low_order, velocity_high_hz
+        Band of a bearing's broad-band velocity: from this multiple of the rated speed (a quarter
+        takes in everything down to the vortex) to this frequency.
     min_speed_fraction
         Share of the rated speed below which the machine counts as standing.
     """
@@ -58,6 +61,8 @@ class AnalysisSettings:
     min_coverage: float = 0.5
     min_bearing_um_pk: float = 4.0
     min_speed_fraction: float = 0.2
+    velocity_low_order: float = 0.25
+    velocity_high_hz: float = 1000.0
     sensors: SensorLimits = field(default_factory=SensorLimits)
     dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 

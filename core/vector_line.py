@@ -11,6 +11,7 @@ from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpe
 from core.excitation import LineLimits, line_excitation
 from core.line_results import AMPLITUDES, DIRECTIONS, reading_of
 from core.machine import Bearing
+from core.overall_results import PHASES, phase_of
 from core.quality import GOOD, Quality, Reading, Reason, missing, worst
 from core.ratio import effective_stiffness_n_per_m
 from core.segments import ORDER1
@@ -76,6 +77,20 @@ class VectorLine:
                 else Reading(float(spectrum.amplitude_um_pk(place)[0]), quality)
             )
         return readings
+
+    def phases(self) -> dict[str, Reading]:
+        """Phase of each channel's mean vector to the rack's key-phase, by quantity, at 1×."""
+        return {name: self._phase(place) for name, place in PHASES.items()}
+
+    def _phase(self, place: int) -> Reading:
+        quality = self.quality(self.line, place)
+        if isinstance(quality, Reading):
+            return quality
+        counted = self.usable[:, place] & self.has_phase[:, place]
+        if not counted[-1]:
+            return missing(Reason.NOT_MEASURED)
+        vector = complex(self.phasors_um_pk[counted, place].sum())
+        return phase_of(vector, quality) if vector else missing(Reason.INSUFFICIENT_EXCITATION)
 
     def roundness(self) -> Reading:
         """How round the shaft's orbit is, where the phases of both probes are known."""

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from core.arrays import ComplexArray, FloatArray, SampleArray
 from core.blocks import SampleBlock
 from core.machine import Unit
+from core.overall import Overall
 from core.quality import Level, Quality, Reading, Reason, bad
 from core.runout import RunoutVerdict
 from core.segments import ORDER1, VORTEX, Segment
@@ -168,6 +169,7 @@ class PollReader:
             order_frequency_hz=order_hz,
             order_phasors_um_pk=np.zeros((n_channels, 2), dtype=np.complex128),
             runout={channel.id: RunoutVerdict.NO_VECTOR for channel in self._unit.channels},
+            overall=Overall.of_nothing(n_channels, len(self._unit.bearings)),
         )
 
 

@@ -10,6 +10,7 @@ from core.assessment import Evidence
 from core.estimators import STIFFNESS_OF, Estimator, preferred_stiffness
 from core.film_results import NAMES as DYNAMIC_NAMES
 from core.machine import Bearing, Unit
+from core.overall_results import OVERALL_NAMES
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain, worst
@@ -103,8 +104,9 @@ class VectorResults:
             "oil_temperature_c": self._slow(self._bearing.oil_temperature),
             **position,
             **order1,
+            **self._line(ORDER1).phases(),
             **vortex,
-            **dict.fromkeys(DYNAMIC_NAMES, NO_WAVEFORM),
+            **dict.fromkeys((*DYNAMIC_NAMES, *OVERALL_NAMES), NO_WAVEFORM),
         }
         self.budgets = {**budgets1, **budgets_v, **budgets_p}
         chosen = {axes: self._preferred(readings, axes) for axes in ("xx", "yy")}

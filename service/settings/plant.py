@@ -122,6 +122,13 @@ class AnalysisModel(Settings):
     min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
     """Share of the rated speed below which the machine counts as standing."""
 
+    velocity_low_order: Annotated[float, Field(ge=0.05, le=20.0)] = 0.25
+    """Broad-band velocity of bearings counts from this multiple of the rated speed."""
+
+    velocity_high_hz: Annotated[float, Field(gt=0.0, le=100_000.0)] = 1000.0
+    """Broad-band velocity of bearings counts up to this frequency, as far as the sampling rate
+    reaches."""
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         low, high = self.vortex_band
@@ -176,10 +183,20 @@ class PlantFile(Settings):
                 f" {low:g} Hz, and below half the sampling rate, {high:g} Hz",
                 *("analysis", "max_frequency_hz"),
             )
+        self._check_velocity_band(unit)
         n_needed = math.ceil(MIN_SEGMENT_TURNS * unit.sampling_hz / turn_hz)
         if self.analysis.segment_samples < n_needed:
             raise MisfitError(
                 f"for unit {unit.id} must hold {MIN_SEGMENT_TURNS} turns at rated speed,"
                 f" {n_needed} samples, to tell the vortex from 1×",
                 *("analysis", "segment_samples"),
+            )
+
+    def _check_velocity_band(self, unit: UnitSettings) -> None:
+        low_hz = self.analysis.velocity_low_order * hz_from_rpm(unit.rated_speed_rpm)
+        high_hz = min(self.analysis.velocity_high_hz, unit.sampling_hz / 2)
+        if low_hz >= high_hz:
+            raise MisfitError(
+                f"for unit {unit.id} begins at {low_hz:g} Hz and must begin below {high_hz:g} Hz",
+                *("analysis", "velocity_low_order"),
             )
