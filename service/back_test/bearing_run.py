@@ -125,9 +125,9 @@ def _run(
     baseline = None
     if learned > begin:
         healthy = history.rows(begin, learned)
-        baseline = learn(
-            healthy, is_settled[begin:learned], _origin(place, period, rules), rules.baseline
-        )
+        settings = settings_for(history, rules.baseline)
+        origin = _origin(place, period, rules)
+        baseline = learn(healthy, is_settled[begin:learned], origin, settings)
     later, settled = history.rows(learned, end), is_settled[learned:end]
     run = PeriodRun(period, baseline, {})
     decided = {
@@ -135,6 +135,12 @@ def _run(
         for direction in DIRECTIONS
     }
     return replace(run, decided=decided)
+
+
+def settings_for(history: StiffnessHistory, settings: BaselineSettings) -> BaselineSettings:
+    """Without the attitude where it was never measured; with it nothing would be known at all."""
+    is_measured = bool(np.isfinite(history.attitude_deg).any())
+    return replace(settings, uses_attitude=settings.uses_attitude and is_measured)
 
 
 def _origin(place: Place, period: Period, rules: BackTestRules) -> Origin:

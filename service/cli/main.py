@@ -7,6 +7,7 @@ import traceback
 import typer
 
 from service.cli import config, probe, recording, reference
+from service.cli.backtest import backtest
 from service.cli.daq import daq
 from service.cli.demo import demo
 from service.cli.logs import set_up_logging
@@ -25,6 +26,7 @@ app.command()(daq)
 app.command()(record)
 app.command()(replay)
 app.command()(reanalyse)
+app.command()(backtest)
 app.command()(validate)
 app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")

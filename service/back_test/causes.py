@@ -1,0 +1,125 @@
+"""What the alarms of one unit are put down to, by the motion of its shaft in all bearings."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from functools import reduce
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray
+from core.baseline.baseline import Watched
+from core.baseline.response import (
+    MEAN_READINGS,
+    ShaftResponse,
+    learn_response,
+    place_columns,
+)
+from core.baseline.watched import watched_values
+from core.condition.film_conditions import FilmConditions
+from core.decision.attribution import Attribution, Cause, attribute
+from core.stiffness_history import DIRECTIONS, StiffnessHistory, TimeArray
+from service.back_test.bearing_run import BackTestRules, BearingRun, PeriodRun
+from service.back_test.periods import Period, periods_of
+
+NO_AMPLITUDES = Attribution(Cause.UNKNOWN, "the readings have no shaft_um_pk in every bearing")
+NOT_LEARNED = Attribution(Cause.UNKNOWN, "the response of the shaft has not been learned")
+
+
+class UnitCauses:
+    """Shaft response of a unit in each of its periods, and the cause of its alarms.
+
+    Parameters
+    ----------
+    runs
+        Of all its bearings. Only times count at which all of them have readings.
+    """
+
+    def __init__(self, unit: str, runs: Sequence[BearingRun], rules: BackTestRules) -> None:
+        self._runs, self._rules = runs, rules
+        times = [run.rows.history.time_ns for run in runs]
+        self._time_ns: TimeArray = reduce(np.intersect1d, times)
+        self._rows = [np.searchsorted(time_ns, self._time_ns) for time_ns in times]
+        self._histories = {
+            run.place[1]: _taken(run.rows.history, rows)
+            for run, rows in zip(runs, self._rows, strict=True)
+        }
+        self._has_amplitudes = all(
+            np.isfinite(history.shaft_um_pk).any() for history in self._histories.values()
+        )
+        events = [event for event in rules.events if event.unit == unit]
+        self._periods = periods_of(self._time_ns, events, rules.learning)
+        self.responses = [self._learned(period) for period in self._periods]
+        self._columns: tuple[FloatArray, FloatArray, FloatArray] | None = None
+
+    def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
+        """Cause of an alarm, judged with readings up to a time."""
+        if not self._has_amplitudes:
+            return NO_AMPLITUDES
+        last = int(np.searchsorted(self._time_ns, time_ns, side="right"))
+        number = next((n for n, p in enumerate(self._periods) if p.begin < last <= p.end), None)
+        response = None if number is None else self.responses[number]
+        if response is None or number is None:
+            return NOT_LEARNED
+        first = self._periods[number].learned
+        columns = [column[:, first:last] for column in self._all_columns()]
+        known = np.isfinite(columns[2][response.places.index((bearing, direction))])
+        newest = np.flatnonzero(known)[-MEAN_READINGS:]
+        ln_k, ln_shaft, deviation = (column[:, newest] for column in columns)
+        place = (bearing, direction)
+        return attribute(place, response, ln_k, ln_shaft, deviation, self._brackets())
+
+    def _brackets(self) -> FloatArray | None:
+        known = [self._rules.bracket_n_per_m.get(run.place) for run in self._runs]
+        if not all(known):
+            return None
+        return np.repeat(np.array(known, np.float64), len(DIRECTIONS))
+
+    def _learned(self, period: Period) -> ShaftResponse | None:
+        if not self._has_amplitudes or period.learned == period.begin:
+            return None
+        settled = np.logical_and.reduce(self._settled())[period.begin : period.learned]
+        return learn_response(
+            {b: h.rows(period.begin, period.learned) for b, h in self._histories.items()}, settled
+        )
+
+    def _settled(self) -> list[npt.NDArray[np.bool_]]:
+        pairs = zip(self._runs, self._rows, strict=True)
+        return [run.operation.is_settled[rows] for run, rows in pairs]
+
+    def _all_columns(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Ln of stiffness and shaft motion, and deviation: (n_places, n) each."""
+        if self._columns is None:
+            deviation = [
+                _deviation(run, direction)[rows]
+                for run, rows in zip(self._runs, self._rows, strict=True)
+                for direction in DIRECTIONS
+            ]
+            self._columns = (*place_columns(self._histories), np.stack(deviation))
+        return self._columns
+
+
+def _deviation(run: BearingRun, direction: str) -> FloatArray:
+    """(n,) from the baseline of each period, of settled readings that are compared."""
+    found = np.full(len(run.rows.history), np.nan)
+    for period in run.periods:
+        rows = slice(period.period.learned, period.period.end)
+        found[rows] = _compared(run.rows.history.rows(rows.start, rows.stop), period, direction)
+    return np.where(run.operation.is_settled, found, np.nan)
+
+
+def _compared(history: StiffnessHistory, period: PeriodRun, direction: str) -> FloatArray:
+    baseline = period.stiffness(direction)
+    if baseline is None:
+        return np.full(len(history), np.nan)
+    value, u_random = watched_values(history, Watched.STIFFNESS, direction)
+    return baseline.compare(FilmConditions.of(history), value, u_random).deviation
+
+
+def _taken(history: StiffnessHistory, rows: npt.NDArray[np.int64]) -> StiffnessHistory:
+    if rows.size == len(history):
+        return history
+    columns: Mapping[str, npt.NDArray[np.generic]] = {
+        field.name: getattr(history, field.name)[..., rows] for field in fields(history)
+    }
+    return StiffnessHistory(**columns)  # type: ignore[arg-type]
