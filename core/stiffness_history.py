@@ -85,6 +85,12 @@ class StiffnessHistory:
             **{f.name: getattr(self, f.name)[..., start:stop] for f in fields(self)}
         )
 
+    def where(self, wanted: npt.NDArray[np.bool_]) -> "StiffnessHistory":
+        """The readings that a mask of shape (n,) picks."""
+        return StiffnessHistory(
+            **{f.name: getattr(self, f.name)[..., wanted] for f in fields(self)}
+        )
+
     def _check_shapes(self) -> None:
         for column in fields(self):
             shape = getattr(self, column.name).shape

@@ -59,7 +59,7 @@ def _calibration(settings: ChannelSettings) -> ChannelCalibration:
 
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     return Bearing(
-        **settings.model_dump(exclude=ACCURACY_KEYS | {"alarms"}),
+        **settings.model_dump(exclude=ACCURACY_KEYS | {"alarms", "watched_estimator"}),
         accuracy=_accuracy(settings, unit),
         gap_accuracy=_gap_accuracy(settings, unit),
     )

@@ -27,7 +27,8 @@ from service.api.views import (
     trend_model,
 )
 from service.live import CurrentBearing
-from service.store.port import TrendQuery, ValueRange
+from service.store.port import TrendQuery
+from service.store.value_range import ValueRange
 
 MAX_POINTS = 5000
 MAX_QUANTITIES = 40

@@ -107,6 +107,10 @@ class BearingSettings(Settings):
     that has a number. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
     "ratio_order1"."""
 
+    watched_estimator: Estimator | None = None
+    """Whose stiffness is compared with its baseline; without it the first of preference, and
+    "ratio_order1" where a rack gives amplitudes. Another one needs another baseline."""
+
     alarms: BearingAlarmSettings = BearingAlarmSettings()
     """Limits that raise alarms; none unless given."""
 

@@ -8,6 +8,7 @@ from pydantic import Field, StringConstraints, model_validator
 from core.units import hz_from_rpm
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
@@ -159,6 +160,9 @@ class PlantFile(Settings):
 
     alarms: AlarmSettings = AlarmSettings()
     """Delays and limits of the alarms of all units."""
+
+    films: FilmAlarmSettings = FilmAlarmSettings()
+    """Baselines of stiffness by operating condition, and alarms of its change."""
 
     capture: CaptureSettings = CaptureSettings()
     """Samples that are kept around an alarm."""

@@ -36,6 +36,10 @@ class UnitSettings(Settings):
     rated_speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
     """Rated running speed in r/min, 20 to 1500; example: 92.3."""
 
+    rated_power_mw: Annotated[float, Field(gt=0.0, le=2000.0)] | None = None
+    """Rated active power in MW, at most 2000; with it and power_channel, operating states are told
+    apart and films compared under like conditions. Example: 700.0."""
+
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
     """Samples per second and channel; example: 600.0. Without effect where registers are polled:
     there it is one over poll_period_s."""

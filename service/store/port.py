@@ -8,9 +8,13 @@ from core.account import Gap
 from core.alarms.alarm import Alarm
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.assessment import Assessment
+from core.condition.operating_state import OperatingState
+from core.films.film_judge import FilmNews
 from core.quality import Level, Reading
+from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.outbox_port import Outbox
+from service.store.value_range import ValueRange
 
 
 class StoreError(Exception):
@@ -26,14 +30,6 @@ class UnitGap:
 
 
 @dataclass(frozen=True)
-class ValueRange:
-    """Bounds, both included; None leaves a side open."""
-
-    low: float | None = None
-    high: float | None = None
-
-
-@dataclass(frozen=True)
 class TrendQuery:
     """Which trends of one bearing are wanted.
 
@@ -45,6 +41,8 @@ class TrendQuery:
         More readings than this are gathered into buckets of equal width.
     hole_ns
         Neighbouring readings further apart than this have a hole between them.
+    states
+        Only readings in these operating states; empty for all.
     """
 
     unit: str
@@ -56,6 +54,7 @@ class TrendQuery:
     hole_ns: int
     eccentricity_ratio: ValueRange = field(default_factory=ValueRange)
     oil_temperature_c: ValueRange = field(default_factory=ValueRange)
+    states: tuple[OperatingState, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -131,13 +130,19 @@ class Store(Protocol):
         """What is to be told to receivers, queued as events of alarms are appended."""
         ...
 
+    @property
+    def films(self) -> FilmStore:
+        """Readings and baselines of films."""
+        ...
+
     def append(
         self,
         assessments: Sequence[Assessment],
         gaps: Sequence[UnitGap],
         alarms: Sequence[AlarmNews] = (),
+        films: Sequence[FilmNews] = (),
     ) -> None:
-        """Write all or nothing; the same assessment or event twice counts once."""
+        """Write all or nothing; what is written twice counts once."""
         ...
 
     def trend(self, query: TrendQuery) -> Trend:

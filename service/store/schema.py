@@ -3,6 +3,7 @@
 import sqlite3
 
 from service.origin import Origin
+from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.port import StoreError
 
@@ -125,6 +126,7 @@ MIGRATIONS = (
     BEGIN SELECT RAISE(ABORT, 'events of alarms are kept'); END;
     """,
     OUTBOX_TABLES,
+    FILM_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

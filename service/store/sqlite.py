@@ -10,11 +10,14 @@ from core.account import Gap
 from core.alarms.alarm import Alarm
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
+from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
 from service.origin import Origin
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.buckets import bucket_width_ns, bucketed, single_points
 from service.store.codec import Layout, columns_of
+from service.store.film_readings import insert_film_news
+from service.store.films import SqliteFilms
 from service.store.gap_reference import GapReference
 from service.store.newest import select_newest
 from service.store.outbox import SqliteOutbox
@@ -35,7 +38,7 @@ from service.store.trends import select_readings, storable
 BUSY_TIMEOUT_S = 5.0
 
 INSERT_ASSESSMENT = """
-    INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
+    INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
     ON CONFLICT (series, time_ns) DO NOTHING
 """
 INSERT_GAP = "INSERT INTO gap VALUES (?,?,?,?,?) ON CONFLICT DO NOTHING"
@@ -64,6 +67,7 @@ class SqliteStore:
         self._path, self._origin, self._address = path, origin, address
         self._lock = Lock()
         self.outbox = SqliteOutbox(self._writing, self._reader)
+        self.films = SqliteFilms(self._writing, self._reader, self._series_id)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -86,8 +90,9 @@ class SqliteStore:
         assessments: Sequence[Assessment],
         gaps: Sequence[UnitGap],
         alarms: Sequence[AlarmNews] = (),
+        films: Sequence[FilmNews] = (),
     ) -> None:
-        """Write assessments, gaps and news of alarms in one transaction; durable when this returns.
+        """Write what was found in one transaction; durable when this returns.
 
         Raises
         ------
@@ -99,6 +104,7 @@ class SqliteStore:
             self._writer.executemany(INSERT_ASSESSMENT, rows)
             self._writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
             insert_alarms(self._writer, alarms, self._address)
+            insert_film_news(self._writer, films, self._series_id)
 
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
@@ -157,6 +163,7 @@ class SqliteStore:
 
     def _row(self, assessment: Assessment) -> tuple[object, ...]:
         values, qualities = self._layout.encode(assessment.readings)
+        condition = assessment.condition
         return (
             self._series_id(assessment.unit, assessment.bearing),
             assessment.time_ns,
@@ -173,6 +180,8 @@ class SqliteStore:
             qualities,
             assessment.estimators["xx"],
             assessment.estimators["yy"],
+            None if condition is None else int(condition.state),
+            None if condition is None else int(condition.is_settled),
         )
 
     def _series_id(self, unit: str, bearing: str) -> int:

@@ -20,6 +20,7 @@ MATCHING = """
     AND (:eccentricity_high IS NULL OR eccentricity_ratio <= :eccentricity_high)
     AND (:oil_low IS NULL OR oil_temperature_c >= :oil_low)
     AND (:oil_high IS NULL OR oil_temperature_c <= :oil_high)
+    AND (:states = '' OR instr(:states, ',' || operating_state || ',') > 0)
 """
 COUNT_ROWS = "SELECT count(*)" + MATCHING
 SELECT_ROWS = (
@@ -64,6 +65,7 @@ def _arguments(query: TrendQuery) -> dict[str, object]:
         "eccentricity_high": query.eccentricity_ratio.high,
         "oil_low": query.oil_temperature_c.low,
         "oil_high": query.oil_temperature_c.high,
+        "states": "".join(f",{int(state)}," for state in query.states),
     }
 
 

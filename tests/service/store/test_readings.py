@@ -12,8 +12,9 @@ from core.quality import Level, Quality, Reading, Reason, missing, uncertain
 from core.quantities import CATALOGUE
 from service.store import sqlite, trends
 from service.store.codec import Layout
-from service.store.port import QueryTooLargeError, StoreError, TrendQuery, UnitGap, ValueRange
+from service.store.port import QueryTooLargeError, StoreError, TrendQuery, UnitGap
 from service.store.sqlite import SqliteStore
+from service.store.value_range import ValueRange
 
 Build = Callable[..., Assessment]
 BuildGap = Callable[..., UnitGap]

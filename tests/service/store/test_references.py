@@ -3,6 +3,7 @@
 import math
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -105,11 +106,18 @@ def test_what_another_process_has_set_is_seen(store: SqliteStore, path: Path) ->
 def test_a_database_without_references_gets_room_for_them_and_keeps_its_data(
     path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    today = SqliteStore(path.with_name("today.sqlite3"))
+    today.append([assessment(gap_x_um=1998.5)], [])
+    today.close()
     with monkeypatch.context() as at_that_time:
         at_that_time.setattr(schema, "MIGRATIONS", schema.MIGRATIONS[:2])
-        old = SqliteStore(path)
-        old.append([assessment(gap_x_um=1998.5)], [])
-        old.close()
+        SqliteStore(path).close()
+    with closing(sqlite3.connect(path)) as old:
+        columns = ", ".join(row[1] for row in old.execute("PRAGMA table_info (assessment)"))
+        old.execute("ATTACH ? AS today", (str(path.with_name("today.sqlite3")),))
+        old.execute("INSERT INTO series SELECT * FROM today.series")
+        old.execute(f"INSERT INTO assessment SELECT {columns} FROM today.assessment")  # noqa: S608
+        old.commit()
 
     new = SqliteStore(path)
     new.add_reference(reference())

@@ -1,0 +1,179 @@
+"""Learning the films of a unit from stored readings, and whether to believe what was learned."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from core.baseline.agreement import mean_difference
+from core.baseline.baseline import BearingBaseline, Origin
+from core.baseline.learning import learn
+from core.baseline.response import ShaftResponse, learn_response
+from core.estimators import Estimator
+from core.films.film_rules import FilmRules
+from core.stiffness_history import StiffnessHistory
+from core.units import NS_PER_S
+from service.films.versions import Versions, versions_after
+from service.settings.film_alarms import FilmAlarmSettings
+from service.store.film_port import (
+    BaselineStep,
+    FilmHistory,
+    FilmQuery,
+    FilmStore,
+    StoredStep,
+)
+
+DAY_NS = 86_400 * NS_PER_S
+PADWATCH = "padwatch"
+"""Who learns, and accepts where engineers leave it to padwatch."""
+
+
+@dataclass(frozen=True)
+class FilmPlace:
+    """One bearing of one unit, by one estimator."""
+
+    unit: str
+    bearing: str
+    estimator: Estimator
+
+
+class Learner:
+    """Learns baselines; holds nothing between calls, and may be used in any thread."""
+
+    def __init__(self, store: FilmStore, settings: FilmAlarmSettings) -> None:
+        self._store, self._settings = store, settings
+
+    def is_due(self, place: FilmPlace, now_ns: int) -> bool:
+        """Whether it is time to learn a bearing (again)."""
+        versions = self.versions(place)
+        since_ns = self._since_ns(place, versions)
+        if versions.is_frozen or since_ns is None:
+            return False
+        newest = next(
+            (
+                entry
+                for entry in self._store.baselines(place.unit, place.bearing)
+                if entry.estimator is place.estimator and entry.created_ns >= since_ns
+            ),
+            None,
+        )
+        if newest is None:
+            return now_ns - since_ns >= self._settings.baseline.min_learning_days * DAY_NS
+        until_ns = since_ns + round(self._settings.learning_days * DAY_NS)
+        if newest.learned_until_ns >= until_ns or newest.created_ns > until_ns:
+            return False
+        return now_ns - newest.created_ns >= self._settings.learn_every_days * DAY_NS
+
+    def versions(self, place: FilmPlace) -> Versions:
+        """Where the baselines of a bearing stand."""
+        return versions_after(self._store.steps(place.unit, place.bearing))
+
+    def learn(
+        self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
+    ) -> BearingBaseline | None:
+        """Learn a bearing, store what was learned, and put it in force where that is padwatch's.
+
+        Returns
+        -------
+        None if there are too few readings.
+        """
+        versions = self.versions(place)
+        found = self._readings(place, versions, now_ns)
+        if not len(found):
+            return None
+        baseline = learn(
+            found.history,
+            found.is_settled & ~np.any(found.level > 0, axis=0),
+            self._origin(place, now_ns, author, reason),
+            self._settings.baseline.settings(self._settings.reading_h),
+        )
+        if not baseline.quantities:
+            return None
+        self._store.add_baseline(baseline, self._steps(baseline, versions))
+        return baseline
+
+    def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
+        """Learn how a unit's shaft answers to its films, and store it."""
+        places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
+        found = {p.bearing: self._readings(p, self.versions(p), now_ns) for p in places}
+        histories, is_settled = at_same_times(found)
+        if not is_settled.size:
+            return None
+        response = learn_response(histories, is_settled)
+        if response is not None:
+            self._store.set_response(unit, response, now_ns)
+        return response
+
+    def _since_ns(self, place: FilmPlace, versions: Versions) -> int | None:
+        if versions.renewed_ns is not None:
+            return versions.renewed_ns
+        return self._store.first_ns(place.unit, place.bearing, place.estimator)
+
+    def _readings(self, place: FilmPlace, versions: Versions, now_ns: int) -> FilmHistory:
+        since_ns = self._since_ns(place, versions) or 0
+        until_ns = min(now_ns, since_ns + round(self._settings.learning_days * DAY_NS))
+        return self._store.history(
+            FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
+        )
+
+    def _origin(self, place: FilmPlace, now_ns: int, author: str, reason: str) -> Origin:
+        entries = self._store.baselines(place.unit, place.bearing)
+        version = 1 + max((entry.version for entry in entries), default=0)
+        return Origin(
+            place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason
+        )
+
+    def _steps(self, baseline: BearingBaseline, versions: Versions) -> list[StoredStep]:
+        doubt = self._doubt(baseline, versions)
+        steps = [_step(baseline, BaselineStep.LEARNED, doubt or baseline.origin.event)]
+        if self._settings.acceptance == "automatic" and doubt is None:
+            steps.append(_step(baseline, BaselineStep.ACCEPTED, "agrees with what was learned"))
+        return steps
+
+    def _doubt(self, baseline: BearingBaseline, versions: Versions) -> str | None:
+        """Why an engineer should look before this is put in force; None if nothing speaks against.
+
+        Compared is with the first that was accepted: films that soften slowly would be learned
+        little by little.
+        """
+        origin = baseline.origin
+        if versions.first_accepted is None:
+            return None
+        first = self._store.baseline(origin.unit, origin.bearing, versions.first_accepted)
+        if first is None or first.origin.estimator != origin.estimator:
+            return "learned with another estimator than the first"
+        worst = max(mean_difference(first, baseline).values(), key=abs, default=0.0)
+        if abs(worst) < self._settings.change.alert_change:
+            return None
+        return f"{100 * worst:+.1f} % from version {versions.first_accepted} under like conditions"
+
+
+def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredStep:
+    origin = baseline.origin
+    return StoredStep(
+        origin.unit,
+        origin.bearing,
+        origin.version,
+        step,
+        origin.created_ns,
+        origin.author,
+        reason,
+    )
+
+
+def at_same_times(
+    found: Mapping[str, FilmHistory],
+) -> tuple[dict[str, StiffnessHistory], npt.NDArray[np.bool_]]:
+    """Histories of all bearings where all have a reading, and whether the unit had settled."""
+    times: Sequence[npt.NDArray[np.int64]] = [f.history.time_ns for f in found.values()]
+    common = times[0]
+    for other in times[1:]:
+        common = np.intersect1d(common, other, assume_unique=True)
+    rows = {bearing: np.isin(f.history.time_ns, common) for bearing, f in found.items()}
+    histories = {bearing: f.history.where(rows[bearing]) for bearing, f in found.items()}
+    settled = [
+        f.is_settled[rows[bearing]] & ~np.any(f.level > 0, axis=0)[rows[bearing]]
+        for bearing, f in found.items()
+    ]
+    return histories, np.all(settled, axis=0)
