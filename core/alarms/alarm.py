@@ -32,6 +32,24 @@ class AlarmKind(StrEnum):
     CHANNEL_NOT_OK = "channel_not_ok"
     SHAFT_X = "order1_shaft_x"
     SHAFT_Y = "order1_shaft_y"
+    CHANGE_SHAFT_X = "order1_change_shaft_x"
+    CHANGE_SHAFT_Y = "order1_change_shaft_y"
+    CHANGE_BEARING_X = "order1_change_bearing_x"
+    CHANGE_BEARING_Y = "order1_change_bearing_y"
+    OVERALL_SHAFT_X = "overall_shaft_x"
+    OVERALL_SHAFT_Y = "overall_shaft_y"
+    OVERALL_BEARING_X = "overall_bearing_x"
+    OVERALL_BEARING_Y = "overall_bearing_y"
+    ZONE_SHAFT_X = "zone_shaft_x"
+    ZONE_SHAFT_Y = "zone_shaft_y"
+    ZONE_SHAFT = "zone_shaft"
+    ZONE_BEARING_X = "zone_bearing_x"
+    ZONE_BEARING_Y = "zone_bearing_y"
+    ECCENTRICITY = "eccentricity_ratio"
+    GAP_X = "gap_x"
+    GAP_Y = "gap_y"
+    OPPOSITE_GAP_X = "opposite_gap_x"
+    OPPOSITE_GAP_Y = "opposite_gap_y"
     OIL_TEMPERATURE = "oil_temperature"
     STIFFNESS_X = "stiffness_x"
     STIFFNESS_Y = "stiffness_y"
@@ -39,6 +57,16 @@ class AlarmKind(StrEnum):
     CLOCK_DRIFT = "clock_drift"
     TIME_STAMPS = "time_stamps"
     LINK_LOST = "link_lost"
+    SAMPLES_LOST = "samples_lost"
+    RESULTS_NOT_STORED = "results_not_stored"
+    RESULTS_LOST = "results_lost"
+    BLOCKS_WAITING = "blocks_waiting"
+    ANALYSIS_LATE = "analysis_late"
+    CAPTURES_NOT_KEPT = "captures_not_kept"
+
+
+PLANT = "plant"
+"""In the place of a unit: what concerns all of them. No unit may be called so."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +75,11 @@ class AlarmIdentity:
 
     Parameters
     ----------
+    unit
+        `PLANT` where it is about the service itself.
     subject
-        Channel or bearing that it is about; "device" or "link" where it is about the whole unit.
+        Channel or bearing that it is about; "device" or "link" where it is about the whole unit,
+        "store", "service" or "captures" where it is about the service.
     """
 
     unit: str

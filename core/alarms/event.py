@@ -23,6 +23,7 @@ class AlarmChange(StrEnum):
     UNSUPPRESSED = "unsuppressed"
     TAKEN_OUT_OF_SERVICE = "taken_out_of_service"
     RETURNED_TO_SERVICE = "returned_to_service"
+    COMMENTED = "commented"
     CONDITION_UNKNOWN = "condition_unknown"
     CONDITION_KNOWN = "condition_known"
 

@@ -60,7 +60,17 @@ class Reset:
     actor: str
 
 
-Action: TypeAlias = Acknowledge | Shelve | Unshelve | TakeOutOfService | ReturnToService | Reset
+@dataclass(frozen=True)
+class Comment:
+    """Somebody says something about the alarm; it stays as it is."""
+
+    actor: str
+    text: str
+
+
+Action: TypeAlias = (
+    Acknowledge | Shelve | Unshelve | TakeOutOfService | ReturnToService | Reset | Comment
+)
 
 
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
@@ -144,6 +154,10 @@ def _reset(alarm: Alarm, action: Reset, now_ns: int) -> _Result:  # noqa: ARG001
     return after, AlarmChange.RESET, ""
 
 
+def _comment(alarm: Alarm, action: Comment, now_ns: int) -> _Result:  # noqa: ARG001
+    return alarm, AlarmChange.COMMENTED, action.text
+
+
 _DOERS: dict[type, Callable[..., _Result]] = {
     Acknowledge: _acknowledge,
     Shelve: _shelve,
@@ -151,4 +165,5 @@ _DOERS: dict[type, Callable[..., _Result]] = {
     TakeOutOfService: _take_out,
     ReturnToService: _return,
     Reset: _reset,
+    Comment: _comment,
 }

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from core.alarms.alarm import AlarmRule
 from core.alarms.limits import Limits
+from core.alarms.state_limits import EVERY_STATE, StateLimits, States
 from core.units import ns_from_s
 
 
@@ -14,26 +15,68 @@ def rule_of(on_delay_s: float, off_delay_s: float, *, is_latching: bool = False)
 
 @dataclass(frozen=True)
 class LimitRule:
-    """A value above a limit."""
+    """A value beyond a limit.
+
+    Parameters
+    ----------
+    states
+        Operating states in which it counts.
+    """
 
     limits: Limits
+    rule: AlarmRule
+    states: States = EVERY_STATE
+
+    @property
+    def by_state(self) -> StateLimits:
+        """The limits with the states in which they hold."""
+        return StateLimits.single(self.limits, self.states)
+
+
+@dataclass(frozen=True)
+class ZoneRule:
+    """A value in a zone that is not for long operation; zones differ from state to state."""
+
+    by_state: StateLimits
     rule: AlarmRule
 
 
 @dataclass(frozen=True)
 class BearingRules:
-    """What is watched on one bearing.
+    """What is watched on one bearing; None if it is not.
 
     Parameters
     ----------
     shaft_order1
-        Relative shaft vibration at 1× in each direction, µm zero-to-peak; None if it is not.
+        Relative shaft vibration at 1× in each direction, µm zero-to-peak.
     oil_temperature
-        °C; None if it is not.
+        °C.
+    shaft_overall
+        Relative shaft vibration in each direction, broad-band, µm peak-to-peak.
+    bearing_overall
+        Absolute bearing vibration in each direction, broad-band, mm/s rms.
+    eccentricity
+        Distance of the shaft's centre from that of the bearing, as a share of the clearance.
+    gap
+        Mean of each probe's gap, µm.
+    shaft_change, bearing_change
+        How far the 1× vector has moved from its reference, µm zero-to-peak.
+    shaft_zones, orbit_zones, bearing_zones
+        Zones of the broad-band peak-to-peak values, of the farthest excursion, and of the bearing
+        velocity.
     """
 
     shaft_order1: LimitRule | None = None
     oil_temperature: LimitRule | None = None
+    shaft_overall: LimitRule | None = None
+    bearing_overall: LimitRule | None = None
+    eccentricity: LimitRule | None = None
+    gap: LimitRule | None = None
+    shaft_change: LimitRule | None = None
+    bearing_change: LimitRule | None = None
+    shaft_zones: ZoneRule | None = None
+    orbit_zones: ZoneRule | None = None
+    bearing_zones: ZoneRule | None = None
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """`UnitAlarms`: all alarms of one unit, and what samples, results, links and people do to them."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
-from core.alarms.alarm import Alarm, AlarmKind, AlarmRule, Condition, unknown
+from core.alarms.alarm import Alarm, Condition, unknown
+from core.alarms.board import AlarmBoard
 from core.alarms.conditions import (
     SENSOR_FAULTS,
     channel_condition,
@@ -13,21 +13,25 @@ from core.alarms.conditions import (
     slow_channel_condition,
     stamp_condition,
 )
-from core.alarms.event import AlarmEvent, AlarmNews
-from core.alarms.life_cycle import advance, interrupted, restored
-from core.alarms.limits import judge
-from core.alarms.operation import Action, expire, operate
+from core.alarms.event import AlarmNews
+from core.alarms.operation import Action
 from core.alarms.rules import UnitRules
-from core.alarms.watch_list import LimitWatch, Watch, watch_list
+from core.alarms.state_limits import outside
+from core.alarms.vector_change import VectorReference, vector_condition
+from core.alarms.watch import LimitWatch
+from core.alarms.watch_list import watch_list
 from core.assessment import Assessment
 from core.blocks import SampleBlock
+from core.condition.operating_state import OperatingState
 from core.line_results import AMPLITUDES
 from core.machine import Unit
 from core.quality import Quality, Reading, Reason, missing, worst
+from core.units import NS_PER_S
 
 NOT_THERE = missing(Reason.NOT_MEASURED)
 
-RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
+STATE_HOLDS_NS = 300 * NS_PER_S
+"""For how long a result's operating state is taken for that of slow channels, too."""
 
 
 class UnitAlarms:
@@ -39,28 +43,36 @@ class UnitAlarms:
         What is watched; alarms whose rule is gone can only be acknowledged.
     rows
         Which channel each row of a block is about, by id; the unit's channels if not given.
+    references
+        Vectors that 1× is compared with.
     """
 
-    def __init__(self, unit: Unit, rules: UnitRules, rows: Sequence[str] | None = None) -> None:
+    def __init__(
+        self,
+        unit: Unit,
+        rules: UnitRules,
+        rows: Sequence[str] | None = None,
+        references: Iterable[VectorReference] = (),
+    ) -> None:
         self._watched = watch_list(unit, rules)
-        self._rules = {watch.id: watch.rule for watch in self._watched.all}
-        self._alarms = {watch.id: Alarm(watch.identity) for watch in self._watched.all}
+        self._board = AlarmBoard(self._watched.all)
         of_rows = [channel.id for channel in unit.channels] if rows is None else list(rows)
         self._rows_of = {
             watch.source: [row for row, channel in enumerate(of_rows) if channel == watch.source]
             for watch in self._watched.channels
         }
         self._channels_of = {bearing.id: bearing.channels for bearing in unit.bearings}
+        self._references = {(r.bearing, r.state): r for r in references}
         self._segment_faults: dict[str, Reason] = {}
+        self._state: tuple[OperatingState | None, int] = (None, 0)
         self._stop: tuple[int, int] | None = None
         self._resting_with: tuple[Quality, ...] | None = None
         self._link: tuple[bool, str | None] = (False, None)
-        self._news: list[AlarmNews] = []
 
     @property
     def alarms(self) -> Sequence[Alarm]:
         """All of them, whatever their state."""
-        return list(self._alarms.values())
+        return self._board.alarms
 
     @property
     def is_connected(self) -> bool:
@@ -69,7 +81,15 @@ class UnitAlarms:
 
     def alarm(self, id_: str) -> Alarm:
         """Look one up. Raises `KeyError` if the unit has no such alarm."""
-        return self._alarms[id_]
+        return self._board.alarm(id_)
+
+    def reference(self, bearing: str, state: OperatingState) -> VectorReference | None:
+        """What the 1× vectors of a bearing are compared with in a state."""
+        return self._references.get((bearing, state))
+
+    def refer_to(self, reference: VectorReference) -> None:
+        """Compare 1× vectors with a new reference from the next result on."""
+        self._references[reference.bearing, reference.state] = reference
 
     def take(
         self, block: SampleBlock, assessments: Iterable[Assessment], host_ns: int
@@ -88,11 +108,13 @@ class UnitAlarms:
         self._take_channels(block)
         for watch in self._watched.slow_channels:
             reading = block.slow.get(watch.source, NOT_THERE)
-            self._apply(watch, slow_channel_condition(reading), block.stop_ns)
+            self._board.find(watch, slow_channel_condition(reading), block.stop_ns)
+        state = self._recent_state(block.stop_ns)
         for warmth in self._watched.temperatures:
-            self._compare(warmth, block.slow.get(warmth.source, NOT_THERE), block.stop_ns)
+            reading = block.slow.get(warmth.source, NOT_THERE)
+            self._compare(warmth, reading, block.stop_ns, state)
         self._take_clock(block, host_ns)
-        return self._told()
+        return self._board.told()
 
     def films(self, conditions: Mapping[str, Condition], now_ns: int) -> list[AlarmNews]:
         """Take in what was decided about films.
@@ -111,22 +133,20 @@ class UnitAlarms:
         """
         films = {watch.id: watch for watch in self._watched.films}
         for id_, condition in conditions.items():
-            self._apply(films[id_], condition, now_ns)
-        return self._told()
+            self._board.advance(films[id_].id, condition, now_ns)
+        return self._board.told()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
         """Note whether samples arrive."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
-        return self._told()
+        return self._board.told()
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Let the host's time pass for a lost link and for what is shelved."""
         self._take_link(host_ns)
-        for id_, alarm in self._alarms.items():
-            if alarm.shelf is not None:
-                self._note(id_, *expire(alarm, host_ns))
-        return self._told()
+        self._board.expire(host_ns)
+        return self._board.told()
 
     def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
         """Do what somebody asks for.
@@ -138,25 +158,16 @@ class UnitAlarms:
         ActionRefusedError
             If it does not fit the alarm as it is now.
         """
-        self._note(id_, *operate(self._alarms[id_], action, host_ns))
-        return self._told()
+        self._board.operate(id_, action, host_ns)
+        return self._board.told()
 
     def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
         """Go on where the service stopped: what was active is, and its condition is unknown.
 
         An alarm that nothing watches any more returns; it stays on the list until acknowledged.
         """
-        for stored in alarms:
-            id_ = stored.identity.id
-            if id_ in self._rules:
-                self._alarms[id_] = restored(stored)
-                if stored.identity.kind is not AlarmKind.LINK_LOST:
-                    self._advance(id_, unknown(RESTARTED, stored.suppressed_by), host_ns)
-            elif stored.level is not None or not stored.is_acknowledged:
-                self._alarms[id_] = restored(replace(stored, is_latched=False))
-                self._rules[id_] = AlarmRule()
-                self._advance(id_, Condition(reason=NO_LONGER_WATCHED), host_ns)
-        return self._told()
+        self._board.restore(alarms, host_ns)
+        return self._board.told()
 
     def _is_repeated(self, block: SampleBlock) -> bool:
         """Whether the block brings nothing new; where samples are missing, delays stand still."""
@@ -167,18 +178,36 @@ class UnitAlarms:
             self._stop = before
             return True
         if block.epoch != before[0] or block.first_index > before[1]:
-            self._alarms = {
-                id_: alarm if alarm.identity.kind is AlarmKind.LINK_LOST else interrupted(alarm)
-                for id_, alarm in self._alarms.items()
-            }
+            self._board.interrupt()
         return False
 
     def _take_assessment(self, assessment: Assessment) -> None:
-        channels = self._channels_of[assessment.bearing]
-        for channel, place in zip(channels, AMPLITUDES, strict=True):
-            self._note_segment(channel, assessment.readings[f"order1_{place}_um_pk"])
-        for watch in self._watched.amplitudes[assessment.bearing]:
-            self._compare(watch, assessment.readings[watch.source], assessment.time_ns)
+        bearing, readings, now_ns = assessment.bearing, assessment.readings, assessment.time_ns
+        for channel, place in zip(self._channels_of[bearing], AMPLITUDES, strict=True):
+            self._note_segment(channel, readings[f"order1_{place}_um_pk"])
+        state = None if assessment.condition is None else assessment.condition.state
+        self._state = (state, now_ns)
+        for watch in self._watched.readings[bearing]:
+            held = self._board.alarm(watch.id).condition.level
+            condition = watch.limits.judge(readings[watch.source], state, held)
+            self._board.advance(watch.id, condition, now_ns)
+        for watch in self._watched.changes[bearing]:
+            self._board.advance(watch.id, self._change(watch, assessment, state), now_ns)
+
+    def _change(
+        self, watch: LimitWatch, assessment: Assessment, state: OperatingState | None
+    ) -> Condition:
+        """What a 1× vector says against the reference of the present state."""
+        limits = watch.limits.at(state)
+        if limits is None:
+            return outside(state)
+        reference = self.reference(assessment.bearing, state or OperatingState.UNKNOWN)
+        held = self._board.alarm(watch.id).condition.level
+        return vector_condition(assessment.readings, watch.source, reference, limits, held)
+
+    def _recent_state(self, now_ns: int) -> OperatingState | None:
+        state, seen_ns = self._state
+        return state if abs(now_ns - seen_ns) <= STATE_HOLDS_NS else None
 
     def _note_segment(self, channel: str, reading: Reading) -> None:
         """Remember what only a segment shows of a channel, until another one shows otherwise."""
@@ -192,9 +221,11 @@ class UnitAlarms:
         """Judge every channel; where all rest and nothing is new, that is a single comparison."""
         if block.channel_quality == self._resting_with:
             return
-        for watch in self._watched.channels:
-            self._apply(watch, self._channel_condition(watch.source, block), block.stop_ns)
-        resting = all(self._alarms[watch.id].is_resting for watch in self._watched.channels)
+        watches = self._watched.channels
+        for watch in watches:
+            condition = self._channel_condition(watch.source, block)
+            self._board.find(watch, condition, block.stop_ns)
+        resting = all(self._board.alarm(watch.id).is_resting for watch in watches)
         self._resting_with = block.channel_quality if resting else None
 
     def _channel_condition(self, channel: str, block: SampleBlock) -> Condition:
@@ -211,32 +242,18 @@ class UnitAlarms:
         if drift is not None:
             self._compare(drift, drift_reading(block.clock), host_ns)
         if stamps is not None:
-            self._apply(stamps, stamp_condition(block.stamp_fault), host_ns)
+            self._board.find(stamps, stamp_condition(block.stamp_fault), host_ns)
 
     def _take_link(self, host_ns: int) -> None:
         if self._watched.link is not None:
-            self._apply(self._watched.link, link_condition(*self._link), host_ns)
+            self._board.find(self._watched.link, link_condition(*self._link), host_ns)
 
-    def _compare(self, watch: LimitWatch, reading: Reading, now_ns: int) -> None:
-        alarm, value = self._alarms[watch.id], reading.value
-        if alarm.is_resting and value is not None and value <= watch.limits.lowest:
+    def _compare(
+        self, watch: LimitWatch, reading: Reading, now_ns: int, state: OperatingState | None = None
+    ) -> None:
+        alarm, value = self._board.alarm(watch.id), reading.value
+        limits = watch.limits.at(state)
+        if limits and alarm.is_resting and value is not None and limits.is_within(value):
             return  # as nearly always
-        self._apply(watch, judge(reading, watch.limits, alarm.condition.level), now_ns)
-
-    def _apply(self, watch: Watch, condition: Condition, now_ns: int) -> None:
-        alarm = self._alarms[watch.id]
-        if condition.level is None and condition.is_known and alarm.is_resting:
-            return
-        self._advance(watch.id, condition, now_ns)
-
-    def _advance(self, id_: str, condition: Condition, now_ns: int) -> None:
-        self._note(id_, *advance(self._alarms[id_], condition, now_ns, self._rules[id_]))
-
-    def _note(self, id_: str, alarm: Alarm, events: tuple[AlarmEvent, ...]) -> None:
-        self._alarms[id_] = alarm
-        if events:
-            self._news.append(AlarmNews(alarm, events))
-
-    def _told(self) -> list[AlarmNews]:
-        news, self._news = self._news, []
-        return news
+        condition = watch.limits.judge(reading, state, alarm.condition.level)
+        self._board.find(watch, condition, now_ns)

@@ -1,42 +1,15 @@
 """Which alarms a unit has, and what each of them looks at."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 from core.alarms.alarm import AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.limits import Limits
-from core.alarms.rules import ClockRules, LimitRule, UnitRules
+from core.alarms.bearing_watches import change_watches, reading_watches
+from core.alarms.rules import BearingRules, ClockRules, LimitRule, UnitRules
+from core.alarms.watch import LimitWatch, Watch
 from core.machine import Unit
 
 DEVICE, LINK = "device", "link"
 """Subjects of alarms about the whole unit."""
-
-
-@dataclass(frozen=True)
-class Watch:
-    """One alarm to be, and how long its condition must last.
-
-    Parameters
-    ----------
-    source
-        Channel or reading that it looks at.
-    """
-
-    identity: AlarmIdentity
-    rule: AlarmRule
-    source: str
-
-    @cached_property
-    def id(self) -> str:
-        """Of the alarm."""
-        return self.identity.id
-
-
-@dataclass(frozen=True)
-class LimitWatch(Watch):
-    """One that compares a value with limits."""
-
-    limits: Limits
 
 
 @dataclass(frozen=True)
@@ -49,8 +22,10 @@ class WatchList:
         One for each waveform channel, in their order.
     slow_channels
         Of those that a limit depends on.
-    amplitudes
+    readings
         By bearing, to be compared with its readings.
+    changes
+        By bearing, to compare its 1× vectors with their references.
     temperatures
         To be compared with slow channels.
     films
@@ -59,7 +34,8 @@ class WatchList:
 
     channels: tuple[Watch, ...]
     slow_channels: tuple[Watch, ...]
-    amplitudes: dict[str, tuple[LimitWatch, ...]]
+    readings: dict[str, tuple[LimitWatch, ...]]
+    changes: dict[str, tuple[LimitWatch, ...]]
     temperatures: tuple[LimitWatch, ...]
     films: tuple[Watch, ...]
     offset: LimitWatch | None
@@ -70,7 +46,11 @@ class WatchList:
     @property
     def all(self) -> list[Watch]:
         """Each of them once."""
-        of_bearings = [watch for watches in self.amplitudes.values() for watch in watches]
+        of_bearings = [
+            watch
+            for bearing, watches in self.readings.items()
+            for watch in (*watches, *self.changes[bearing])
+        ]
         of_unit = [w for w in (self.offset, self.drift, self.stamps, self.link) if w is not None]
         return [
             *self.channels,
@@ -86,10 +66,12 @@ def watch_list(unit: Unit, rules: UnitRules) -> WatchList:
     """The alarms that rules make of a unit."""
     temperatures = tuple(_temperatures(unit, rules))
     sources = dict.fromkeys(watch.source for watch in temperatures)
+    of_bearings = [(b, rules.bearings.get(b.id, BearingRules())) for b in unit.bearings]
     return WatchList(
         channels=tuple(_channel(unit, channel.id, rules.channel) for channel in unit.channels),
         slow_channels=tuple(_channel(unit, source, rules.slow_channel) for source in sources),
-        amplitudes={bearing.id: _amplitudes(unit, bearing.id, rules) for bearing in unit.bearings},
+        readings={b.id: reading_watches(unit.id, b, found) for b, found in of_bearings},
+        changes={b.id: change_watches(unit.id, b, found) for b, found in of_bearings},
         temperatures=temperatures,
         films=_films(unit, rules.films),
         offset=_offset(unit, rules.clock),
@@ -108,7 +90,7 @@ def _channel(unit: Unit, channel: str, rule: AlarmRule) -> Watch:
 
 
 def _limit(unit: Unit, subject: str, kind: AlarmKind, rule: LimitRule, source: str) -> LimitWatch:
-    return LimitWatch(_identity(unit, subject, kind), rule.rule, source, rule.limits)
+    return LimitWatch(_identity(unit, subject, kind), rule.rule, source, rule.by_state)
 
 
 def _offset(unit: Unit, clock: ClockRules | None) -> LimitWatch | None:
@@ -135,16 +117,6 @@ def _films(unit: Unit, rule: AlarmRule | None) -> tuple[Watch, ...]:
         Watch(_identity(unit, bearing.id, kind), rule, bearing.id)
         for bearing in unit.bearings
         for kind in (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
-    )
-
-
-def _amplitudes(unit: Unit, bearing: str, rules: UnitRules) -> tuple[LimitWatch, ...]:
-    found = rules.bearings.get(bearing)
-    if found is None or found.shaft_order1 is None:
-        return ()
-    return tuple(
-        _limit(unit, bearing, kind, found.shaft_order1, f"{kind}_um_pk")
-        for kind in (AlarmKind.SHAFT_X, AlarmKind.SHAFT_Y)
     )
 
 

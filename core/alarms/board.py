@@ -1,0 +1,105 @@
+"""`AlarmBoard`: alarms with their rules, and the news of them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from core.alarms.alarm import Alarm, AlarmKind, AlarmRule, Condition, unknown
+from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.life_cycle import advance, interrupted, restored
+from core.alarms.operation import Action, expire, operate
+from core.alarms.watch import Watch
+
+RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
+
+JUDGED_WITHOUT_DATA = (AlarmKind.LINK_LOST,)
+"""Kinds whose condition is known whether samples arrive or not."""
+
+
+class AlarmBoard:
+    """Owns some alarms. News come in the order in which things happened.
+
+    Parameters
+    ----------
+    watched
+        What may raise an alarm.
+    """
+
+    def __init__(self, watched: Iterable[Watch]) -> None:
+        watches = list(watched)
+        self._rules = {watch.id: watch.rule for watch in watches}
+        self._alarms = {watch.id: Alarm(watch.identity) for watch in watches}
+        self._news: list[AlarmNews] = []
+
+    @property
+    def alarms(self) -> Sequence[Alarm]:
+        """All of them, whatever their state."""
+        return list(self._alarms.values())
+
+    def __contains__(self, id_: str) -> bool:
+        return id_ in self._alarms
+
+    def alarm(self, id_: str) -> Alarm:
+        """Look one up. Raises `KeyError` if there is no such alarm."""
+        return self._alarms[id_]
+
+    def find(self, watch: Watch, condition: Condition, now_ns: int) -> None:
+        """Take in what is found; of what rests and goes on resting, that is nothing."""
+        alarm = self._alarms[watch.id]
+        if condition.level is None and condition.is_known and alarm.is_resting:
+            return
+        self.advance(watch.id, condition, now_ns)
+
+    def advance(self, id_: str, condition: Condition, now_ns: int) -> None:
+        """Take in what is found, and remember it even if nothing comes of it."""
+        self._note(id_, *advance(self._alarms[id_], condition, now_ns, self._rules[id_]))
+
+    def interrupt(self) -> None:
+        """Let delays stand still where samples are missing."""
+        self._alarms = {
+            id_: alarm if alarm.identity.kind in JUDGED_WITHOUT_DATA else interrupted(alarm)
+            for id_, alarm in self._alarms.items()
+        }
+
+    def expire(self, host_ns: int) -> None:
+        """Bring back what was shelved until now."""
+        for id_, alarm in self._alarms.items():
+            if alarm.shelf is not None:
+                self._note(id_, *expire(alarm, host_ns))
+
+    def operate(self, id_: str, action: Action, host_ns: int) -> None:
+        """Do what somebody asks for.
+
+        Raises
+        ------
+        KeyError
+            If there is no such alarm.
+        ActionRefusedError
+            If it does not fit the alarm as it is now.
+        """
+        self._note(id_, *operate(self._alarms[id_], action, host_ns))
+
+    def restore(self, alarms: Iterable[Alarm], host_ns: int) -> None:
+        """Go on where the service stopped: what was active is, and its condition is unknown.
+
+        An alarm that nothing watches any more returns; it stays on the list until acknowledged.
+        """
+        for stored in alarms:
+            id_ = stored.identity.id
+            if id_ in self._rules:
+                self._alarms[id_] = restored(stored)
+                if stored.identity.kind not in JUDGED_WITHOUT_DATA:
+                    self.advance(id_, unknown(RESTARTED, stored.suppressed_by), host_ns)
+            elif stored.level is not None or not stored.is_acknowledged:
+                self._alarms[id_] = restored(replace(stored, is_latched=False))
+                self._rules[id_] = AlarmRule()
+                self.advance(id_, Condition(reason=NO_LONGER_WATCHED), host_ns)
+
+    def told(self) -> list[AlarmNews]:
+        """Hand over the news since the last call."""
+        news, self._news = self._news, []
+        return news
+
+    def _note(self, id_: str, alarm: Alarm, events: tuple[AlarmEvent, ...]) -> None:
+        self._alarms[id_] = alarm
+        if events:
+            self._news.append(AlarmNews(alarm, events))

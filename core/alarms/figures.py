@@ -1,0 +1,173 @@
+"""Figures of an alarm list after ISA-18.2, table 7: how often people are called, and by what."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from core.alarms.alarm import Alarm, AlarmLevel, AlarmState
+from core.alarms.chatter import ChatterRule
+from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.units import NS_PER_S
+
+TEN_MINUTES_NS = 600 * NS_PER_S
+DAY_NS = 86_400 * NS_PER_S
+
+STALE_NS = DAY_NS
+"""An alarm that is active for longer is stale."""
+
+N_FLOOD = 10
+"""More alarms than this in ten minutes are a flood: nobody can follow them."""
+
+N_MOST_FREQUENT = 10
+
+HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
+
+
+@dataclass(frozen=True)
+class Frequent:
+    """An alarm that came often: how often, and as which share of all."""
+
+    alarm: str
+    n_alarms: int
+    share: float
+
+
+@dataclass(frozen=True)
+class AlarmFigures:
+    """Figures over some time.
+
+    Parameters
+    ----------
+    n_alarms
+        How often something was announced: an alarm that was raised or rose to danger, or that came
+        back from where it was hidden.
+    per_day, per_10_min
+        On average.
+    most_in_10_min
+        In the worst ten minutes.
+    share_in_flood
+        Of the ten-minute periods, those with more than `N_FLOOD`.
+    n_by_level
+        By priority.
+    most_frequent
+        At most `N_MOST_FREQUENT`, the most frequent first.
+    chattering
+        How often each alarm was raised within the window of too many others of its own.
+    n_fleeting
+        Alarms that returned within the window.
+    """
+
+    n_alarms: int
+    per_day: float
+    per_10_min: float
+    most_in_10_min: int
+    share_in_flood: float
+    n_by_level: Mapping[AlarmLevel, int]
+    most_frequent: Sequence[Frequent]
+    chattering: Mapping[str, int]
+    n_fleeting: int
+
+
+def is_announced(event: AlarmEvent) -> bool:
+    """Whether an event calls for somebody: something new on the list, or back on it."""
+    return event.state_after is AlarmState.UNACKNOWLEDGED and (
+        event.change in ANNOUNCED or event.state_before in HIDDEN
+    )
+
+
+def figures_of(
+    events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
+) -> AlarmFigures:
+    """Count what happened.
+
+    Parameters
+    ----------
+    events
+        In the order in which they happened; those of other times are left out.
+    start_ns, end_ns
+        From the first, up to but not including the second.
+
+    Raises
+    ------
+    ValueError
+        If the end is not after the start.
+    """
+    if end_ns <= start_ns:
+        raise ValueError(f"end {end_ns} must be after start {start_ns}")
+    within = [event for event in events if start_ns <= event.time_ns < end_ns]
+    told = [event for event in within if is_announced(event)]
+    by_alarm = Counter(event.identity.id for event in told)
+    span_ns = end_ns - start_ns
+    times = sorted(event.time_ns for event in told)
+    return AlarmFigures(
+        n_alarms=len(told),
+        per_day=len(told) * DAY_NS / span_ns,
+        per_10_min=len(told) * TEN_MINUTES_NS / span_ns,
+        most_in_10_min=_most_within(times, TEN_MINUTES_NS),
+        share_in_flood=_share_in_flood(times, start_ns, end_ns),
+        n_by_level={n: sum(event.level is n for event in told) for n in AlarmLevel},
+        most_frequent=[
+            Frequent(alarm, n, n / len(told)) for alarm, n in by_alarm.most_common(N_MOST_FREQUENT)
+        ],
+        chattering=_chattering(within, rule),
+        n_fleeting=_n_fleeting(within, rule),
+    )
+
+
+def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
+    """Alarms on the list that have been active for more than a day, the oldest first."""
+    standing = [
+        (alarm.raised_ns, alarm)
+        for alarm in alarms
+        if alarm.level is not None and alarm.raised_ns is not None and alarm.state not in HIDDEN
+    ]
+    old = [pair for pair in standing if now_ns - pair[0] > STALE_NS]
+    return [alarm for _, alarm in sorted(old, key=lambda pair: pair[0])]
+
+
+def _most_within(times: Sequence[int], window_ns: int) -> int:
+    """Most of some sorted times in any window, its end not included."""
+    most, first = 0, 0
+    for n, time_ns in enumerate(times):
+        while time_ns - times[first] >= window_ns:
+            first += 1
+        most = max(most, n - first + 1)
+    return most
+
+
+def _share_in_flood(times: Iterable[int], start_ns: int, end_ns: int) -> float:
+    periods = Counter((time_ns - start_ns) // TEN_MINUTES_NS for time_ns in times)
+    n_periods = -(-(end_ns - start_ns) // TEN_MINUTES_NS)
+    return sum(n > N_FLOOD for n in periods.values()) / n_periods
+
+
+def _chattering(events: Iterable[AlarmEvent], rule: ChatterRule) -> dict[str, int]:
+    """Activations of each alarm that lie, with enough others, within one window."""
+    raised: dict[str, list[int]] = {}
+    for event in events:
+        if event.change in ANNOUNCED:
+            raised.setdefault(event.identity.id, []).append(event.time_ns)
+    counts = {alarm: _n_in_bursts(sorted(times), rule) for alarm, times in raised.items()}
+    return {alarm: n for alarm, n in counts.items() if n}
+
+
+def _n_in_bursts(times: Sequence[int], rule: ChatterRule) -> int:
+    n_wanted = rule.n_activations
+    counted: set[int] = set()
+    for last in range(n_wanted - 1, len(times)):
+        first = last - n_wanted + 1
+        if times[last] - times[first] <= rule.window_ns:
+            counted.update(range(first, last + 1))
+    return len(counted)
+
+
+def _n_fleeting(events: Iterable[AlarmEvent], rule: ChatterRule) -> int:
+    raised_ns: dict[str, int] = {}
+    n_fleeting = 0
+    for event in events:
+        id_ = event.identity.id
+        if event.change is AlarmChange.RAISED:
+            raised_ns[id_] = event.time_ns
+        elif event.change is AlarmChange.RETURNED and id_ in raised_ns:
+            n_fleeting += event.time_ns - raised_ns.pop(id_) < rule.window_ns
+    return n_fleeting
