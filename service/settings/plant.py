@@ -8,6 +8,7 @@ from pydantic import Field, StringConstraints, model_validator
 from core.units import hz_from_rpm
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.delivery import DeliverySettings
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
@@ -167,12 +168,16 @@ class PlantFile(Settings):
     capture: CaptureSettings = CaptureSettings()
     """Samples that are kept around an alarm."""
 
+    delivery: DeliverySettings = DeliverySettings()
+    """Who is told of alarms, beside the dashboard."""
+
     unit: Annotated[tuple[UnitSettings, ...], Field(min_length=1, max_length=200)]
     """Generating units."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         refuse_twice(("unit", n, "id", unit.id) for n, unit in enumerate(self.unit))
+        self.delivery.require_units(tuple(unit.id for unit in self.unit))
         for unit in self.unit:
             if not isinstance(unit.source, ModbusVectorSettings):
                 self._check_analysis(unit)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from service.origin import Origin
 from service.settings.plant import PlantFile
+from service.store.outbox_port import Address, nobody
 from service.store.port import Store
 from service.store.sqlite import SqliteStore
 
@@ -15,12 +16,17 @@ def database_path(plant: PlantFile) -> Path:
     return Path(plant.service.data_folder) / DATABASE
 
 
-def open_store(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store:
+def open_store(plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = nobody) -> Store:
     """The plant's database, created if need be.
+
+    Parameters
+    ----------
+    address
+        Who is to be told of events of alarms.
 
     Raises
     ------
     StoreError
         If it cannot be used, or holds results of the other origin.
     """
-    return SqliteStore(database_path(plant), origin)
+    return SqliteStore(database_path(plant), origin, address)

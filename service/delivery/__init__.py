@@ -1,0 +1,1 @@
+"""Delivery: alarms told to webhooks and mailboxes through a durable outbox."""

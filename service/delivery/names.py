@@ -1,0 +1,80 @@
+"""Addresses of a receiver, looked up where a name server that does not answer holds up nobody.
+
+The event loop's own look-up takes a thread that the store needs, too, and keeps it for as long as
+the name servers take to fail, whoever has stopped waiting meanwhile.
+"""
+
+import asyncio
+import ipaddress
+import socket
+import threading
+
+MAX_ADDRESSES = 4
+"""Most addresses of one name that are tried."""
+
+
+class NameLookUp:
+    """Looks up one name; at most one look-up is under way, however often it is asked for."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._host, self._port = host, port
+        self._asking: asyncio.Future[list[str]] | None = None
+
+    async def addresses(self) -> list[str]:
+        """Addresses in the order in which to try them.
+
+        Raises
+        ------
+        OSError
+            If there are none.
+        """
+        if _is_address(self._host):
+            return [self._host]
+        if self._asking is None or self._asking.done():
+            self._asking = asyncio.get_running_loop().create_future()
+            self._asking.add_done_callback(_retrieved)
+            threading.Thread(
+                target=_look_up,
+                args=(self._host, self._port, asyncio.get_running_loop(), self._asking),
+                name=f"look up {self._host}",
+                daemon=True,  # it must not hold up the end of the program either
+            ).start()
+        return await asyncio.shield(self._asking)
+
+
+def _look_up(
+    host: str, port: int, loop: asyncio.AbstractEventLoop, answer: "asyncio.Future[list[str]]"
+) -> None:
+    found: list[str] | OSError
+    try:
+        infos = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        found = list(dict.fromkeys(str(info[4][0]) for info in infos))[:MAX_ADDRESSES]
+    except (OSError, UnicodeError) as error:
+        found = error if isinstance(error, OSError) else OSError(f"{host} is no name")
+    try:
+        loop.call_soon_threadsafe(_answer, answer, found)
+    except RuntimeError:
+        return  # the program has ended meanwhile
+
+
+def _answer(answer: "asyncio.Future[list[str]]", found: list[str] | OSError) -> None:
+    if answer.done():
+        return
+    if isinstance(found, OSError):
+        answer.set_exception(found)
+    else:
+        answer.set_result(found)
+
+
+def _retrieved(answer: "asyncio.Future[list[str]]") -> None:
+    """Look at an error that nobody waits for any more, lest it be reported as forgotten."""
+    if not answer.cancelled():
+        answer.exception()
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True

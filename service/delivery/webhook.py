@@ -1,0 +1,176 @@
+"""Messages as POST requests: signed, bounded, and judged by the status of the answer alone."""
+
+import asyncio
+import contextlib
+import hashlib
+import hmac
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from importlib.metadata import version
+
+import httpx2
+
+from acquisition.clock import Clock
+from core.units import NS_PER_S
+from service.delivery.message import Message
+from service.delivery.names import NameLookUp
+from service.delivery.network import PATIENT, Timeouts, Trust, printable, words
+from service.delivery.outcome import Delivered, Failed, Outcome, Refused
+from service.delivery.secret import Secret, SecretError
+
+EXCERPT_BYTES = 1024
+EXCERPT_S = 2.0
+"""How much of a refusal is read, to be shown, and for how long; of a consent nothing is."""
+
+TRY_AGAIN = (408, 425, 429)
+"""Answers of 4xx that do not say that the message is wrong."""
+
+
+@dataclass(frozen=True)
+class WebhookTarget:
+    """Where messages go.
+
+    Parameters
+    ----------
+    secret
+        Signs them, if there is one.
+    authorization
+        Value of the Authorization header, if there is one.
+    """
+
+    url: str
+    secret: Secret | None = None
+    authorization: Secret | None = None
+    timeouts: Timeouts = PATIENT
+
+
+class Webhook:
+    """Carries messages to a web server; a connection for each."""
+
+    def __init__(self, target: WebhookTarget, trust: Trust, clock: Clock) -> None:
+        self._target, self._trust, self._clock = target, trust, clock
+        self._url = httpx2.URL(target.url)
+        port = self._url.port or (443 if self._url.scheme == "https" else 80)
+        self._look_up = NameLookUp(self._url.host, port)
+
+    async def carry(self, message: Message, body: str) -> Outcome:
+        """Try once."""
+        try:
+            async with asyncio.timeout(self._target.timeouts.total_s):
+                return await self._post(message["id"], body.encode())
+        except (httpx2.HTTPError, httpx2.InvalidURL, OSError, ValueError, SecretError) as error:
+            return Failed(printable(words(_named(error))))
+
+    async def _post(self, id_: str, body: bytes) -> Outcome:
+        timeouts = self._target.timeouts
+        headers = self._headers(id_, body)
+        context = await self._trust.context()
+        async with asyncio.timeout(timeouts.connect_s):
+            addresses = await self._look_up.addresses()
+        # a bare transport: no redirects, cookies, proxies or netrc, whatever an answer says
+        async with httpx2.AsyncHTTPTransport(verify=context, trust_env=False) as transport:
+            for address in addresses[:-1]:
+                with contextlib.suppress(httpx2.ConnectError, httpx2.ConnectTimeout):
+                    return await self._answer(transport, address, headers, body)
+            return await self._answer(transport, addresses[-1], headers, body)
+
+    async def _answer(
+        self,
+        transport: httpx2.AsyncHTTPTransport,
+        address: str,
+        headers: Mapping[str, str],
+        body: bytes,
+    ) -> Outcome:
+        timeouts = self._target.timeouts
+        limits = httpx2.Timeout(timeouts.answer_s, connect=timeouts.connect_s)
+        request = httpx2.Request(
+            "POST",
+            self._url.copy_with(host=address),
+            headers=headers,
+            content=body,
+            extensions={"sni_hostname": self._url.host, "timeout": limits.as_dict()},
+        )
+        response = await transport.handle_async_request(request)
+        try:
+            return await self._judged(response)
+        finally:
+            await response.aclose()
+
+    async def _judged(self, response: httpx2.Response) -> Outcome:
+        status = response.status_code
+        if 200 <= status < 300:
+            return Delivered(f"{status}")
+        if 300 <= status < 400:
+            where = response.headers.get("Location", "elsewhere")
+            return Failed(printable(f"{status}: sends on to {where}, which is not followed"))
+        said = printable(f"{status} {await _excerpt(response)}")
+        if 400 <= status < 500 and status not in TRY_AGAIN:
+            return Refused(said)
+        return Failed(said, retry_after_s(response.headers.get("Retry-After"), self._clock))
+
+    def _headers(self, id_: str, body: bytes) -> dict[str, str]:
+        """What goes with a message.
+
+        Raises
+        ------
+        SecretError
+            If a secret is not to be had: nothing is sent without what should prove it.
+        """
+        time_s = str(self._clock.now_ns() // NS_PER_S)
+        headers = {
+            "Host": self._url.netloc.decode("ascii"),
+            "Content-Type": "application/json",
+            "Accept-Encoding": "identity",
+            "Connection": "close",
+            "User-Agent": f"padwatch/{version('padwatch')}",
+            "Padwatch-Event-Id": id_,
+            "Idempotency-Key": f'"{id_}"',
+            "Padwatch-Timestamp": time_s,
+        }
+        if self._target.secret is not None:
+            headers["Padwatch-Signature"] = signature(self._target.secret.read(), time_s, body)
+        if self._target.authorization is not None:
+            headers["Authorization"] = self._target.authorization.read()
+        return headers
+
+
+def signature(secret: str, time_s: str, body: bytes) -> str:
+    """HMAC-SHA-256 over time stamp, a dot and body, so that an old message cannot be sent anew."""
+    signed = time_s.encode() + b"." + body
+    return "v1=" + hmac.new(secret.encode(), signed, hashlib.sha256).hexdigest()
+
+
+def retry_after_s(text: str | None, clock: Clock) -> float | None:
+    """When a server wants to be asked again (RFC 9110, 10.2.3): seconds or a date; else None."""
+    if text is None:
+        return None
+    if text.isascii() and text.isdigit():
+        return float(text[:9])
+    try:
+        moment = parsedate_to_datetime(text)
+    except ValueError:
+        return None
+    aware = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    now = datetime.fromtimestamp(clock.now_ns() / NS_PER_S, UTC)
+    return max(0.0, (aware - now).total_seconds())
+
+
+async def _excerpt(response: httpx2.Response) -> str:
+    """Read the beginning of what it says; an answer that never ends, or breaks off, will do."""
+    found = b""
+    with contextlib.suppress(httpx2.HTTPError, TimeoutError):
+        async with asyncio.timeout(EXCERPT_S):
+            async for part in response.aiter_raw():
+                found += part[:EXCERPT_BYTES]
+                if len(found) >= EXCERPT_BYTES:
+                    break
+    return found[:EXCERPT_BYTES].decode("utf-8", "replace")
+
+
+def _named(error: Exception) -> Exception:
+    """The error with a word for what kind it is, where it says nothing itself."""
+    if isinstance(error, httpx2.TimeoutException):
+        return TimeoutError()
+    return error
