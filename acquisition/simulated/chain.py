@@ -5,6 +5,7 @@ import numpy as np
 from acquisition.errors import ConfigError
 from acquisition.simulated.accelerometer_noise import AccelerometerNoise
 from acquisition.simulated.conditions import Conditions
+from acquisition.simulated.forces import straight
 from acquisition.simulated.key_phase import KeyPhasePulses
 from acquisition.simulated.probes import ShaftRunout, reference_gap_um, standing_gap_um
 from acquisition.simulated.response_filter import ResponseFilter
@@ -44,7 +45,6 @@ class TransducerChain:
             for row, channel in enumerate(channels)
             if channel.response is not None
         }
-        self._gains = {row: c.gain for row, c in enumerate(channels) if c.gain != 1.0}
         self._reference_um = reference_gap_um(machine)
         self._white, self._white_rms = white, noise_rms(machine, scenario.noise)
         self._noisy, self._own = _own_noise(machine, scenario.noise, own)
@@ -72,7 +72,8 @@ class TransducerChain:
             motion[self._noisy] += self._own.advance(turns.size)
         for row, response in self._filters.items():
             motion[row] = response.advance(motion[row])
-        for row, gain in self._gains.items():
+        for row in np.flatnonzero((start.gain != 1.0) | (stop.gain != 1.0)).tolist():
+            gain = straight(float(start.gain[row]), float(stop.gain[row]), turns.size)
             motion[row] = self._reference_um[row] + gain * (motion[row] - self._reference_um[row])
         return motion
 

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 import scipy.signal
 
-from acquisition.simulated.rotation import Rotation
+from acquisition.simulated.rotation import Turning
 from core.arrays import FloatArray
 
 CUTOFF_FILTER_ORDER = 4
@@ -30,7 +30,7 @@ class UnbalanceForce:
         At the mean speed.
     """
 
-    def __init__(self, force_n: float, rotation: Rotation) -> None:
+    def __init__(self, force_n: float, rotation: Turning) -> None:
         self._force_n = force_n
         self._rotation = rotation
         self._index = 0

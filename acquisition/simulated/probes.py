@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.simulated.conditions import Conditions
-from acquisition.simulated.scenario import Scenario
+from acquisition.simulated.scenario import ChannelScenario, Scenario
 from core.arrays import ComplexArray, FloatArray
 from core.machine import Bearing, Measurand, Unit
 
@@ -54,8 +54,9 @@ def _probes(index: int, bearing: Bearing) -> Iterator[Probe]:
 
 def gap_um(probe: Probe, direction: int, now: Conditions) -> float:
     """Mean gap under a probe whose reading grows with motion in the given direction."""
-    centre_um = direction * float(now.centre_um[probe.bearing, probe.axis])
-    return probe.reference_um + centre_um + float(now.gap_growth_um[probe.bearing])
+    place = probe.bearing, probe.axis
+    told_um = direction * float(now.centre_um[place] + now.position_error_um[place])
+    return probe.reference_um + told_um + float(now.gap_growth_um[probe.bearing])
 
 
 def reference_gap_um(machine: Unit) -> FloatArray:
@@ -84,16 +85,20 @@ class ShaftRunout:
         rows = {channel.id: row for row, channel in enumerate(machine.channels)}
         self._phasors: dict[int, ComplexArray] = {}
         for probe in probes(machine):
+            row = rows[probe.channel]
+            channel = machine.channels[row]
             runout = scenario.bearings[machine.bearings[probe.bearing].id].runout_um_pk
-            if runout:
-                row = rows[probe.channel]
-                order = np.arange(1, len(runout) + 1)
-                passed = np.exp(-0.5j * np.pi * order * (probe.axis + 2 * probe.opposite))
-                # a bump towards the probe is a smaller gap, or motion along a near probe's axis
-                channel = machine.channels[row]
-                gap = channel.measurand is Measurand.GAP_UM
-                sign = -1 if gap else channel.direction * (-1 if probe.opposite else 1)
-                self._phasors[row] = sign * np.array(runout) * passed
+            own = scenario.channels.get(channel.id, ChannelScenario()).runout_um_pk
+            phasors = np.zeros(max(len(runout), len(own)), np.complex128)
+            order = np.arange(1, len(runout) + 1)
+            passed = np.exp(-0.5j * np.pi * order * (probe.axis + 2 * probe.opposite))
+            # a bump towards the probe is a smaller gap, or motion along a near probe's axis
+            gap = channel.measurand is Measurand.GAP_UM
+            sign = -1 if gap else channel.direction * (-1 if probe.opposite else 1)
+            phasors[: len(runout)] += sign * np.array(runout) * passed
+            phasors[: len(own)] += channel.direction * np.array(own)
+            if phasors.any():
+                self._phasors[row] = phasors
 
     def add_to(self, readings: FloatArray, turns: FloatArray) -> None:
         """Add what the probes see of it, in place; the rest of the channels see nothing."""

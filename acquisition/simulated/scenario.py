@@ -27,6 +27,11 @@ class BearingScenario:
         shaft; the other probes see the same surface later. Towards a probe is positive.
     bracket_stiffness_factor
         True stiffness of the bracket over the one of `Scenario.rotor`, which monitors are told.
+    position_error_um
+        Displacement (x, y) that the gaps tell and that is not there: drift of probes, before their
+        gain. It does not move the film.
+    oil_temperature_error_c
+        By how much the thermometer reads high.
     """
 
     film: Film
@@ -39,6 +44,8 @@ class BearingScenario:
     gap_growth_wander_um_rms: float = 0.0
     runout_um_pk: tuple[complex, ...] = ()
     bracket_stiffness_factor: float = 1.0
+    position_error_um: tuple[float, float] = (0.0, 0.0)
+    oil_temperature_error_c: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -129,10 +136,14 @@ class ChannelScenario:
     gain
         True sensitivity over the nominal one. A probe's reference gap was read with the probe
         itself, so that the gain acts on what differs from it.
+    runout_um_pk
+        What this probe alone sees besides the runout of the shaft, 1×, 2×, …: phasors of motion
+        along its axis.
     """
 
     response: Response | None = None
     gain: float = 1.0
+    runout_um_pk: tuple[complex, ...] = ()
     faults: tuple[Fault, ...] = ()
 
 

@@ -12,8 +12,12 @@ def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, f
         machine.power_channel: now.active_power_mw,
     }
     for index, bearing in enumerate(machine.bearings):
-        values[bearing.oil_temperature] = float(now.oil_temperature_c[index])
-    directions = {channel.id: channel.direction for channel in machine.channels}
+        shown_c = now.oil_temperature_c[index] + now.oil_temperature_error_c[index]
+        values[bearing.oil_temperature] = float(shown_c)
+    rows = {channel.id: row for row, channel in enumerate(machine.channels)}
     for probe in probes(machine):
-        values[probe.slow_channel] = gap_um(probe, directions[probe.channel], now) / 1e3
+        row = rows[probe.channel]
+        from_reference_um = gap_um(probe, machine.channels[row].direction, now) - probe.reference_um
+        shown_um = probe.reference_um + float(now.gain[row]) * from_reference_um
+        values[probe.slow_channel] = shown_um / 1e3
     return {name: value for name, value in values.items() if name is not None}

@@ -9,6 +9,7 @@ from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.simulated.conditions import Conditions, between
 from acquisition.simulated.converter import to_counts
+from acquisition.simulated.course import Course
 from acquisition.simulated.faults import FaultInjector
 from acquisition.simulated.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.scenario import Scenario
@@ -27,6 +28,8 @@ class SimulatedUnit:
     ----------
     machine
         Its bearings are called UJB, LJB and TJB; it need not have all three.
+    scenario
+        One for ever, or a course of them.
     start_ns
         Time of sample 0; in whole seconds it is also the epoch of the blocks.
 
@@ -40,18 +43,18 @@ class SimulatedUnit:
         self,
         machine: Unit,
         calibration: UnitCalibration,
-        scenario: Scenario,
+        scenario: Scenario | Course,
         seed: int,
         start_ns: int,
     ) -> None:
         _check(machine, calibration)
         self._machine = machine
         self._calibration = calibration
-        self._scenario = scenario
+        first = scenario if isinstance(scenario, Scenario) else scenario.at(0.0)
         self._start_ns = start_ns
         self._plant = SimulatedPlant(machine, scenario, seed)
-        self._faults = _faults(machine, scenario, seed)
-        self._exchanged = _exchanged(machine, calibration, scenario)
+        self._faults = _faults(machine, first, seed)
+        self._exchanged = _exchanged(machine, calibration, first)
         self._index = 0
         self._next_chunk()
 
@@ -87,7 +90,9 @@ class SimulatedUnit:
 
     def truth(self) -> UnitTruth:
         """Tell what is really so at the next sample."""
-        return unit_truth(self._machine, self._scenario, self._conditions(), self._speed_rpm())
+        return unit_truth(
+            self._machine, self._chunk.scenario, self._conditions(), self._speed_rpm()
+        )
 
     def _next_chunk(self) -> None:
         self._chunk = self._plant.advance()
@@ -98,7 +103,7 @@ class SimulatedUnit:
 
     def _speed_rpm(self) -> float:
         offset = self._index % CHUNK_SAMPLES
-        return self._scenario.speed_rpm * self._plant.relative_speed(self._chunk, offset)
+        return self._plant.speed_rpm(self._chunk, offset)
 
     def _conditions(self) -> Conditions:
         fraction = self._index % CHUNK_SAMPLES / CHUNK_SAMPLES

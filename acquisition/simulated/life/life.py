@@ -185,4 +185,5 @@ def _truth(life: _BearingLife, order1: ComplexArray) -> BearingLifeTruth:
         oil_temperature_c=life.thermal.oil_temperature_c,
         order1_um_pk=order1,
         altered=life.altered,
+        chain=life.chain,
     )

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.damage import Alteration, Damage
+from acquisition.simulated.life.measured import Chain
 from acquisition.simulated.life.operation import Operation
 from core.arrays import ComplexArray, FloatArray
 from core.stiffness_history import StiffnessHistory
@@ -30,6 +31,8 @@ class BearingLifeTruth:
         Phasors of u_x, u_y, x_b, y_b at 1×.
     altered
         What damage has done to film, bracket and transducers.
+    chain
+        What the transducers make of it.
     """
 
     film: FilmColumns
@@ -40,6 +43,7 @@ class BearingLifeTruth:
     oil_temperature_c: FloatArray
     order1_um_pk: ComplexArray
     altered: Alteration
+    chain: Chain
 
     @property
     def eccentricity_ratio(self) -> FloatArray:

@@ -1,5 +1,7 @@
 """One moment of a life as a scenario, so that the same bearings can be sampled at 600 Hz."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from acquisition.simulated.life.excitation import VORTEX_FORCE_N, has_vortex, hydraulic_force_n
@@ -12,29 +14,29 @@ from acquisition.simulated.scenario import (
     TransducerNoise,
     VortexRope,
 )
+from core.arrays import FloatArray
 from core.machine import Bearing, Unit
 
 TRANSDUCER_NOISE = TransducerNoise(gap_um_rms=1.2, accelerometer_g_per_sqrt_hz=5e-6)
 """What the accuracy benchmark calls realistic."""
 
+HYDRAULIC_CUTOFF_HZ = 20.0
+"""Turbulence has died down well above the harmonics that stiffness is read between."""
+
 
 def scenario_at(
-    life: UnitLife,
-    time_ns: int,
-    machine: Unit,
-    gap_growth_share: float = 1.0,
-    noise: TransducerNoise = TRANSDUCER_NOISE,
+    life: UnitLife, time_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> Scenario:
     """What the unit goes through at the newest reading up to a moment, held for as long as wanted.
+
+    The transducers are those that the readings were made with. Gaps grow with the shaft where four
+    probes can tell that from a displacement; two are shown what four would find.
 
     Parameters
     ----------
     machine
         The unit to be sampled; its bearings are those of the life. Its clearances should be
         `LifeBearing.told_clearance_um`, for eccentricity to be that of the readings.
-    gap_growth_share
-        How much of the growth of the shaft all gaps show: 1 as it is, which two probes take for a
-        displacement and four do not; 0 for two probes to give what four would.
 
     Raises
     ------
@@ -45,29 +47,24 @@ def scenario_at(
     """
     row = row_at(life, time_ns)
     operation = life.operation
-    load = operation.load[row : row + 1]
-    vortex_n = VORTEX_FORCE_N * float(has_vortex(load)[0])
+    load = float(operation.load[row])
     return Scenario(
         bearings={
-            bearing.id: _bearing_at(life.truth[bearing.id], row, gap_growth_share)
+            bearing.id: bearing_at(life.truth[bearing.id], row, bearing)
             for bearing in machine.bearings
         },
         speed_rpm=float(operation.speed_rpm[row]),
         active_power_mw=float(operation.power_mw[row]),
         unbalance_grade_mm_s=float(life.grade_mm_s[row]),
-        hydraulic=HydraulicNoise(float(hydraulic_force_n(load)[0]), HYDRAULIC_CUTOFF_HZ),
-        rope=VortexRope(vortex_n),
+        hydraulic=hydraulic_noise(load),
+        rope=vortex_rope(load),
         noise=noise,
         channels={
-            channel: ChannelScenario(gain=gain)
+            channel: one
             for bearing in machine.bearings
-            for channel, gain in _gains_at(life.truth[bearing.id], row, bearing).items()
+            for channel, one in channels_at(life.truth[bearing.id], row, bearing)
         },
     )
-
-
-HYDRAULIC_CUTOFF_HZ = 20.0
-"""Turbulence has died down well above the harmonics that stiffness is read between."""
 
 
 def row_at(life: UnitLife, time_ns: int) -> int:
@@ -86,25 +83,74 @@ def row_at(life: UnitLife, time_ns: int) -> int:
     return row
 
 
-def _bearing_at(truth: BearingLifeTruth, row: int, gap_growth_share: float) -> BearingScenario:
+def hydraulic_noise(load: float) -> HydraulicNoise:
+    """Broadband force at a share of rated power."""
+    return HydraulicNoise(float(hydraulic_force_n(np.array([load]))[0]), HYDRAULIC_CUTOFF_HZ)
+
+
+def vortex_rope(load: float) -> VortexRope:
+    """Vortex at a share of rated power, if there is one."""
+    return VortexRope(VORTEX_FORCE_N * float(has_vortex(np.array([load]))[0]))
+
+
+def bearing_at(
+    truth: BearingLifeTruth, row: int, bearing: Bearing, usual_clearance_um: float | None = None
+) -> BearingScenario:
+    """One bearing in one row.
+
+    Parameters
+    ----------
+    usual_clearance_um
+        At which the gaps have their reference; by default the median over all rows.
+    """
+    usual_um = usual_clearance_um or float(np.median(truth.clearance_um))
+    has_four = bearing.opposite_reference_um is not None
     x_um, y_um = (float(x) for x in truth.centre_um[:, row])
-    usual_um = float(np.median(truth.clearance_um))
+    error_x_um, error_y_um = _position_error_um(truth, row).tolist()
     return BearingScenario(
         film=truth.film.at(row),
         centre_x_um=x_um,
         centre_y_um=y_um,
         oil_temperature_c=float(truth.oil_temperature_c[row]),
-        gap_growth_um=gap_growth_share * (float(truth.clearance_um[row]) - usual_um),
+        gap_growth_um=float(truth.clearance_um[row]) - usual_um if has_four else 0.0,
         bracket_stiffness_factor=float(truth.altered.bracket[row]),
+        position_error_um=(error_x_um, error_y_um),
+        oil_temperature_error_c=float(truth.chain.oil_error_c[row]),
     )
 
 
-def _gains_at(truth: BearingLifeTruth, row: int, bearing: Bearing) -> dict[str, float]:
-    """Gain by channel, as far as damage has changed it."""
-    altered = truth.altered
-    gains = np.concatenate([altered.probe_gain, altered.accelerometer_gain])[:, row]
-    return {
-        channel: float(gain)
-        for channel, gain in zip(bearing.channels, gains, strict=True)
-        if gain != 1.0
-    }
+def channels_at(
+    truth: BearingLifeTruth, row: int, bearing: Bearing
+) -> Iterator[tuple[str, ChannelScenario]]:
+    """What the transducers of a bearing are like in one row, by channel."""
+    probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
+    near, far = bearing.channels[:2], (bearing.opposite_x, bearing.opposite_y)
+    for axis in range(2):
+        gain, runout = float(probe_gain[axis]), (complex(truth.chain.runout_um_pk[axis]),)
+        yield near[axis], ChannelScenario(gain=gain, runout_um_pk=runout)
+        if far[axis] is not None:
+            yield str(far[axis]), ChannelScenario(gain=gain)
+        yield bearing.channels[2 + axis], ChannelScenario(gain=float(accelerometer_gain[axis]))
+
+
+def _probe_gain(truth: BearingLifeTruth, row: int) -> FloatArray:
+    return np.asarray(truth.chain.probe_gain * truth.altered.probe_gain[:, row])
+
+
+def _accelerometer_gain(truth: BearingLifeTruth, row: int) -> FloatArray:
+    """(2,) with all that makes stiffness stray alike over hours and days."""
+    strays = np.exp(truth.chain.ln_k_error[:, row])
+    return np.asarray(
+        truth.chain.accelerometer_gain * truth.altered.accelerometer_gain[:, row] * strays
+    )
+
+
+def _position_error_um(truth: BearingLifeTruth, row: int) -> FloatArray:
+    """(2,) by which gaps err before the probe's gain, for readings to err as the life says.
+
+    Mean gaps have a gain of their own there, that of four probes together.
+    """
+    centre_um, chain = truth.centre_um[:, row], truth.chain
+    read_um = chain.gap_gain * truth.altered.probe_gain[:, row] * centre_um
+    read_um += chain.position_error_um[:, row]
+    return np.asarray(read_um / _probe_gain(truth, row) - centre_um)

@@ -40,7 +40,12 @@ def test_a_scenario_holds_what_was_so_at_that_moment(two_years: Life, day_ns: Da
     assert bearing.oil_temperature_c == truth.oil_temperature_c[row]
     assert scenario.active_power_mw == life.operation.power_mw[row]
     assert scenario.bearings["LJB"].bracket_stiffness_factor == pytest.approx(0.8)
-    assert {name: c.gain for name, c in scenario.channels.items()} == {"UJB_vy": pytest.approx(0.8)}
+    chain = truth.chain
+    strays = math.exp(chain.ln_k_error[1, row])
+    assert scenario.channels["UJB_vy"].gain == pytest.approx(
+        0.8 * chain.accelerometer_gain[1] * strays
+    )
+    assert scenario.channels["UJB_ux"].gain == chain.probe_gain[0]
 
 
 def test_before_and_after_a_loss_the_whole_chain_finds_the_film_of_the_life(
