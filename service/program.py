@@ -14,6 +14,10 @@ from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of
+from service.delivery.deliveries import Deliveries
+from service.delivery.facts import look_around
+from service.films.keeper import FilmKeeper
+from service.films.start import film_keeper
 from service.live import LiveView
 from service.origin import Origin
 from service.recorder import Recorder
@@ -23,6 +27,7 @@ from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.wiring.captures import captures_of
+from service.wiring.delivery import receivers_of, router_of
 from service.wiring.sources import vector_rows
 from service.wiring.stores import open_store
 
@@ -103,9 +108,11 @@ async def run_service(
     StoreError
         If the database cannot be used.
     """
-    store = open_store(performance.plant, performance.origin)
+    plant, origin = performance.plant, performance.origin
+    live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * _refresh_s(plant))
+    store = open_store(plant, origin, router_of(plant, origin, look_around(live), clock))
     try:
-        await _run(performance, listener, clock, store, announce)
+        await _run(performance, listener, clock, live, store, announce)
     finally:
         store.close()
 
@@ -114,19 +121,22 @@ async def _run(
     performance: Performance,
     listener: socket.socket,
     clock: Clock,
+    live: LiveView,
     store: Store,
     announce: Callable[[str], None],
 ) -> None:
     plant, units = performance.plant, performance.units
-    refresh_s = _refresh_s(plant)
-    live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s)
-    recorder = Recorder(store, live, clock)
+    receivers = receivers_of(plant, performance.origin, clock)
+    deliveries = Deliveries(receivers, store.outbox, clock)
+    recorder = Recorder(store, live, clock, told=deliveries.wake)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
     captures = captures_of(plant, performance.origin, clock)
     alarms = await alarm_engine(
         plant, performance.origin, store, recorder.put, clock, captures, vector_rows(plant)
     )
-    runner = Runner(units, live, recorder, clock, alarms)
+    machines = {unit: monitor.unit for unit, monitor in monitors.items()}
+    films = await film_keeper(plant, machines, store.films, clock)
+    runner = Runner(units, live, recorder, clock, alarms, films)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
     context = Context(
@@ -135,11 +145,13 @@ async def _run(
         live=live,
         store=store,
         clock=clock,
-        refresh_s=refresh_s,
+        refresh_s=_refresh_s(plant),
         references=references,
         alarms=alarms,
+        films=films,
         recorder=recorder,
         captures=captures,
+        deliveries=deliveries,
         origin=performance.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
     )
@@ -158,18 +170,26 @@ async def _run(
             looking = tasks.create_task(references.run(), name="references")
             watching = tasks.create_task(alarms.run(), name="alarms")
             capturing = tasks.create_task(captures.run(), name="captures")
+            learning = tasks.create_task(_learn(films, performance.origin), name="learn")
+            delivering = tasks.create_task(deliveries.run(), name="deliver")
             serving = tasks.create_task(server.serve([listener]), name="serve")
             announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
             if performance.ends:
                 running.add_done_callback(lambda _: stopped.set())
             await stopped.wait()
             server.should_exit = True
-            for task in (running, looking, watching, capturing, announcing):
+            for task in (running, looking, watching, capturing, learning, delivering, announcing):
                 task.cancel()
             await asyncio.wait([serving])
     finally:
         await captures.close()
         await recorder.flush()  # also when a bug ends the program
+
+
+async def _learn(films: FilmKeeper, origin: Origin) -> None:
+    """Learn baselines; what a replay shows is no history of a machine."""
+    if origin is Origin.LIVE:
+        await films.run()
 
 
 def _refresh_s(plant: PlantFile) -> float:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -11,6 +11,7 @@ import structlog
 from acquisition.clock import Clock
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
+from core.films.film_judge import FilmNews
 from service.live import LiveView
 from service.store.port import Store, StoreError, UnitGap
 
@@ -31,6 +32,7 @@ class Findings:
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()
     alarms: Sequence[AlarmNews] = ()
+    films: Sequence[FilmNews] = ()
 
 
 class Recorder:
@@ -42,11 +44,20 @@ class Recorder:
         Most findings that wait for a store that does not answer; beyond it the oldest are given up
         and counted in :attr:`LiveView.n_unstored`. News of alarms wait apart from them, up to
         `MAX_NEWS`, and are given up last.
+    told
+        Called when news of alarms has been written.
     """
 
-    def __init__(self, store: Store, live: LiveView, clock: Clock, capacity: int = 5000) -> None:
+    def __init__(
+        self,
+        store: Store,
+        live: LiveView,
+        clock: Clock,
+        capacity: int = 5000,
+        told: Callable[[], None] = lambda: None,
+    ) -> None:
         self._store, self._live, self._clock = store, live, clock
-        self._capacity = capacity
+        self._capacity, self._told = capacity, told
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
         self._news = asyncio.Event()
@@ -98,8 +109,9 @@ class Recorder:
         batch, alarms = list(self._waiting), list(self._alarms)
         assessments = [a for findings in batch for a in findings.assessments]
         gaps = [gap for findings in batch for gap in findings.gaps]
+        films = [told for findings in batch for told in findings.films]
         try:
-            await asyncio.to_thread(self._store.append, assessments, gaps, alarms)
+            await asyncio.to_thread(self._store.append, assessments, gaps, alarms, films)
         except StoreError as error:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
@@ -111,6 +123,8 @@ class Recorder:
         self._live.store_error = None
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
+        if alarms:
+            self._told()
         await self._tell_progress()
         return True
 

@@ -15,6 +15,7 @@ from core.monitor_port import Monitor
 from service.alarms.engine import AlarmEngine
 from service.bus import Bus
 from service.connect_gate import ConnectGate
+from service.films.keeper import FilmKeeper
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
 from service.store.port import UnitGap
@@ -56,9 +57,10 @@ class Runner:
         recorder: Recorder,
         clock: Clock,
         alarms: AlarmEngine,
+        films: FilmKeeper,
     ) -> None:
         self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
-        self._alarms = alarms
+        self._alarms, self._films = alarms, films
         self._bus = Bus(BUS_CAPACITY)
         self._gate = ConnectGate(CONNECTS_PER_S, clock)
 
@@ -109,14 +111,14 @@ class Runner:
 
     def _take(self, block: SampleBlock) -> None:
         monitor = self._units[block.unit].monitor
-        assessments = monitor.ingest(block)
+        assessments, films = self._films.take(block.unit, monitor.ingest(block))
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
             self._live.set_assessment(assessment)
         self._live.set_received(block, monitor.account)
-        news = self._alarms.take(block, assessments)
+        news = self._alarms.take(block, assessments, self._films.conditions(films))
         if assessments or gaps or news:
-            self._recorder.put(Findings(assessments, gaps, news))
+            self._recorder.put(Findings(assessments, gaps, news, films))
 
 
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import structlog
 
@@ -17,6 +18,8 @@ from service.recorder import Findings
 log = structlog.get_logger()
 
 TICK_S = 0.5
+
+NO_FILMS: Mapping[str, Condition] = MappingProxyType({})
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
@@ -75,9 +78,22 @@ class AlarmEngine:
             mine = [alarm for alarm in found if alarm.identity.unit == unit]
             self._publish(own.restore(mine, now_ns))
 
-    def take(self, block: SampleBlock, assessments: Sequence[Assessment]) -> list[AlarmNews]:
-        """Take in a block and what it has taught; the news is to be stored with it."""
-        news = self._units[block.unit].take(block, assessments, self._clock.now_ns())
+    def take(
+        self,
+        block: SampleBlock,
+        assessments: Sequence[Assessment],
+        films: Mapping[str, Condition] = NO_FILMS,
+    ) -> list[AlarmNews]:
+        """Take in a block and what it has taught; the news is to be stored with it.
+
+        Parameters
+        ----------
+        films
+            What was decided about films by it, by alarm.
+        """
+        own = self._units[block.unit]
+        news = own.take(block, assessments, self._clock.now_ns())
+        news += own.films(films, block.stop_ns)
         _log(news)
         if self._listener is not None:
             self._listener(block, news)
@@ -86,16 +102,6 @@ class AlarmEngine:
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
         """Note whether samples of a unit arrive."""
         self._publish(self._units[unit].link(is_connected, reason, self._clock.now_ns()))
-
-    def films(self, unit: str, conditions: Mapping[str, Condition], now_ns: int) -> None:
-        """Take in what was decided about films of a unit, by alarm.
-
-        Parameters
-        ----------
-        now_ns
-            Time of the samples that it was decided by.
-        """
-        self._publish(self._units[unit].films(conditions, now_ns))
 
     async def run(self) -> None:
         """Let time pass for lost links and for what is shelved, for ever."""

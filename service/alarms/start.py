@@ -2,17 +2,22 @@
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 from acquisition.clock import Clock
+from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
+from core.films.film_rules import FilmRules
 from service.alarms.engine import AlarmEngine
 from service.alarms.rules import rules_of
 from service.capture.captures import Captures
 from service.conversion import machine_of
+from service.films.rules import film_rules_of
 from service.origin import Origin
 from service.recorder import Findings
 from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
 from service.store.port import Store
 
 
@@ -40,11 +45,16 @@ async def alarm_engine(
         If the alarms that there were cannot be read: to start without them would lose them.
     """
     units = {
-        unit.id: UnitAlarms(
-            machine_of(unit), rules_of(unit, plant.alarms, origin), rows.get(unit.id)
-        )
+        unit.id: UnitAlarms(machine_of(unit), _rules(plant, unit, origin), rows.get(unit.id))
         for unit in plant.unit
     }
     engine = AlarmEngine(units, put, clock, captures.take if captures else None)
     engine.restore(await asyncio.to_thread(store.alarms))
     return engine
+
+
+def _rules(plant: PlantFile, unit: UnitSettings, origin: Origin) -> UnitRules:
+    """Of a unit; its films have an alarm where they are watched, with delays of their own."""
+    is_watched = isinstance(film_rules_of(unit, plant.films), FilmRules)
+    films = rule_of(0.0, 0.0, is_latching=plant.films.latching) if is_watched else None
+    return replace(rules_of(unit, plant.alarms, origin), films=films)

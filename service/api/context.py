@@ -10,6 +10,7 @@ from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.api.problems import ProblemError
 from service.capture.captures import Captures
+from service.films.keeper import FilmKeeper
 from service.live import LiveView
 from service.origin import Origin
 from service.recorder import Recorder
@@ -43,6 +44,7 @@ class Context:
     refresh_s: float
     references: ReferencesInForce
     alarms: AlarmEngine
+    films: FilmKeeper
     recorder: Recorder
     captures: Captures
     origin: Origin = Origin.LIVE

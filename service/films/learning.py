@@ -12,7 +12,7 @@ from core.baseline.learning import learn
 from core.baseline.response import ShaftResponse, learn_response
 from core.estimators import Estimator
 from core.films.film_rules import FilmRules
-from core.stiffness_history import StiffnessHistory
+from core.stiffness_history import StiffnessHistory, TimeArray
 from core.units import NS_PER_S
 from service.films.versions import Versions, versions_after
 from service.settings.film_alarms import FilmAlarmSettings
@@ -166,14 +166,18 @@ def at_same_times(
     found: Mapping[str, FilmHistory],
 ) -> tuple[dict[str, StiffnessHistory], npt.NDArray[np.bool_]]:
     """Histories of all bearings where all have a reading, and whether the unit had settled."""
-    times: Sequence[npt.NDArray[np.int64]] = [f.history.time_ns for f in found.values()]
-    common = times[0]
-    for other in times[1:]:
+    common = common_times([history.history.time_ns for history in found.values()])
+    histories, settled = {}, np.ones(common.size, np.bool_)
+    for bearing, film in found.items():
+        rows = np.isin(film.history.time_ns, common)
+        histories[bearing] = film.history.where(rows)
+        settled &= (film.is_settled & ~np.any(film.level > 0, axis=0))[rows]
+    return histories, settled
+
+
+def common_times(times_ns: Sequence[TimeArray]) -> TimeArray:
+    """Times that all have, each of them increasing."""
+    common = times_ns[0]
+    for other in times_ns[1:]:
         common = np.intersect1d(common, other, assume_unique=True)
-    rows = {bearing: np.isin(f.history.time_ns, common) for bearing, f in found.items()}
-    histories = {bearing: f.history.where(rows[bearing]) for bearing, f in found.items()}
-    settled = [
-        f.is_settled[rows[bearing]] & ~np.any(f.level > 0, axis=0)[rows[bearing]]
-        for bearing, f in found.items()
-    ]
-    return histories, np.all(settled, axis=0)
+    return common

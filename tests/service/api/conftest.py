@@ -17,6 +17,7 @@ from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of, calibration_of, machine_of
+from service.films.start import film_keeper
 from service.live import LinkState, LiveView
 from service.origin import Origin
 from service.recorder import Recorder
@@ -131,6 +132,8 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
     origin = Origin.LIVE
     alarms = await alarm_engine(plant, origin, store, recorder.put, clock)
     captures = captures_of(plant, Origin.REPLAY, clock)
+    machines = {unit: monitor.unit for unit, monitor in monitors.items()}
+    films = await film_keeper(plant, machines, store.films, clock)
     recording = asyncio.create_task(recorder.run())
     context = Context(
         plant_name=plant.plant.name,
@@ -141,6 +144,7 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
         refresh_s=11.95,
         references=references,
         alarms=alarms,
+        films=films,
         recorder=recorder,
         captures=captures,
         max_shelf_s=7200.0,

@@ -22,9 +22,11 @@ from service.alarms.engine import AlarmEngine
 from service.capture.captures import Captures
 from service.capture.file import MakeWriter
 from service.capture.span import CaptureSettings
+from service.films.keeper import FilmKeeper
 from service.live import LiveView
 from service.recorder import Recorder
 from service.runner import Runner, WatchedUnit
+from service.settings.film_alarms import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 
 RATE_HZ = 100.0
@@ -154,6 +156,14 @@ class Plant:
         self.live = LiveView(["U1", "U2"], self.clock, 30.0)
         self.recorder = Recorder(self.store, self.live, self.clock, capacity)
         self.capture_folder = path.parent / "captures"
+        units = {name: unit_named(name) for name in ("U1", "U2")}
+        self.films = FilmKeeper(
+            units,
+            dict.fromkeys(units, "not here"),
+            FilmAlarmSettings(),
+            self.store.films,
+            self.clock,
+        )
         self.start_alarms()
 
     def start_alarms(self) -> None:
@@ -177,7 +187,7 @@ class Plant:
             name: WatchedUnit(source, UnitMonitor(unit_named(name), settings))
             for name, source in units.items()
         }
-        return Runner(watched, self.live, self.recorder, self.clock, self.alarms)
+        return Runner(watched, self.live, self.recorder, self.clock, self.alarms, self.films)
 
 
 @pytest.fixture

@@ -93,6 +93,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
         Context(
             *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
             alarms=plant.alarms,
+            films=plant.films,
             recorder=plant.recorder,
             captures=plant.captures,
         )

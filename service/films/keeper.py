@@ -1,0 +1,177 @@
+"""`FilmKeeper`: the films of all units, fed by the runner, taught by the learner and engineers."""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.alarm import AlarmIdentity, AlarmKind, Condition
+from core.assessment import Assessment
+from core.baseline.baseline import BearingBaseline
+from core.films.film_finding import alarm_condition
+from core.films.film_judge import FilmJudge, FilmNews
+from core.films.film_rules import FilmRules
+from core.films.film_watch import FilmWatch
+from core.machine import Unit
+from core.stiffness_history import DIRECTIONS
+from service.films.learning import FilmPlace, Learner
+from service.films.resume import UnitStart, in_force, unit_start
+from service.settings.film_alarms import FilmAlarmSettings
+from service.store.film_port import FilmStore
+from service.store.port import StoreError
+
+log = structlog.get_logger()
+
+KINDS = dict(zip(DIRECTIONS, (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y), strict=True))
+
+
+@dataclass(frozen=True)
+class WatchedFilms:
+    """A unit's films with their rules and what has been said of them last."""
+
+    rules: FilmRules
+    watch: FilmWatch
+    newest: dict[str, FilmNews]
+
+
+class FilmKeeper:
+    """Watches films on the event loop; reads and learns in threads.
+
+    Parameters
+    ----------
+    rules
+        Of every unit; where films cannot be watched, why.
+    """
+
+    def __init__(
+        self,
+        units: Mapping[str, Unit],
+        rules: Mapping[str, FilmRules | str],
+        settings: FilmAlarmSettings,
+        store: FilmStore,
+        clock: Clock,
+    ) -> None:
+        self._store, self._clock, self._settings = store, clock, settings
+        self.learner = Learner(store, settings)
+        self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
+        self._films = {
+            unit: _watched(units[unit], found)
+            for unit, found in rules.items()
+            if isinstance(found, FilmRules)
+        }
+
+    async def start(self) -> None:
+        """Go on where the service stopped, before anything arrives.
+
+        Raises
+        ------
+        StoreError
+            If what is stored cannot be read: to begin again would lose what was found.
+        """
+        responses = await asyncio.to_thread(self._store.responses)
+        for unit, films in self._films.items():
+            response = responses.get(unit)
+            found = await asyncio.to_thread(unit_start, self._store, unit, films.rules, response)
+            _go_on(films.watch, found)
+
+    def rules(self, unit: str) -> FilmRules | None:
+        """How the films of a unit are watched; None if they are not."""
+        return self._films[unit].rules if unit in self._films else None
+
+    def newest(self, unit: str, bearing: str) -> FilmNews | None:
+        """What has been said of a bearing last since the service started."""
+        return self._films[unit].newest.get(bearing) if unit in self._films else None
+
+    def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
+        """What a bearing is compared with now."""
+        films = self._films.get(unit)
+        return films.watch.judge.baseline(bearing) if films else None
+
+    def take(
+        self, unit: str, assessments: Sequence[Assessment]
+    ) -> tuple[Sequence[Assessment], list[FilmNews]]:
+        """Say under which condition results were found, and take readings when it is time."""
+        films = self._films.get(unit)
+        if films is None or not assessments:
+            return assessments, []
+        seen, news = films.watch.take(assessments)
+        films.newest.update({told.reading.bearing: told for told in news})
+        return seen, news
+
+    def conditions(self, news: Sequence[FilmNews]) -> dict[str, Condition]:
+        """What alarms make of it, by alarm."""
+        return {
+            alarm_id(told.reading.unit, told.reading.bearing, direction): alarm_condition(
+                finding, self._films[told.reading.unit].rules.change
+            )
+            for told in news
+            for direction, finding in zip(DIRECTIONS, told.findings, strict=True)
+        }
+
+    async def run(self) -> None:
+        """Learn whatever is due, for ever."""
+        period_s = min(3600.0, 86_400.0 * self._settings.learn_every_days / 4)
+        while True:
+            try:
+                await self.learn_due()
+            except StoreError as error:
+                log.error("baselines are not learned", reason=str(error))
+            await self._clock.sleep(period_s)
+
+    async def learn_due(self) -> None:
+        """Learn every bearing whose turn it is, one after the other."""
+        for unit, films in self._films.items():
+            due = [
+                place
+                for place in (FilmPlace(unit, *item) for item in films.rules.estimators.items())
+                if await asyncio.to_thread(self.learner.is_due, place, self._clock.now_ns())
+            ]
+            for place in due:
+                await self.learn(place)
+
+    async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
+        """Learn a bearing now; None if there are too few readings."""
+        films, now_ns = self._films[place.unit], self._clock.now_ns()
+        learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
+        if learned is not None:
+            log.info(
+                "baseline learned",
+                unit=place.unit,
+                bearing=place.bearing,
+                version=learned.origin.version,
+            )
+            response = await asyncio.to_thread(
+                self.learner.learn_response, place.unit, films.rules, now_ns
+            )
+            films.watch.judge.answer_by(response)
+            await self.put_in_force(place)
+        return learned
+
+    async def put_in_force(self, place: FilmPlace) -> None:
+        """Compare a bearing with what its stored steps say from now on."""
+        films = self._films[place.unit]
+        held = films.watch.judge.baseline(place.bearing)
+        found = await asyncio.to_thread(in_force, self._store, place, films.rules)
+        if found.baseline is None or held is None or found.baseline.origin != held.origin:
+            films.watch.judge.put_in_force(place.bearing, found.baseline, found.decisions)
+
+
+def alarm_id(unit: str, bearing: str, direction: str) -> str:
+    """Alarm of the change of a film."""
+    return AlarmIdentity(unit, bearing, KINDS[direction]).id
+
+
+def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
+    brackets = {bearing.id: bearing.bracket_stiffness_n_per_m for bearing in unit.bearings}
+    return WatchedFilms(rules, FilmWatch(rules, FilmJudge(rules, brackets)), {})
+
+
+def _go_on(watch: FilmWatch, found: UnitStart) -> None:
+    watch.go_on(found.operation)
+    for bearing, its in found.bearings.items():
+        watch.judge.put_in_force(bearing, its.baseline, its.decisions)
+    for column in found.recent:
+        watch.judge.recent.append(column)
+    watch.judge.answer_by(found.response)

@@ -1,0 +1,122 @@
+"""Films as the service starts: baselines in force, and where it had stopped."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.baseline.baseline import BearingBaseline, Watched
+from core.baseline.response import ShaftResponse
+from core.condition.operating_state import Operation
+from core.decision.decision import UNDECIDED, Decision
+from core.films.catching_up import decision_after, operation_after
+from core.films.film_rules import FilmRules
+from core.films.recent_readings import KEPT
+from core.stiffness_history import DIRECTIONS
+from core.units import NS_PER_S
+from service.films.learning import FilmPlace, common_times
+from service.films.versions import versions_after
+from service.store.film_port import FilmHistory, FilmQuery, FilmStore
+
+TAIL_NS = 2 * 86_400 * NS_PER_S
+"""How far operation is looked back on: longer than warming up."""
+
+CATCH_UP_NS = 21 * 86_400 * NS_PER_S
+"""How far decisions are: several times the longest mean."""
+
+
+@dataclass(frozen=True)
+class InForce:
+    """What a bearing is compared with, and where its decisions stand; all empty without one."""
+
+    baseline: BearingBaseline | None = None
+    decisions: tuple[Decision, ...] = ()
+
+
+def in_force(store: FilmStore, place: FilmPlace, rules: FilmRules) -> InForce:
+    """The baseline of a bearing that is in force, and its decisions so far."""
+    version = versions_after(store.steps(place.unit, place.bearing)).in_force
+    if version is None:
+        return InForce()
+    baseline = store.baseline(place.unit, place.bearing, version)
+    if baseline is None or baseline.origin.estimator != place.estimator:
+        return InForce()
+    stored = [
+        found.decision
+        for found in store.decisions(place.unit, place.bearing)
+        if (found.baseline_version, found.estimator) == (version, place.estimator)
+    ]
+    if len(stored) == 2:
+        return InForce(baseline, tuple(stored))
+    return InForce(baseline, caught_up(store, place, rules, baseline))
+
+
+def caught_up(
+    store: FilmStore, place: FilmPlace, rules: FilmRules, baseline: BearingBaseline
+) -> tuple[Decision, ...]:
+    """Decisions x and y as if a baseline had been in force for the newest readings."""
+    newest_ns = _newest_ns(store, place)
+    start_ns = newest_ns - round(CATCH_UP_NS / rules.time_lapse)
+    found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
+    learned = (baseline.of(Watched.STIFFNESS, direction) for direction in DIRECTIONS)
+    return tuple(
+        decision_after(found.history, found.is_settled, quantity, rules) if quantity else UNDECIDED
+        for quantity in learned
+    )
+
+
+@dataclass(frozen=True)
+class UnitStart:
+    """Where the films of a unit go on.
+
+    Parameters
+    ----------
+    bearings
+        By bearing.
+    recent
+        Newest readings, as :meth:`RecentReadings.append` takes them.
+    """
+
+    operation: Operation
+    bearings: dict[str, InForce]
+    recent: list[FloatArray]
+    response: ShaftResponse | None
+
+
+def unit_start(
+    store: FilmStore, unit: str, rules: FilmRules, response: ShaftResponse | None
+) -> UnitStart:
+    """Where the films of a unit go on after everything that is stored."""
+    places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
+    newest_ns = _newest_ns(store, places[0])
+    found = {
+        place.bearing: store.history(
+            FilmQuery(unit, place.bearing, place.estimator, newest_ns - TAIL_NS)
+        )
+        for place in places
+    }
+    return UnitStart(
+        operation_after(found[places[0].bearing].history, rules),
+        {place.bearing: in_force(store, place, rules) for place in places},
+        _recent(found),
+        response,
+    )
+
+
+def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
+    newest = store.history(FilmQuery(place.unit, place.bearing, place.estimator, newest=1))
+    return int(newest.history.time_ns[-1]) if len(newest) else 0
+
+
+def _recent(found: Mapping[str, FilmHistory]) -> list[FloatArray]:
+    """Newest settled readings at the same times, (3, n_places) each."""
+    common = common_times([history.history.time_ns for history in found.values()])
+    columns = []
+    for film in found.values():
+        rows = np.isin(film.history.time_ns, common)
+        settled = film.is_settled[rows]
+        rows_of = (film.history.ln_k, film.history.shaft_um_pk, film.deviation)
+        columns.append(np.stack([column[:, rows] for column in rows_of]))
+    whole = np.concatenate(columns, axis=1)[:, :, settled]
+    return [whole[:, :, i] for i in range(max(0, whole.shape[2] - KEPT), whole.shape[2])]

@@ -1,0 +1,120 @@
+"""Baselines in SQLite: kept as they were learned, with all that was done to them."""
+
+import sqlite3
+from collections.abc import Iterable
+
+from core.baseline.baseline import BearingBaseline
+from core.baseline.exchange import from_json, response_from_json, response_to_json, to_json
+from core.baseline.response import ShaftResponse
+from core.estimators import Estimator
+from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
+from service.store.port import StoreError
+
+ENTRY_COLUMNS = (
+    "unit, bearing, estimator, version, created_ns, author,"
+    " learned_from_ns, learned_until_ns, event"
+)
+INSERT_BASELINE = (
+    f"INSERT INTO baseline ({ENTRY_COLUMNS}, document)"  # noqa: S608
+    " VALUES (?,?,?,?,?,?,?,?,?,?)"
+)
+STEP_COLUMNS = "unit, bearing, version, step, time_ns, from_ns, actor, reason"
+INSERT_STEP = f"INSERT INTO baseline_step ({STEP_COLUMNS}) VALUES (?,?,?,?,?,?,?,?)"  # noqa: S608
+SET_RESPONSE = """
+    INSERT INTO shaft_response VALUES (?, ?, ?)
+    ON CONFLICT (unit) DO UPDATE SET
+    created_ns = excluded.created_ns, document = excluded.document
+"""
+
+
+def insert_baseline(writer: sqlite3.Connection, baseline: BearingBaseline) -> None:
+    """Add a baseline to those of its bearing."""
+    origin = baseline.origin
+    writer.execute(
+        INSERT_BASELINE,
+        (
+            *(origin.unit, origin.bearing, origin.estimator, origin.version, origin.created_ns),
+            *(origin.author, baseline.learned_from_ns, baseline.learned_until_ns, origin.event),
+            to_json(baseline),
+        ),
+    )
+
+
+def insert_steps(writer: sqlite3.Connection, steps: Iterable[StoredStep]) -> None:
+    """Add what was done to baselines."""
+    writer.executemany(
+        INSERT_STEP,
+        [
+            (s.unit, s.bearing, s.version, s.step.value, s.time_ns, s.from_ns, s.actor, s.reason)
+            for s in steps
+        ],
+    )
+
+
+def select_baselines(reader: sqlite3.Connection, unit: str, bearing: str) -> list[BaselineEntry]:
+    """Every baseline of a bearing, newest first."""
+    rows = reader.execute(
+        f"SELECT {ENTRY_COLUMNS} FROM baseline"  # noqa: S608
+        " WHERE unit = ? AND bearing = ? ORDER BY version DESC",
+        (unit, bearing),
+    )
+    return [
+        BaselineEntry(unit, bearing, Estimator(estimator), *rest)
+        for unit, bearing, estimator, *rest in rows
+    ]
+
+
+def select_baseline(
+    reader: sqlite3.Connection, unit: str, bearing: str, version: int
+) -> BearingBaseline | None:
+    """One baseline whole.
+
+    Raises
+    ------
+    StoreError
+        If what is stored is no baseline.
+    """
+    found = reader.execute(
+        "SELECT document FROM baseline WHERE unit = ? AND bearing = ? AND version = ?",
+        (unit, bearing, version),
+    ).fetchone()
+    try:
+        return None if found is None else from_json(found[0])
+    except ValueError as error:
+        name = f"baseline {version} of unit {unit} bearing {bearing}"
+        raise StoreError(f"{name}: {error}") from error
+
+
+def select_steps(reader: sqlite3.Connection, unit: str, bearing: str) -> list[StoredStep]:
+    """What was done to the baselines of a bearing, oldest first."""
+    rows = reader.execute(
+        f"SELECT {STEP_COLUMNS} FROM baseline_step"  # noqa: S608
+        " WHERE unit = ? AND bearing = ? ORDER BY id",
+        (unit, bearing),
+    )
+    return [
+        StoredStep(unit, bearing, version, BaselineStep(step), time_ns, actor, reason, from_ns)
+        for unit, bearing, version, step, time_ns, from_ns, actor, reason in rows
+    ]
+
+
+def set_response(
+    writer: sqlite3.Connection, unit: str, response: ShaftResponse, now_ns: int
+) -> None:
+    """Put a unit's response in the place of the one before."""
+    writer.execute(SET_RESPONSE, (unit, now_ns, response_to_json(response)))
+
+
+def select_responses(reader: sqlite3.Connection) -> dict[str, ShaftResponse]:
+    """How shafts answer, by unit.
+
+    Raises
+    ------
+    StoreError
+        If what is stored is no response.
+    """
+    rows = reader.execute("SELECT unit, document FROM shaft_response").fetchall()
+    try:
+        return {unit: response_from_json(document) for unit, document in rows}
+    except ValueError as error:
+        raise StoreError(f"the response of a shaft: {error}") from error

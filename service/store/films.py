@@ -1,0 +1,110 @@
+"""Films behind the store's interface, in SQLite."""
+
+import sqlite3
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
+
+from core.baseline.baseline import BearingBaseline
+from core.baseline.response import ShaftResponse
+from core.estimators import Estimator
+from core.films.film_judge import FilmNews
+from service.store.baselines import (
+    insert_baseline,
+    insert_steps,
+    select_baseline,
+    select_baselines,
+    select_responses,
+    select_steps,
+    set_response,
+)
+from service.store.film_port import (
+    BaselineEntry,
+    FilmHistory,
+    FilmQuery,
+    Provenance,
+    StoredDecision,
+    StoredStep,
+)
+from service.store.film_readings import insert_film_news, select_decisions, select_film_history
+
+Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
+
+
+class SqliteFilms:
+    """The film tables of one database.
+
+    Parameters
+    ----------
+    writing
+        Opens a transaction that is durable when left.
+    reading
+        Opens a connection that only reads.
+    series_of
+        Number of a unit's bearing, given one within a transaction if it has none.
+    """
+
+    def __init__(
+        self, writing: Connect, reading: Connect, series_of: Callable[[str, str], int]
+    ) -> None:
+        self._writing, self._reading, self._series_of = writing, reading, series_of
+
+    def add_simulated(self, readings: Iterable[FilmNews]) -> None:
+        """Write readings of a simulation, marked as such."""
+        with self._writing() as writer:
+            insert_film_news(writer, readings, self._series_of, Provenance.SIMULATED)
+
+    def history(self, query: FilmQuery) -> FilmHistory:
+        """Read readings of one film, oldest first."""
+        with self._reading() as reader:
+            return select_film_history(reader, query)
+
+    def first_ns(self, unit: str, bearing: str, estimator: Estimator) -> int | None:
+        """Time of the first reading of a film."""
+        with self._reading() as reader:
+            found = reader.execute(
+                "SELECT min(time_ns) FROM film_reading WHERE estimator = ? AND series ="
+                " (SELECT id FROM series WHERE unit = ? AND bearing = ?)",
+                (estimator.value, unit, bearing),
+            ).fetchone()
+        return None if found[0] is None else int(found[0])
+
+    def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
+        """Where the decisions of a bearing stood last."""
+        with self._reading() as reader:
+            return select_decisions(reader, unit, bearing)
+
+    def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
+        """Write a learned baseline with what is done with it at once."""
+        with self._writing() as writer:
+            insert_baseline(writer, baseline)
+            insert_steps(writer, steps)
+
+    def baselines(self, unit: str, bearing: str) -> list[BaselineEntry]:
+        """Every baseline that was ever learned of a bearing, newest first."""
+        with self._reading() as reader:
+            return select_baselines(reader, unit, bearing)
+
+    def baseline(self, unit: str, bearing: str, version: int) -> BearingBaseline | None:
+        """Read one baseline whole."""
+        with self._reading() as reader:
+            return select_baseline(reader, unit, bearing, version)
+
+    def add_steps(self, steps: Sequence[StoredStep]) -> None:
+        """Write what was done to baselines."""
+        with self._writing() as writer:
+            insert_steps(writer, steps)
+
+    def steps(self, unit: str, bearing: str) -> list[StoredStep]:
+        """What was done to the baselines of a bearing, oldest first."""
+        with self._reading() as reader:
+            return select_steps(reader, unit, bearing)
+
+    def set_response(self, unit: str, response: ShaftResponse, now_ns: int) -> None:
+        """Write how a unit's shaft answers to its films."""
+        with self._writing() as writer:
+            set_response(writer, unit, response, now_ns)
+
+    def responses(self) -> dict[str, ShaftResponse]:
+        """How shafts answer, by unit."""
+        with self._reading() as reader:
+            return select_responses(reader)
