@@ -7,6 +7,7 @@ from fastapi import Depends, FastAPI
 from service.api.alarm_routes import alarm_router, operation_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
+from service.api.delivery_routes import delivery_router
 from service.api.health_routes import health_router
 from service.api.origin_header import OriginHeader
 from service.api.plant_routes import plant_router
@@ -47,6 +48,7 @@ def create_app(context: Context) -> FastAPI:
         reference_router(context),
         alarm_router(context),
         operation_router(context),
+        delivery_router(context),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     app.include_router(dashboard_router())

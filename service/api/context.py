@@ -10,6 +10,7 @@ from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.api.problems import ProblemError
 from service.capture.captures import Captures
+from service.delivery.deliveries import Deliveries
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
 from service.origin import Origin
@@ -47,6 +48,7 @@ class Context:
     films: FilmKeeper
     recorder: Recorder
     captures: Captures
+    deliveries: Deliveries
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
 
