@@ -16,10 +16,12 @@ from core.films.film_rules import FilmRules
 from core.films.film_watch import FilmWatch
 from core.machine import Unit
 from core.stiffness_history import DIRECTIONS
+from service.films.actions import Action, step_of
 from service.films.learning import FilmPlace, Learner
 from service.films.resume import UnitStart, in_force, unit_start
+from service.films.versions import Versions
 from service.settings.film_alarms import FilmAlarmSettings
-from service.store.film_port import FilmStore
+from service.store.film_port import FilmStore, StoredStep
 from service.store.port import StoreError
 
 log = structlog.get_logger()
@@ -55,6 +57,7 @@ class FilmKeeper:
     ) -> None:
         self._store, self._clock, self._settings = store, clock, settings
         self.learner = Learner(store, settings)
+        self._acting = asyncio.Lock()  # what is done next stands on what was done before
         self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
         self._films = {
             unit: _watched(units[unit], found)
@@ -79,6 +82,13 @@ class FilmKeeper:
     def rules(self, unit: str) -> FilmRules | None:
         """How the films of a unit are watched; None if they are not."""
         return self._films[unit].rules if unit in self._films else None
+
+    def place(self, unit: str, bearing: str) -> FilmPlace | None:
+        """A bearing with the estimator that it is watched by; None if it is not watched."""
+        rules = self.rules(unit)
+        if rules is None or bearing not in rules.estimators:
+            return None
+        return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
         """What has been said of a bearing last since the service started."""
@@ -130,11 +140,14 @@ class FilmKeeper:
             ]
             for place in due:
                 await self.learn(place)
+            if due:
+                await self._learn_response(unit)
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
         """Learn a bearing now; None if there are too few readings."""
-        films, now_ns = self._films[place.unit], self._clock.now_ns()
-        learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
+        now_ns = self._clock.now_ns()
+        async with self._acting:
+            learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
         if learned is not None:
             log.info(
                 "baseline learned",
@@ -142,12 +155,35 @@ class FilmKeeper:
                 bearing=place.bearing,
                 version=learned.origin.version,
             )
-            response = await asyncio.to_thread(
-                self.learner.learn_response, place.unit, films.rules, now_ns
-            )
-            films.watch.judge.answer_by(response)
             await self.put_in_force(place)
         return learned
+
+    async def _learn_response(self, unit: str) -> None:
+        films, now_ns = self._films[unit], self._clock.now_ns()
+        response = await asyncio.to_thread(self.learner.learn_response, unit, films.rules, now_ns)
+        films.watch.judge.answer_by(response)
+
+    async def act(self, place: FilmPlace, action: Action, actor: str, reason: str) -> Versions:
+        """Do to the baselines of a bearing what an engineer asks for.
+
+        Raises
+        ------
+        BaselineRefusedError
+            If it does not fit the baselines as they are now.
+        StoreError
+            If it could not be written; then nothing has changed.
+        """
+        async with self._acting:
+            step = await asyncio.to_thread(self._step, place, action, actor, reason)
+            await asyncio.to_thread(self._store.add_steps, [step])
+            await self.put_in_force(place)
+        log.info(f"baseline {step.step}", unit=place.unit, bearing=place.bearing, actor=actor)
+        return await asyncio.to_thread(self.learner.versions, place)
+
+    def _step(self, place: FilmPlace, action: Action, actor: str, reason: str) -> StoredStep:
+        entries = list(self._store.baselines(place.unit, place.bearing))
+        versions = self.learner.versions(place)
+        return step_of(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
         """Compare a bearing with what its stored steps say from now on."""
