@@ -11,6 +11,9 @@ from service.back_test.file_columns import LINE, TIME, TIME_NS, ReadingsError, s
 
 _UTC = pa.timestamp("ns", tz="UTC")
 _NO_TIME = "not a time of ISO 8601 with an offset from UTC, like 2026-03-01T08:00:00Z:"
+REASON, NO_REASON = "reason", "ok"
+"""A reading that is good needs no reason."""
+
 _TIMES = "must be texts like 2026-03-01T08:00:00Z or timestamps with a zone; whole ns are time_ns"
 
 
@@ -73,6 +76,8 @@ def _text(column: Any, key: str, problems: RowProblems) -> Any:
     if not _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind):
         raise ReadingsError(f"column {key} of type {kind}: must be texts")
     found = _flat(column.cast(pa.string()))
+    if key == REASON:
+        return found.fill_null(NO_REASON)
     problems.add(_is_null(found), f"{key} is missing")
     return found.fill_null("")
 
@@ -102,7 +107,8 @@ def _fits(value: Any, kind: Any) -> bool:
 
 def _said(value: Any) -> Any:
     """A value for a message; times may be beyond what Python has."""
-    return value.as_py() if _is_text(value.type) else str(value)
+    is_stamp = pa.types.is_timestamp(value.type) and value.is_valid
+    return f"{value.value} {value.type.unit} since 1970" if is_stamp else value.as_py()
 
 
 def _is_null(column: Any) -> Any:

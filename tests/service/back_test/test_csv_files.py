@@ -1,0 +1,140 @@
+"""CSV files of readings: what is taken, and what is refused with the line."""
+
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import pytest
+
+from service.back_test import csv_lines
+from service.back_test.csv_rows import csv_batches
+from service.back_test.file_columns import ReadingsError
+
+Text = Callable[..., str]
+Line = Callable[..., str]
+
+
+def read(content: str | bytes) -> list[dict[str, Any]]:
+    stream = BytesIO(content.encode() if isinstance(content, str) else content)
+    return [row for batch, _ in csv_batches(stream) for row in batch.to_pylist()]
+
+
+def refusal(content: str | bytes) -> str:
+    with pytest.raises(ReadingsError) as refused:
+        read(content)
+    return str(refused.value)
+
+
+def test_times_with_any_offset_are_the_same_moment(text: Text, line: Line) -> None:
+    rows = read(
+        text(
+            line(0, time="2025-03-01T08:00:00Z"),
+            line(0, time="2025-03-01T09:30:00+01:30"),
+            line(0, time="2025-03-01 05:00:00.000-03:00"),
+        )
+    )
+    assert {row["time_ns"] for row in rows[-3:]} == {1_740_816_000_000_000_000}
+
+
+def test_whole_nanoseconds_have_a_heading_of_their_own(text: Text) -> None:
+    nanoseconds = text().replace("time,", "time_ns,", 1).replace("2025-01-01T00:50:00Z", "77")
+    with pytest.raises(ReadingsError, match="line 2: time_ns is no integer: '2025-01-01T00:00:00Z"):
+        read(nanoseconds)
+    head, _, _ = nanoseconds.partition("\n")
+    assert read(f"{head}\n{line_of_ns(1_740_816_000_000_000_001)}\n")[0]["time_ns"] % 10 == 1
+
+
+def line_of_ns(time_ns: int) -> str:
+    return f"{time_ns},U1,UJB,x,1e9,0.01,0.3,40,part_load,good"
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("begin", ["", "\ufeff"])
+def test_a_spreadsheet_s_line_ends_mark_and_quotes_do_not_matter(
+    text: Text, end: str, begin: str
+) -> None:
+    assert read(begin + text().replace("\n", end).replace("U1", '"U1"')) == read(text())
+
+
+def test_empty_lines_count_as_lines_and_not_as_rows(text: Text, line: Line) -> None:
+    rows = read("\n" + text("", "", line(200)))
+    assert [row["line"] for row in rows] == [*range(3, 13), 15]
+
+
+def test_an_empty_cell_is_no_number_and_not_nought(text: Text, line: Line) -> None:
+    rows = read(text(line(200, k_n_per_m="", quality="bad")))
+    assert rows[-1]["k_n_per_m"] != rows[-1]["k_n_per_m"]
+
+
+def test_pieces_of_a_file_number_their_lines_on(
+    text: Text, line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(csv_lines, "CHUNK_BYTES", 200)
+    lines = [line(100 + n) for n in range(30)]
+    assert [row["line"] for row in read(text(*lines))] == list(range(2, 42))
+    assert refusal(text(*lines, "", line(200, u_random="much"))).startswith("line 43: ")
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"time": "2025-03-01T08:00:00"}, "line 12: not a time of ISO 8601 with an offset"),
+        ({"time": "2025-13-01T08:00:00Z"}, "line 12: not a time of ISO 8601"),
+        ({"time": "1740816000"}, "line 12: not a time of ISO 8601"),
+        ({"time": ""}, "line 12: not a time of ISO 8601"),
+        ({"time": "2999-01-01T00:00:00Z"}, "line 12: not a time of ISO 8601"),
+        ({"oil_temperature_c": "warm"}, "line 12: oil_temperature_c is no number: 'warm'"),
+        ({"oil_temperature_c": "0x20"}, "line 12: oil_temperature_c is no number: '0x20'"),
+        ({"oil_temperature_c": "40,5"}, "line 12: 11 columns where the heading has 10"),
+        ({"unit": ""}, "line 12: unit is missing"),
+        ({"unit": "U1\0"}, "line 12: has a NUL byte"),
+        ({"unit": '"U1'}, "line 12: a quote is not closed"),
+        ({"unit": "U1\rU2"}, "line 12: a carriage return within the line"),
+        ({"unit": "U" * 20_000}, "line 12: longer than 16384 bytes"),
+    ],
+)
+def test_a_wrong_cell_is_named_with_its_line(
+    text: Text, line: Line, changes: dict[str, str], says: str
+) -> None:
+    assert refusal(text(line(100, **changes), line(110))).startswith(says)
+
+
+def test_a_line_that_is_cut_off_is_named(text: Text) -> None:
+    assert refusal(text()[:-20]) == "line 11: 8 columns where the heading has 10"
+
+
+def test_ten_lines_are_named_and_the_others_counted(text: Text, line: Line) -> None:
+    said = refusal(text(*(line(n, u_random="x") for n in range(100, 120))))
+    assert "line 21: u_random is no number: 'x'; and 10 more" in said
+
+
+def test_other_encodings_are_refused(text: Text, line: Line) -> None:
+    assert refusal(text(line(100, unit="Ü")).encode("latin-1")) == "line 12: not UTF-8 text"
+    assert refusal(text().encode("utf-16")) == "line 1: has a NUL byte"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("u_random", "uncertainty", "missing columns: u_random; unknown columns: 'uncertainty'"),
+        ("time,", "", "missing columns: time or time_ns"),
+        ("state", "quality", "columns that are there twice: 'quality'"),
+        (",unit", ",unit,time_ns", "both time and time_ns"),
+        (",", ";", "line 1: columns must be separated by commas"),
+        ("time", '"time', "line 1: a quote is not closed"),
+    ],
+)
+def test_wrong_headings_are_named(text: Text, old: str, new: str, says: str) -> None:
+    assert says in refusal(text().replace(old, new, -1 if old == "," else 1))
+
+
+def test_a_file_without_rows_is_no_history() -> None:
+    assert refusal(b"") == refusal(b"\n\r\n") == "is empty: there is no heading"
+
+
+def test_a_heading_of_a_million_columns_and_a_line_without_end_are_refused() -> None:
+    assert refusal(",".join(f"c{n}" for n in range(1_000_000))) == (
+        "line 1: longer than 16384 bytes"
+    )
+    assert refusal(",".join("a" * 200)) == "200 columns; at most 100 are read"
+    assert refusal(b"x" * 20_000_000) == "line 1: longer than 16384 bytes"

@@ -1,0 +1,193 @@
+"""Parquet files of readings: what is taken, and what is refused with the row."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from core.history_rows import Place
+from service.back_test.file_columns import ReadingsError
+from service.back_test.parquet_rows import parquet_batches
+from service.back_test.reading import read_histories
+
+N_ROWS = 20
+UJB: Place = ("U1", "UJB")
+
+
+def columns(n_rows: int = N_ROWS) -> dict[str, Any]:
+    start = datetime(2025, 1, 1, tzinfo=UTC)
+    return {
+        "time": pa.array([start + timedelta(minutes=10 * n) for n in range(n_rows)]),
+        "unit": ["U1"] * n_rows,
+        "bearing": ["UJB"] * n_rows,
+        "direction": ["x"] * n_rows,
+        "k_n_per_m": np.full(n_rows, 1e9),
+        "u_random": np.full(n_rows, 0.01),
+        "eccentricity_ratio": np.full(n_rows, 0.3),
+        "oil_temperature_c": np.full(n_rows, 40.0),
+        "state": ["part_load"] * n_rows,
+        "quality": ["good"] * n_rows,
+    }
+
+
+Written = Callable[..., Path]
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Written:
+    """Writes a file, sound but for the columns given."""
+
+    def write(**changes: Any) -> Path:
+        path = tmp_path / "readings.parquet"
+        pq.write_table(pa.table(columns() | changes), path)
+        return path
+
+    return write
+
+
+def refusal(path: Path) -> str:
+    """In this process: what it says of a file that harms nobody."""
+    with pytest.raises(ReadingsError) as refused, path.open("rb") as stream:
+        list(parquet_batches(stream))
+    return str(refused.value)
+
+
+def with_value(key: str, value: Any, row: int = 7) -> Any:
+    column = list(columns()[key])
+    column[row] = value
+    return column
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_time_stamps_of_any_unit_and_zone_are_the_same_moments(written: Written, unit: str) -> None:
+    there = columns()["time"].cast(pa.timestamp(unit, tz="America/Sao_Paulo"))
+    time_ns = read_histories(written(time=there))[UJB].history.time_ns
+    assert time_ns[[0, 1]].tolist() == [1_735_689_600 * 10**9, 1_735_690_200 * 10**9]
+
+
+def test_names_may_be_in_a_dictionary_and_numbers_of_any_kind(written: Written) -> None:
+    path = written(
+        unit=pa.array(["U1"] * N_ROWS).dictionary_encode(),
+        oil_temperature_c=pa.array(range(N_ROWS), pa.int16()),
+        eccentricity_ratio=pa.array([0.25] * N_ROWS, pa.float32()),
+        attitude_deg=pa.nulls(N_ROWS),
+    )
+    found = read_histories(path)[UJB].history
+    assert found.oil_temperature_c.tolist() == list(range(N_ROWS))
+    assert set(found.eccentricity_ratio.tolist()) == {0.25}
+    assert np.isnan(found.attitude_deg).all()
+
+
+@pytest.mark.parametrize(
+    ("key", "column", "says"),
+    [
+        ("time", columns()["time"].cast(pa.timestamp("us")), "column time of type timestamp[us]:"),
+        ("time", list(range(N_ROWS)), "column time of type int64: must be texts like"),
+        ("time", with_value("time", None), "row 8: not a time of ISO 8601"),
+        (
+            "time",
+            pa.array([10**15] * N_ROWS, pa.timestamp("ms", tz="UTC")),
+            "row 1: not a time of ISO 8601",
+        ),
+        ("unit", with_value("unit", None), "row 8: unit is missing"),
+        ("unit", list(range(N_ROWS)), "column unit of type int64: must be texts"),
+        ("u_random", ["0.01"] * 7 + ["x"] * 13, "row 8: u_random is no number: 'x'"),
+        ("u_random", [[0.01]] * N_ROWS, "column u_random of type list"),
+        ("colour", ["red"] * N_ROWS, "unknown columns: 'colour'"),
+    ],
+)
+def test_a_wrong_column_or_cell_is_named_with_its_row(
+    written: Written, key: str, column: Any, says: str
+) -> None:
+    assert says in refusal(written(**{key: column}))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("k_n_per_m", -1e9, "row 8: k_n_per_m must be above 0, not -1000000000.0"),
+        ("k_n_per_m", float("inf"), "row 8: k_n_per_m must be finite, not inf"),
+        ("k_n_per_m", float("nan"), "row 8: k_n_per_m must be above 0, not nan"),
+        ("unit", "U9", "row 8: unknown unit 'U9'"),
+        ("bearing", "XJB", "row 8: unit U1 has no bearing 'XJB'"),
+        ("unit", "U 1", "row 8: unit 'U 1' must be letters, digits"),
+        ("direction", "z", "row 8: unknown direction 'z'"),
+        ("quality", "fair", "row 8: unknown quality 'fair'"),
+        ("state", "resting", "row 8: unknown state 'resting'"),
+        ("time", columns()["time"][3], "row 8: earlier than the row before"),
+        ("time", columns()["time"][6], "row 8: the same time twice"),
+    ],
+)
+def test_a_row_that_makes_no_sense_is_named(
+    written: Written, key: str, value: Any, says: str
+) -> None:
+    path = written(**{key: pa.array(with_value(key, value))})
+    with pytest.raises(ReadingsError, match=says) as refused:
+        read_histories(path, [UJB])
+    assert str(refused.value).startswith(f"{path}: ")
+
+
+def test_a_reason_says_why_a_reading_is_bad(written: Written) -> None:
+    quality = ["bad", "bad", "uncertain", *["good"] * 17]
+    reason = ["insufficient_excitation", "clipped", "few_segments", *["ok"] * 17]
+    found = read_histories(written(quality=quality, reason=reason))[UJB].history
+    assert found.evidence[0, :4].tolist() == [1, 2, 2, 0]
+    with pytest.raises(ReadingsError, match="row 1: quality good for the reason 'clipped'"):
+        read_histories(written(reason=["clipped"] * N_ROWS))
+
+
+def test_a_file_that_is_cut_off_anywhere_is_refused(written: Written) -> None:
+    path = written()
+    whole = path.read_bytes()
+    for size in range(4, len(whole), 97):
+        path.write_bytes(whole[:size])
+        assert refusal(path) == "not a complete Parquet file"
+
+
+def test_more_rows_than_are_read_are_refused_by_the_footer(
+    written: Written, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.back_test.parquet_rows.MAX_ROWS", N_ROWS - 1)
+    assert refusal(written()) == "20 rows; at most 19 are read"
+
+
+def test_texts_that_unpack_to_more_than_memory_end_the_reading_process_only(
+    written: Written, tmp_path: Path
+) -> None:
+    n_rows = 60_000
+    texts = pa.DictionaryArray.from_arrays(np.zeros(n_rows, np.int32), ["U" * 1_000_000])
+    path = tmp_path / "bomb.parquet"
+    pq.write_table(pa.table(columns(n_rows) | {"unit": texts}), path, compression="zstd")
+    assert path.stat().st_size < 3_000_000
+    with pytest.raises(ReadingsError) as refused:
+        read_histories(path)
+    assert str(refused.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_damaged_file_is_read_or_refused_and_never_ends_the_program(
+    written: Written, seed: int
+) -> None:
+    path, random = written(), np.random.default_rng(seed)
+    damaged = bytearray(path.read_bytes())
+    for at in random.integers(4, len(damaged) - 8, 6):
+        damaged[at] = random.integers(256)
+    path.write_bytes(bytes(damaged))
+    try:
+        found = read_histories(path, [UJB])
+    except ReadingsError as error:
+        assert str(error).startswith(f"{path}: ")
+        assert "\n" not in str(error)
+    else:
+        assert len(found[UJB].history) <= N_ROWS
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "missing.csv", Path("/dev/zero")):
+        with pytest.raises(ReadingsError, match=r"not a regular file|No such file"):
+            read_histories(path)

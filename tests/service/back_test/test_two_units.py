@@ -1,0 +1,219 @@
+"""More than a year of two simulated units, one of them damaged, out of files."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.baseline.baseline import BearingBaseline, Origin, Watched
+from core.baseline.exchange import from_json
+from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
+from core.condition.operating_limits import OperatingLimits
+from core.condition.operation_history import operation_history
+from core.decision.back_test import back_test
+from core.decision.limits import ChangeLimits
+from core.history_rows import BearingRows, Place
+from core.stiffness_history import DIRECTIONS
+from service.api.times import rfc3339
+from service.back_test.bearing_run import BackTestRules
+from service.back_test.exporting import export_baselines
+from service.back_test.file_columns import ReadingsError
+from service.back_test.periods import DAY_NS, Learning, MachineEvent
+from service.back_test.reading import read_histories
+from service.back_test.running import Found, run_back_test
+
+START_NS = 19_723 * DAY_NS
+DAMAGED_NS = START_NS + 400 * DAY_NS
+YEAR = Learning(days=365)
+BRACKETS = {
+    (unit, bearing): k
+    for unit in ("U1", "U2")
+    for bearing, k in (("UJB", 1.18e9), ("LJB", 3.62e9), ("TJB", 1.85e9))
+}
+
+
+@pytest.fixture(scope="module")
+def histories(two_units: Any) -> Mapping[Place, BearingRows]:
+    return read_histories(two_units.parquet)
+
+
+@pytest.fixture(scope="module")
+def found(histories: Mapping[Place, BearingRows]) -> Found:
+    return run_back_test(histories, BackTestRules(YEAR, bracket_n_per_m=BRACKETS))
+
+
+def test_csv_and_parquet_are_the_same_histories(
+    two_units: Any, histories: Mapping[Place, BearingRows]
+) -> None:
+    from_csv = read_histories(two_units.csv)
+    assert set(from_csv) == set(histories) == set(BRACKETS)
+    for place, rows in histories.items():
+        for key, column in vars(rows.history).items():
+            assert np.array_equal(getattr(from_csv[place].history, key), column, equal_nan=True)
+        assert from_csv[place].state.tolist() == rows.state.tolist()
+        assert from_csv[place].n_rows == rows.n_rows == (len(rows.history),) * 2
+
+
+def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> None:
+    """Straight from the simulated life, without any file."""
+    expected = []
+    for unit, life in two_units.lives.items():
+        operation = life.operation
+        limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
+        is_settled = operation_history(
+            operation.time_ns, operation.speed_rpm, operation.power_mw, limits
+        ).is_settled
+        learned_ns = operation.time_ns[0] + 365 * DAY_NS
+        n = int(np.searchsorted(operation.time_ns, learned_ns))
+        for bearing, history in life.readings.items():
+            baseline = _learned(unit, bearing, history.rows(0, n), is_settled[:n])
+            for direction in DIRECTIONS:
+                film = baseline.of(Watched.STIFFNESS, direction)
+                assert film is not None
+                later = history.rows(n, len(history))
+                decided = back_test(later, is_settled[n:], film, ChangeLimits())
+                active = np.concatenate([[0], decided.level > 0, [0]])
+                begins = np.flatnonzero(np.diff(active) == 1)
+                expected += [
+                    (rfc3339(int(later.time_ns[row])), unit, bearing, direction, change)
+                    for row, change in zip(begins, decided.change[begins], strict=True)
+                ]
+    alarms = [(a.begin, a.unit, a.bearing, a.direction, a.raised.percent) for a in found.alarms]
+    assert [alarm[:4] for alarm in alarms] == [alarm[:4] for alarm in sorted(expected)]
+    percent = [100.0 * (np.exp(alarm[4]) - 1.0) for alarm in sorted(expected)]
+    assert [alarm[4] for alarm in alarms] == pytest.approx(percent, rel=1e-9)
+    assert {(a.unit, a.bearing, a.direction) for a in found.alarms} >= {
+        ("U2", "LJB", "x"),
+        ("U2", "LJB", "y"),
+    }
+
+
+def _learned(unit: str, bearing: str, history: Any, is_settled: Any) -> BearingBaseline:
+    origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
+    return learn(history, is_settled, origin, BaselineSettings())
+
+
+def test_the_damage_is_told_with_its_evidence(found: Found) -> None:
+    alarm = next(a for a in found.alarms if (a.unit, a.bearing) == ("U2", "LJB"))
+    begin = alarm.begin
+    assert rfc3339(DAMAGED_NS) < begin < rfc3339(DAMAGED_NS + 3 * DAY_NS)
+    assert alarm.end is None
+    assert abs(alarm.largest.percent) >= abs(alarm.raised.percent) > 4.0
+    assert 0.0 < alarm.raised.u_percent < 3.0
+    assert alarm.condition.state in ("speed_no_load", "part_load", "full_load")
+    assert alarm.condition.cell == (
+        int(alarm.condition.eccentricity_ratio / 0.05),
+        int(alarm.condition.oil_temperature_c / 2.5),
+    )
+    assert alarm.cause.reason != "the response of the shaft has not been learned"
+    assert alarm.cause.film_share is not None
+
+
+def test_every_reading_is_counted_once(
+    histories: Mapping[Place, BearingRows], found: Found
+) -> None:
+    assert len(found.films) == 12
+    for film in found.films:
+        n_readings = len(histories[film.unit, film.bearing].history)
+        assert film.learning + sum(film.verdicts.values()) == n_readings
+        assert film.verdicts["normal"] > 1000
+        assert film.baselines[0].cells_own > 10
+    n_alarms = sum(film.n_alarms for film in found.films)
+    assert found.rate().n_alarms == len(found.alarms) == n_alarms
+    assert found.unit_years == pytest.approx(2 * 0.3, abs=0.02)
+
+
+def test_exported_baselines_read_back_as_they_were(found: Found, tmp_path: Any) -> None:
+    assert export_baselines(found, tmp_path / "out") == 8
+    stored = from_json((tmp_path / "out" / "U2-LJB-v1.json").read_text(encoding="utf-8"))
+    assert stored in found.baselines
+    with pytest.raises(FileExistsError):
+        export_baselines(found, tmp_path / "out")
+
+
+def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
+    histories: Mapping[Place, BearingRows],
+) -> None:
+    """What has changed before it is healthy after it, and nothing is compared across it."""
+    event = MachineEvent("U2", "LJB", DAMAGED_NS, "new pads")
+    learning = Learning(days=30, until_ns=START_NS + 365 * DAY_NS)
+    unit = {place: rows for place, rows in histories.items() if place[0] == "U2"}
+    found = run_back_test(unit, BackTestRules(learning, events=[event]))
+    baselines = {film.bearing: film.baselines for film in found.films}
+    assert [b.event for b in baselines["LJB"]] == ["", "new pads"]
+    assert [b.event for b in baselines["UJB"]] == [""]
+    assert not any(a.bearing == "LJB" and a.begin >= rfc3339(DAMAGED_NS) for a in found.alarms)
+
+
+def test_an_event_of_a_bearing_without_readings_is_refused(
+    histories: Mapping[Place, BearingRows],
+) -> None:
+    event = MachineEvent("U3", None, DAMAGED_NS, "overhaul")
+    with pytest.raises(ReadingsError, match="event of U3: there are no readings of it"):
+        run_back_test(histories, BackTestRules(YEAR, events=[event]))
+
+
+def test_without_attitude_or_shaft_motion_less_is_known_and_said(
+    histories: Mapping[Place, BearingRows],
+) -> None:
+    rows = histories["U2", "LJB"]
+    nothing = np.full(len(rows.history), np.nan)
+    poorer = replace(
+        rows,
+        history=replace(
+            rows.history, attitude_deg=nothing, shaft_um_pk=np.stack([nothing, nothing])
+        ),
+    )
+    found = run_back_test({("U2", "LJB"): poorer}, BackTestRules(YEAR))
+    assert found.doubts == ["U2 LJB: no attitude_deg, so that its baseline does without"]
+    assert all(q.surface.shape.has_attitude is False for q in found.baselines[0].quantities)
+    assert {a.cause.reason for a in found.alarms} == {
+        "the readings have no shaft_um_pk in every bearing"
+    }
+
+
+def test_states_that_are_not_told_are_followed_or_asked_for(
+    two_units: Any, histories: Mapping[Place, BearingRows], found: Found
+) -> None:
+    rows, life = histories["U2", "LJB"], two_units.lives["U2"]
+    operation = life.operation
+    untold = replace(
+        rows,
+        state=None,
+        history=replace(rows.history, speed_rpm=operation.speed_rpm, power_mw=operation.power_mw),
+    )
+    rated = {"U2": (operation.rated_speed_rpm, operation.rated_power_mw)}
+    followed = run_back_test({("U2", "LJB"): untold}, BackTestRules(YEAR, rated=rated))
+    of_u2 = [film.verdicts for film in found.films if (film.unit, film.bearing) == ("U2", "LJB")]
+    assert [film.verdicts for film in followed.films] == of_u2
+    with pytest.raises(ReadingsError, match="unit U2: operating states are not known"):
+        run_back_test({("U2", "LJB"): untold}, BackTestRules(YEAR))
+
+
+def test_too_little_to_learn_from_leaves_everything_without_a_baseline(
+    histories: Mapping[Place, BearingRows],
+) -> None:
+    place = ("U1", "TJB")
+    for learning in (Learning(days=10), Learning(365, until_ns=START_NS - 1)):
+        found = run_back_test({place: histories[place]}, BackTestRules(learning))
+        assert found.alarms == []
+        for film in found.films:
+            assert film.verdicts["no_baseline"] > 10_000
+            assert film.verdicts["normal"] == film.verdicts["gathering_evidence"] == 0
+            assert film.verdicts["transient"] > 0
+            assert not film.baselines[0].is_learned
+
+
+def test_readings_that_are_further_apart_than_told_are_doubted(
+    histories: Mapping[Place, BearingRows],
+) -> None:
+    place = ("U1", "TJB")
+    rules = BackTestRules(YEAR, baseline=BaselineSettings(reading_h=1.0))
+    found = run_back_test({place: histories[place]}, rules)
+    assert found.doubts == [
+        "U1 TJB: readings are 10 min apart and are taken to stand for 60 min each;"
+        " set reading_period_s"
+    ]
