@@ -15,7 +15,7 @@ from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of
 from service.delivery.deliveries import Deliveries
-from service.delivery.facts import look_around
+from service.delivery.facts import Around
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
 from service.live import LiveView
@@ -110,9 +110,10 @@ async def run_service(
     """
     plant, origin = performance.plant, performance.origin
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * _refresh_s(plant))
-    store = open_store(plant, origin, router_of(plant, origin, look_around(live), clock))
+    around = Around(live)
+    store = open_store(plant, origin, router_of(plant, origin, around, clock))
     try:
-        await _run(performance, listener, clock, live, store, announce)
+        await _run(performance, listener, clock, live, around, store, announce)
     finally:
         store.close()
 
@@ -122,6 +123,7 @@ async def _run(
     listener: socket.socket,
     clock: Clock,
     live: LiveView,
+    around: Around,
     store: Store,
     announce: Callable[[str], None],
 ) -> None:
@@ -136,6 +138,7 @@ async def _run(
     )
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
+    around.watch_films(films.newest)
     runner = Runner(units, live, recorder, clock, alarms, films)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result

@@ -1,9 +1,11 @@
 """What was known around an alarm when it was written down to be told."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from core.alarms.alarm import AlarmIdentity, AlarmKind
+from core.assessment import Assessment
+from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
 from service.live import LiveView
 
@@ -16,6 +18,9 @@ MEASURED = {
     AlarmKind.OIL_TEMPERATURE: "oil_temperature_c",
 }
 """The quantity that an alarm's value is a reading of."""
+
+FILMS = (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
+"""In the order of a film's findings."""
 
 
 @dataclass(frozen=True)
@@ -56,28 +61,46 @@ class Surroundings:
 
 LookAround = Callable[[AlarmIdentity], Surroundings]
 
+NewestFilm = Callable[[str, str], FilmNews | None]
+"""What is said of the films of a bearing of a unit."""
 
-def look_around(live: LiveView) -> LookAround:
-    """Take it from the newest result of the alarm's bearing, if the alarm is about one."""
 
-    def look(identity: AlarmIdentity) -> Surroundings:
-        assessment = live.assessment(identity.unit, identity.subject)
+class Around:
+    """Finds it in the newest results of the alarm's bearing, if the alarm is about one."""
+
+    def __init__(self, live: LiveView) -> None:
+        self._live = live
+        self._newest_film: NewestFilm = lambda unit, bearing: None  # noqa: ARG005
+
+    def watch_films(self, newest: NewestFilm) -> None:
+        """Look also at what is said of films, once they are watched."""
+        self._newest_film = newest
+
+    def __call__(self, identity: AlarmIdentity) -> Surroundings:
+        """Look around one alarm."""
+        assessment = self._live.assessment(identity.unit, identity.subject)
         if assessment is None:
             return Surroundings()
-        found = {name: assessment.readings[name] for name in CONDITION}
-        measured = assessment.readings.get(MEASURED.get(identity.kind, ""))
-        state = assessment.condition.state.name.lower() if assessment.condition else None
+        condition = assessment.condition
         return Surroundings(
-            uncertainty=measured.u_random if measured else None,
-            state=state,
-            condition=[
-                Fact(name, LABELS[name], reading.value, UNITS[name], reading.u_random)
-                for name, reading in found.items()
-                if reading.value is not None
-            ],
+            uncertainty=self._uncertainty(identity, assessment),
+            state=condition.state.name.lower() if condition else None,
+            condition=list(_facts(assessment)),
         )
 
-    return look
+    def _uncertainty(self, identity: AlarmIdentity, assessment: Assessment) -> float | None:
+        if identity.kind in FILMS:
+            news = self._newest_film(identity.unit, identity.subject)
+            return news.findings[FILMS.index(identity.kind)].change_std if news else None
+        measured = assessment.readings.get(MEASURED.get(identity.kind, ""))
+        return measured.u_random if measured else None
+
+
+def _facts(assessment: Assessment) -> Iterator[Fact]:
+    for name in CONDITION:
+        reading = assessment.readings[name]
+        if reading.value is not None:
+            yield Fact(name, LABELS[name], reading.value, UNITS[name], reading.u_random)
 
 
 LABELS = {quantity.name: quantity.label for quantity in CATALOGUE}

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from core.alarms.alarm import Alarm, AlarmKind
+from core.alarms.alarm import Alarm
 from core.alarms.event import AlarmEvent
 from service.api.alarm_views import LEVEL_NAMES, VALUE_UNITS
 from service.api.times import rfc3339
-from service.delivery.facts import Fact, LookAround, Surroundings
+from service.delivery.facts import FILMS, Fact, LookAround, Surroundings
 
 FORMAT = 1
 """Raised when a key changes its meaning or goes; new ones may come at any time."""
-
-FILM_KINDS = (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
 
 ALARMS_PAGE = "#/alarms"
 
@@ -118,7 +116,7 @@ def _numbers(event: AlarmEvent, found: Surroundings) -> Message:
         "uncertainty": _finite(found.uncertainty),
         "limit": _finite(event.limit),
         "value_unit": VALUE_UNITS.get(kind),
-        "value_is": "ln_change" if kind in FILM_KINDS else "reading",
+        "value_is": "ln_change" if kind in FILMS else "reading",
         "operating_state": found.state,
         "condition": {fact.name: _fact(fact) for fact in found.condition},
     }

@@ -17,6 +17,7 @@ from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of, calibration_of, machine_of
+from service.delivery.deliveries import Deliveries
 from service.films.start import film_keeper
 from service.live import LinkState, LiveView
 from service.origin import Origin
@@ -147,6 +148,7 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
         films=films,
         recorder=recorder,
         captures=captures,
+        deliveries=Deliveries([], store.outbox, clock),
         max_shelf_s=7200.0,
     )
     app = create_app(context)

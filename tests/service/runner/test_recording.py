@@ -11,6 +11,7 @@ import httpx2
 from core.account import Gap
 from service.api.app import create_app
 from service.api.context import Context
+from service.delivery.deliveries import Deliveries
 from service.recorder import Findings
 from service.references import ReferencesInForce
 from service.store.port import TrendQuery, UnitGap
@@ -96,6 +97,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
             films=plant.films,
             recorder=plant.recorder,
             captures=plant.captures,
+            deliveries=Deliveries([], plant.store.outbox, plant.clock),
         )
     )
     running = asyncio.create_task(plant.runner(U1=source).run())
