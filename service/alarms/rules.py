@@ -1,17 +1,30 @@
 """From the plant file's settings to the rules of a unit."""
 
+from core.alarms.chatter import ChatterRule
 from core.alarms.limits import Limits
-from core.alarms.rules import BearingRules, ClockRules, LimitRule, UnitRules, rule_of
-from service.origin import Origin
-from service.settings.alarms import (
-    AlarmSettings,
-    AmplitudeLimitSettings,
-    TemperatureLimitSettings,
+from core.alarms.rules import (
+    BearingRules,
+    ClockRules,
+    LimitRule,
+    UnitRules,
+    ZoneRule,
+    rule_of,
 )
+from core.alarms.state_limits import StateLimits
+from core.alarms.vector_change import OrderVector, VectorReference
+from core.alarms.zones import ZoneLimits
+from core.units import ns_from_s
+from service.origin import Origin
+from service.settings.alarms import AlarmSettings
 from service.settings.bearings import BearingSettings
+from service.settings.limits import GapLimitSettings, LimitSettings, states_of
 from service.settings.units import UnitSettings
+from service.settings.zones import VectorReferenceSettings, ZoneSettings, ZoneTableSettings
 
 CLOCK_DELAYS_S = {"offset": 30.0, "drift": 60.0}
+
+ZONE_DEADBAND = 0.05
+"""Of the boundary between A and B, where no deadband is given."""
 
 
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
@@ -26,18 +39,66 @@ def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitR
     )
 
 
+def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
+    """What counts as chattering."""
+    return ChatterRule(alarms.chattering_activations, ns_from_s(alarms.chattering_window_s))
+
+
+def references_of(unit: UnitSettings) -> list[VectorReference]:
+    """Vectors of the plant file that 1× is compared with."""
+    return [
+        VectorReference(unit.id, bearing.id, state, _vectors(reference))
+        for bearing in unit.bearing
+        for reference in bearing.alarms.order1_reference
+        for state in states_of(reference.states)
+    ]
+
+
+def _vectors(reference: VectorReferenceSettings) -> dict[str, OrderVector]:
+    return {place: OrderVector(*vector) for place, vector in reference.vectors().items()}
+
+
 def _bearing(bearing: BearingSettings) -> BearingRules:
+    alarms, zones = bearing.alarms, bearing.alarms.zones
     return BearingRules(
-        shaft_order1=_limits(bearing.alarms.shaft_order1_um_pk),
-        oil_temperature=_limits(bearing.alarms.oil_temperature_c),
+        shaft_order1=_limits(alarms.shaft_order1_um_pk),
+        oil_temperature=_limits(alarms.oil_temperature_c),
+        shaft_overall=_limits(alarms.shaft_overall_um_pp),
+        bearing_overall=_limits(alarms.bearing_overall_mm_s_rms),
+        eccentricity=_limits(alarms.eccentricity_ratio),
+        gap=_limits(alarms.gap_um),
+        shaft_change=_limits(alarms.shaft_order1_change_um_pk),
+        bearing_change=_limits(alarms.bearing_order1_change_um_pk),
+        shaft_zones=_zones(zones.shaft_um_pp),
+        orbit_zones=_zones(zones.shaft_max_um_pk),
+        bearing_zones=_zones(zones.bearing_mm_s_rms),
     )
 
 
-def _limits(found: AmplitudeLimitSettings | TemperatureLimitSettings | None) -> LimitRule | None:
+def _limits(found: LimitSettings | None) -> LimitRule | None:
     if found is None:
         return None
-    limits = Limits(found.alert, found.danger, found.deadband)
-    return LimitRule(limits, rule_of(found.on_delay_s, found.off_delay_s))
+    below = (
+        (found.alert_below, found.danger_below)
+        if isinstance(found, GapLimitSettings)
+        else (None, None)
+    )
+    rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
+    limits = Limits(found.alert, found.danger, found.deadband, *below)
+    return LimitRule(limits, rule, states_of(found.states))
+
+
+def _zones(found: ZoneSettings | None) -> ZoneRule | None:
+    if found is None:
+        return None
+    tables = tuple((states_of(table.states), _table(table)) for table in found.table)
+    rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
+    return ZoneRule(StateLimits(tables), rule)
+
+
+def _table(table: ZoneTableSettings) -> ZoneLimits:
+    deadband = ZONE_DEADBAND * table.a_b if table.deadband is None else table.deadband
+    return ZoneLimits.between(table.a_b, table.b_c, table.c_d, deadband)
 
 
 def _clock(alarms: AlarmSettings) -> ClockRules:

@@ -4,69 +4,18 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from service.settings.base import MisfitError, Settings
-
-DelayS = Annotated[float, Field(ge=0.0, le=86_400.0)]
-"""Seconds, at most a day."""
-
-
-class _LimitSettings(Settings):
-    """Limits that a value must not pass; without alert and danger nothing is watched."""
-
-    alert: float | None
-    danger: float | None
-    deadband: float
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        alert, danger = self.alert, self.danger
-        given = [limit for limit in (alert, danger) if limit is not None]
-        if not given:
-            raise MisfitError("gives no limit: give alert, danger or both", "alert")
-        if alert is not None and danger is not None and alert >= danger:
-            raise MisfitError(f"must be above alert, {alert:g}", "danger")
-        if self.deadband >= given[0]:
-            raise MisfitError(f"must be below the lowest limit, {given[0]:g}", "deadband")
-        return self
-
-
-class AmplitudeLimitSettings(_LimitSettings):
-    """Limits of a shaft's vibration at 1×. padwatch is no protection system: these inform."""
-
-    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Above this, µm zero-to-peak, the alarm is an alert; example: 150.0."""
-
-    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Above this, µm zero-to-peak, it is a danger; must be above alert; example: 250.0."""
-
-    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 5.0
-    """How far below a limit the amplitude must fall for the alarm to return, µm."""
-
-    on_delay_s: DelayS = 10.0
-    """For how long the limit must be passed, seconds of the samples' time; the amplitude is known
-    once a refresh."""
-
-    off_delay_s: DelayS = 30.0
-    """For how long it must be kept again for the alarm to return, s."""
-
-
-class TemperatureLimitSettings(_LimitSettings):
-    """Limits of an oil temperature; the bearing must name its slow channel."""
-
-    alert: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
-    """Above this, °C, the alarm is an alert; example: 65.0."""
-
-    danger: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
-    """Above this, °C, it is a danger; must be above alert; example: 75.0."""
-
-    deadband: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
-    """How far below a limit the temperature must fall for the alarm to return, K."""
-
-    on_delay_s: DelayS = 10.0
-    """For how long the limit must be passed, seconds of the samples' time."""
-
-    off_delay_s: DelayS = 30.0
-    """For how long it must be kept again for the alarm to return, s."""
+from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.limits import (
+    AmplitudeLimitSettings,
+    DelayS,
+    EccentricityLimitSettings,
+    GapLimitSettings,
+    SpanLimitSettings,
+    TemperatureLimitSettings,
+    VectorChangeLimitSettings,
+    VelocityLimitSettings,
+)
+from service.settings.zones import VectorReferenceSettings, ZonesSettings
 
 
 class BearingAlarmSettings(Settings):
@@ -75,8 +24,42 @@ class BearingAlarmSettings(Settings):
     shaft_order1_um_pk: AmplitudeLimitSettings | None = None
     """Limits of the relative shaft vibration at 1×, in x and in y each."""
 
+    shaft_overall_um_pp: SpanLimitSettings | None = None
+    """Limits of the relative shaft vibration, broad-band peak-to-peak, in x and in y each."""
+
+    bearing_overall_mm_s_rms: VelocityLimitSettings | None = None
+    """Limits of the bearing's velocity, broad-band rms, in x and in y each."""
+
+    eccentricity_ratio: EccentricityLimitSettings | None = None
+    """Limits of the shaft's eccentricity as a share of the clearance."""
+
+    gap_um: GapLimitSettings | None = None
+    """Limits of the mean gap of each probe, above and below."""
+
+    shaft_order1_change_um_pk: VectorChangeLimitSettings | None = None
+    """Limits of how far the shaft's 1× vector may move from its reference, in x and in y each."""
+
+    bearing_order1_change_um_pk: VectorChangeLimitSettings | None = None
+    """Limits of how far the bearing's 1× vector may move, in x and in y each."""
+
+    order1_reference: Annotated[tuple[VectorReferenceSettings, ...], Field(max_length=6)] = ()
+    """Where 1× vectors are when all is well, by operating state. One that an engineer has set on
+    the running machine takes precedence in its state."""
+
+    zones: ZonesSettings = ZonesSettings()
+    """Evaluation zones after ISO 20816-5."""
+
     oil_temperature_c: TemperatureLimitSettings | None = None
     """Limits of the oil temperature."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse_twice(
+            ("order1_reference", n, "states", m, state)
+            for n, reference in enumerate(self.order1_reference)
+            for m, state in enumerate(reference.states)
+        )
+        return self
 
 
 class AlarmSettings(Settings):
@@ -103,6 +86,26 @@ class AlarmSettings(Settings):
     max_clock_drift_ppm: Annotated[float, Field(gt=0.0, le=1e6)] = 200.0
     """Most that a device may sample faster or slower than nominal by the host's clock, parts per
     million, after its uncertainty; for a minute."""
+
+    chattering_activations: Annotated[int, Field(ge=2, le=100)] = 3
+    """An alarm that is raised so often within chattering_window_s is chattering; ISA-18.2 says 3
+    or more in a minute."""
+
+    chattering_window_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 60.0
+    """Within which time, s; an alarm that is active for less is fleeting."""
+
+    store_failing_after_s: DelayS = 10.0
+    """For how long results may wait for a store that does not take them, s."""
+
+    max_analysis_delay_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 5.0
+    """Longest that samples may wait for their analysis, s."""
+
+    max_waiting_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    """Share of the queue from acquisition to analysis that may be filled; at nine tenths it is a
+    danger."""
+
+    max_samples_lost_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.01
+    """Share of a unit's samples that may get lost or be refused in ten minutes."""
 
     max_shelf_h: Annotated[float, Field(gt=0.0, le=8760.0)] = 24.0
     """Longest time for which an alarm can be shelved at once, hours."""

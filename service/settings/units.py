@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from acquisition.calibration import BLOCK_SAMPLES
+from service.settings.alarm_fit import require_alarm_fit
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.bearings import (
     CHANNEL_KEYS,
@@ -114,6 +115,7 @@ class UnitSettings(Settings):
         slow_ids = [channel.id for channel in self.slow_channel]
         channel_ids = [channel.id for channel in self.channel]
         require_source_fit(self.source, self.slow_source, channel_ids, slow_ids)
+        require_alarm_fit(self.id, self.source, self.key_phase, self.channel, self.bearing)
         return self
 
     def _check_channels(self, number: int, bearing: BearingSettings) -> None:

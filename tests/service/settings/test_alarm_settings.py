@@ -8,6 +8,8 @@ import pytest
 from core.alarms.alarm import AlarmRule
 from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule
+from core.alarms.state_limits import AT_SPEED, EVERY_STATE
+from core.condition.operating_state import OperatingState
 from service.alarms.rules import rules_of
 from service.origin import Origin
 from service.settings.plant import PlantFile
@@ -17,6 +19,7 @@ Changed = Callable[[str, str], tuple[str, int]]
 Mistakes = Callable[[str | bytes], list[str]]
 
 SECOND = 1_000_000_000
+EVERY_KNOWN_STATE = EVERY_STATE - {OperatingState.UNKNOWN}
 UJB = "unit[1].bearing[1].alarms."
 OIL = 'oil_temperature = "ujb_oil_temperature"'
 
@@ -54,9 +57,11 @@ def test_limits_of_a_bearing_become_its_rules(plant_of: Callable[..., PlantFile]
 
     found = rules_of(plant.unit[0], plant.alarms, Origin.LIVE).bearings["UJB"]
 
-    assert found.shaft_order1 == LimitRule(Limits(150.0, 250.0, 5.0), AlarmRule(0, 30 * SECOND))
+    assert found.shaft_order1 == LimitRule(
+        Limits(150.0, 250.0, 5.0), AlarmRule(0, 30 * SECOND), AT_SPEED
+    )
     assert found.oil_temperature == LimitRule(
-        Limits(None, 75.0, 2.0), AlarmRule(10 * SECOND, 3 * SECOND // 2)
+        Limits(None, 75.0, 2.0), AlarmRule(10 * SECOND, 3 * SECOND // 2), EVERY_KNOWN_STATE
     )
 
 
@@ -110,7 +115,11 @@ def test_clocks_and_captures_can_be_left_alone(plant_of: Callable[..., PlantFile
             "shaft_order1_um_pk.on_delay_s = -1.0",
             "greater than or equal to 0",
         ),
-        ("shaft_order1_um = { alert = 1.0 }", "shaft_order1_um", "known here: oil_temperature_c"),
+        (
+            "shaft_order1_um = { alert = 1.0 }",
+            "shaft_order1_um",
+            "known here: bearing_order1_change_um_pk",
+        ),
         ("oil_temperature_c = { alert = 300.0 }", "oil_temperature_c.alert = 300.0", "200"),
     ],
 )

@@ -1,0 +1,189 @@
+"""Limits that raise alarms: how far, for how long, and in which operating states."""
+
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from core.alarms.state_limits import States
+from core.condition.operating_state import OperatingState
+from service.settings.base import MisfitError, Settings, refuse_twice
+
+DelayS = Annotated[float, Field(ge=0.0, le=86_400.0)]
+"""Seconds, at most a day."""
+
+StateName = Literal["standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down"]
+
+AT_SPEED: tuple[StateName, ...] = ("speed_no_load", "part_load", "full_load")
+EVERY_STATE: tuple[StateName, ...] = ("standstill", "run_up", *AT_SPEED, "run_down")
+
+StateNames = Annotated[tuple[StateName, ...], Field(min_length=1, max_length=6)]
+
+
+def states_of(names: tuple[StateName, ...]) -> States:
+    """Operating states by their names."""
+    return frozenset(OperatingState[name.upper()] for name in names)
+
+
+class WatchSettings(Settings):
+    """How an alarm of a measurement behaves."""
+
+    on_delay_s: DelayS = 10.0
+    """For how long the limit must be passed, seconds of the samples' time; results come once a
+    refresh."""
+
+    off_delay_s: DelayS = 30.0
+    """For how long it must be kept again for the alarm to return, s."""
+
+    latching: bool = False
+    """Whether the alarm stays active after its condition has gone, until somebody resets it."""
+
+
+class LimitSettings(WatchSettings):
+    """Limits that a value must not pass; without alert and danger nothing is watched."""
+
+    alert: float | None
+    danger: float | None
+    deadband: float
+
+    states: StateNames = AT_SPEED
+    """Operating states in which the limit counts: "standstill", "run_up", "speed_no_load",
+    "part_load", "full_load", "run_down". Elsewhere its alarm is suppressed by design. Where the
+    state is not known, it counts."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse_twice(("states", n, name) for n, name in enumerate(self.states))
+        self._check_limits()
+        return self
+
+    def _check_limits(self) -> None:
+        alert, danger = self.alert, self.danger
+        given = [limit for limit in (alert, danger) if limit is not None]
+        if not given:
+            raise MisfitError("gives no limit: give alert, danger or both", "alert")
+        if alert is not None and danger is not None and alert >= danger:
+            raise MisfitError(f"must be above alert, {alert:g}", "danger")
+        if self.deadband >= given[0]:
+            raise MisfitError(f"must be below the lowest limit, {given[0]:g}", "deadband")
+
+
+class AmplitudeLimitSettings(LimitSettings):
+    """Limits of a shaft's vibration at 1×. padwatch is no protection system: these inform."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Above this, µm zero-to-peak, the alarm is an alert; example: 150.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Above this, µm zero-to-peak, it is a danger; must be above alert; example: 250.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 5.0
+    """How far below a limit the amplitude must fall for the alarm to return, µm."""
+
+
+class SpanLimitSettings(LimitSettings):
+    """Limits of a shaft's broad-band vibration, peak-to-peak."""
+
+    alert: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    """Above this, µm peak-to-peak, the alarm is an alert; example: 300.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    """Above this, µm peak-to-peak, it is a danger; must be above alert; example: 500.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
+    """How far below a limit the value must fall for the alarm to return, µm."""
+
+
+class VelocityLimitSettings(LimitSettings):
+    """Limits of a bearing's broad-band velocity."""
+
+    alert: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """Above this, mm/s rms, the alarm is an alert; example: 2.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """Above this, mm/s rms, it is a danger; must be above alert; example: 4.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.1
+    """How far below a limit the velocity must fall for the alarm to return, mm/s."""
+
+
+class EccentricityLimitSettings(LimitSettings):
+    """Limits of the eccentricity ratio: how much of the clearance the shaft has used up."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
+    """Above this share of the clearance the alarm is an alert; example: 0.7."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
+    """Above this share it is a danger; must be above alert; example: 0.9."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5.0)] = 0.02
+    """How far below a limit it must fall for the alarm to return."""
+
+
+class TemperatureLimitSettings(LimitSettings):
+    """Limits of an oil temperature; the bearing must name its slow channel."""
+
+    alert: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
+    """Above this, °C, the alarm is an alert; example: 65.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
+    """Above this, °C, it is a danger; must be above alert; example: 75.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
+    """How far below a limit the temperature must fall for the alarm to return, K."""
+
+    states: StateNames = EVERY_STATE
+    """Operating states in which the limit counts; all of them unless given: oil that is too hot is
+    so at standstill as well."""
+
+
+class VectorChangeLimitSettings(LimitSettings):
+    """Limits of how far a 1× vector may move from its reference; without phase, its length."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Above this length of the difference, µm zero-to-peak, the alarm is an alert; example: 30."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Above this, µm zero-to-peak, it is a danger; must be above alert; example: 60.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 2.0
+    """How far below a limit the difference must fall for the alarm to return, µm."""
+
+
+GapUm = Annotated[float, Field(gt=0.0, le=10_000.0)]
+
+
+class GapLimitSettings(LimitSettings):
+    """Limits of the mean gap of each probe: a shaft may walk out of a probe's range."""
+
+    alert: GapUm | None = None
+    """Above this gap, µm, the alarm is an alert; example: 2400.0."""
+
+    danger: GapUm | None = None
+    """Above this gap, µm, it is a danger; must be above alert; example: 2600.0."""
+
+    alert_below: GapUm | None = None
+    """Below this gap, µm, the alarm is an alert; example: 600.0."""
+
+    danger_below: GapUm | None = None
+    """Below this gap, µm, it is a danger; must be below alert_below; example: 400.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
+    """How far inside a limit the gap must come back for the alarm to return, µm."""
+
+    def _check_limits(self) -> None:
+        named = ("danger_below", "alert_below", "alert", "danger")
+        given = [(key, limit) for key in named if (limit := getattr(self, key)) is not None]
+        if not given:
+            keys = "alert, danger, alert_below or danger_below"
+            raise MisfitError(f"gives no limit: give {keys}", "alert")
+        for (lower, low), (upper, high) in pairwise(given):
+            if low >= high:
+                raise MisfitError(f"must be above {lower}, {low:g}", upper)
+        low_side = [limit for key, limit in given if key.endswith("below")]
+        high_side = [limit for key, limit in given if not key.endswith("below")]
+        if low_side and high_side and self.deadband >= (high_side[0] - low_side[-1]) / 2.0:
+            room = (high_side[0] - low_side[-1]) / 2.0
+            raise MisfitError(f"must be below half the room between, {room:g}", "deadband")
+        if high_side and self.deadband >= high_side[0]:
+            raise MisfitError(f"must be below the lowest limit, {high_side[0]:g}", "deadband")
