@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 
+from core.history_rows import Place
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.periods import Learning, MachineEvent
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.plant import PlantFile
-
-Place = tuple[str, str]
 
 
 def places_of(plant: PlantFile) -> list[Place]:
@@ -30,12 +29,21 @@ def rules_of(
         change=settings.change.limits(),
         baseline=settings.baseline.settings(settings.reading_h),
         operating=settings.operating.limits(1.0, 1.0),
+        rated=_rated(plant) if plant else {},
         bracket_n_per_m=_brackets(plant) if plant else {},
         events=events,
         author=author,
         created_ns=created_ns,
         estimator=estimator,
     )
+
+
+def _rated(plant: PlantFile) -> dict[str, tuple[float, float]]:
+    return {
+        unit.id: (unit.rated_speed_rpm, unit.rated_power_mw)
+        for unit in plant.unit
+        if unit.rated_power_mw is not None
+    }
 
 
 def _brackets(plant: PlantFile) -> dict[Place, float]:

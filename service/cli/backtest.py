@@ -40,7 +40,8 @@ def backtest(
     settings: Annotated[
         Path | None,
         typer.Option(
-            help="Settings to try (TOML), instead of those of the plant file.", show_default=False
+            help="Settings to try (TOML): keys of the plant file's [films], instead of these.",
+            show_default=False,
         ),
     ] = None,
     learn_days: Annotated[
@@ -82,7 +83,7 @@ def backtest(
     clock = SystemClock()
     begin_s = clock.monotonic_s()
     plant_file = read_plant_file(plant) if plant else None
-    film = _settings(settings)
+    film = _settings(settings, plant_file)
     try:
         learning = Learning(
             days=learn_days or film.learning_days,
@@ -108,9 +109,9 @@ def backtest(
     typer.echo(report.model_dump_json(indent=1) if json_output else "\n".join(lines_of(report)))
 
 
-def _settings(path: Path | None) -> FilmAlarmSettings:
+def _settings(path: Path | None, plant: PlantFile | None) -> FilmAlarmSettings:
     if path is None:
-        return FilmAlarmSettings()
+        return plant.films if plant else FilmAlarmSettings()
     try:
         return load_toml(path, FilmAlarmSettings)
     except TomlFileError as error:

@@ -6,7 +6,7 @@ import traceback
 
 import typer
 
-from service.cli import config, delivery, probe, recording, reference
+from service.cli import config, delivery, probe, readings, recording, reference
 from service.cli.backtest import backtest
 from service.cli.daq import daq
 from service.cli.demo import demo
@@ -31,6 +31,7 @@ app.command()(validate)
 app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")
 app.add_typer(recording.app, name="recording")
+app.add_typer(readings.app, name="readings")
 app.add_typer(probe.app, name="probe")
 app.add_typer(delivery.app, name="delivery")
 
