@@ -1,15 +1,24 @@
-"""What tests of every package share: a plant whose samples are their own numbers, and a clock."""
+"""What tests of every package share: a plant of numbers, a clock, results, readings of films."""
 
 import asyncio
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.raw import RawBlock
+from core.arrays import FloatArray
+from core.assessment import Assessment, AveragingWindow
+from core.cross_spectrum import average
+from core.quality import GOOD, Reading, Reason, missing
+from core.quantities import CATALOGUE
+from core.speed import SpeedSource
+from core.stiffness_history import StiffnessHistory
 
 NS_PER_S = 1_000_000_000
+START_NS = 1_767_225_600 * NS_PER_S
 
 
 class CountingFeed:
@@ -19,7 +28,7 @@ class CountingFeed:
         self,
         n_channels: int = 2,
         rate_hz: float = 600.0,
-        start_ns: int = 1_767_225_600 * NS_PER_S,
+        start_ns: int = START_NS,
         slow: tuple[float, ...] = (45.0, float("nan")),
     ) -> None:
         self._n_channels = n_channels
@@ -89,3 +98,103 @@ def counting_feed() -> Callable[..., CountingFeed]:
 def counts_calibration() -> Callable[..., UnitCalibration]:
     """Builds calibrations that leave counts as they are."""
     return calibration_in_counts
+
+
+def build_assessment(
+    time_ns: int = 1_767_225_600 * NS_PER_S,
+    unit: str = "U1",
+    bearing: str = "UJB",
+    **readings: Reading | float,
+) -> Assessment:
+    """An assessment in which only the named readings have a value."""
+    given = {
+        name: value if isinstance(value, Reading) else Reading(value)
+        for name, value in readings.items()
+    }
+    everything = {q.name: missing(Reason.NOT_MEASURED) for q in CATALOGUE} | given
+    nothing = average(np.arange(1.0, 3.0), np.zeros((1, 4, 2), complex), np.ones((1, 4), bool))
+    return Assessment(
+        unit=unit,
+        bearing=bearing,
+        time_ns=time_ns,
+        window=AveragingWindow(3, 0, 8192, 1, 24, 0, 1.0, 13.653),
+        speed_source=SpeedSource.SLOW_CHANNEL,
+        quality=GOOD,
+        readings=everything,
+        budgets={},
+        estimators={"xx": None, "yy": None},
+        spectrum=nothing,
+        orbit=None,
+        runout={},
+    )
+
+
+@pytest.fixture
+def assessment() -> Callable[..., Assessment]:
+    """Builds assessments; keywords are readings."""
+    return build_assessment
+
+
+FilmLife = Callable[..., StiffnessHistory]
+
+
+@pytest.fixture(scope="session")
+def film_life() -> FilmLife:
+    """Readings of one bearing: warm-ups, loads, seasons, lasting deviations, noise; not physics."""
+
+    def live(
+        seed: int,
+        days: int = 120,
+        lasting_std: float = 0.01,
+        noise_std: float = 0.01,
+        change: Callable[[FloatArray], FloatArray] | None = None,
+        gain: Callable[[FloatArray], FloatArray] | None = None,
+    ) -> StiffnessHistory:
+        """Live for some days.
+
+        Parameters
+        ----------
+        change, gain
+            ln of what happens to the film, and to the bearing's transducer, at hours since start.
+        """
+        random = np.random.default_rng(seed)
+        hours = np.arange(144 * days) / 6.0
+        runs = (hours % 24 > 6.0) & (hours % 24 < 20.0)
+        warmth = 1.0 - np.exp(-np.maximum(hours % 24 - 6.0, 0.0) / 2.0)
+        season = 5.0 * np.sin(2.0 * np.pi * hours / 24.0 / 90.0)
+        power_mw = np.where(_wander(random, hours, 1.0, 10.0) > 0.0, 300.0, 200.0)
+        oil_c = 25.0 + season + 22.0 * warmth + _wander(random, hours, 1.0, 12.0)
+        e = 0.35 + 0.1 * (power_mw > 250.0) - 0.05 * warmth
+        e += _wander(random, hours, 0.03, 6.0) + _wander(random, hours, 0.02, 200.0)
+        film = np.stack([_wander(random, hours, lasting_std, 12.0) for _ in "xy"])
+        film += np.log(0.5e9) + 4.0 * (e - 0.4) - 0.02 * (oil_c - 45.0)
+        film += 0.0 if change is None else change(hours)
+        ln_gain = 0.0 if gain is None else gain(hours)
+        shaft = np.log(60.0) + _wander(random, hours, 0.03, 5.0) - 0.7 * (film - np.log(0.5e9))
+        bearing = shaft + film - np.log(1.18e9) + ln_gain
+        one, pair = np.ones(hours.size), np.ones((2, hours.size))
+        columns = {
+            "time_ns": np.int64(1_700_000_000_000_000_000)
+            + np.arange(hours.size) * 600_000_000_000,
+            "speed_rpm": 92.3 * one,
+            "power_mw": power_mw,
+            "eccentricity_ratio": e + random.normal(0.0, 0.003, hours.size),
+            "u_eccentricity": 0.003 * one,
+            "attitude_deg": 30.0 * one,
+            "oil_temperature_c": oil_c,
+            "ln_k": film + ln_gain + random.normal(0.0, noise_std, film.shape),
+            "u_random": max(noise_std, 1e-9) * pair,
+            "shaft_um_pk": np.exp(shaft),
+            "bearing_um_pk": np.exp(bearing),
+        }
+        return StiffnessHistory(**{name: column[..., runs] for name, column in columns.items()})
+
+    return live
+
+
+def _wander(
+    random: np.random.Generator, hours: FloatArray, std: float, memory_h: float
+) -> FloatArray:
+    memory = float(np.exp(-(hours[1] - hours[0]) / memory_h))
+    fresh = random.standard_normal(hours.size) * std * np.sqrt(1.0 - memory**2)
+    return np.asarray(lfilter([1.0], [1.0, -memory], fresh))

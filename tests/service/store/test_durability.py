@@ -51,7 +51,7 @@ def test_every_append_is_written_through_to_the_disk(store: SqliteStore, path: P
 
 def test_what_was_appended_survives_kill_9(path: Path, query: Ask) -> None:
     writer = subprocess.Popen(
-        [sys.executable, "-c", WRITE_AND_WAIT, str(path), str(Path(__file__).parent)],
+        [sys.executable, "-c", WRITE_AND_WAIT, str(path), str(Path(__file__).parents[2])],
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
     )
@@ -72,11 +72,11 @@ WRITE_AND_WAIT = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-from conftest import HOP_NS, T0, build_assessment
+from conftest import START_NS, build_assessment
 from service.store.sqlite import SqliteStore
 store = SqliteStore(Path(sys.argv[1]))
 for i in range(100):
-    store.append([build_assessment(T0 + i * HOP_NS, speed_rpm=float(i))], [])
+    store.append([build_assessment(START_NS + i * 11_946_666_667, speed_rpm=float(i))], [])
 print("appended", flush=True)
 time.sleep(60)
 """
