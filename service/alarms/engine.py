@@ -70,6 +70,11 @@ class AlarmEngine:
         listener: Callable[[SampleBlock, Sequence[AlarmNews]], None] | None = None,
     ) -> None:
         self._units, self._put, self._clock, self._listener = units, put, clock, listener
+        self._witness: Callable[[Sequence[AlarmNews]], None] | None = None
+
+    def show(self, witness: Callable[[Sequence[AlarmNews]], None]) -> None:
+        """Let somebody see all news at the moment at which it comes about."""
+        self._witness = witness
 
     def restore(self, alarms: Iterable[Alarm]) -> None:
         """Go on where the service stopped, before anything else arrives."""
@@ -94,7 +99,7 @@ class AlarmEngine:
         own = self._units[block.unit]
         news = own.take(block, assessments, self._clock.now_ns())
         news += own.films(films, block.stop_ns)
-        _log(news)
+        self._tell(news)
         if self._listener is not None:
             self._listener(block, news)
         return news
@@ -158,9 +163,14 @@ class AlarmEngine:
 
     def _publish(self, news: list[AlarmNews]) -> None:
         """Store what no block has brought."""
-        _log(news)
+        self._tell(news)
         if news:
             self._put(Findings(alarms=news))
+
+    def _tell(self, news: list[AlarmNews]) -> None:
+        _log(news)
+        if news and self._witness is not None:
+            self._witness(news)
 
 
 def _log(news: Iterable[AlarmNews]) -> None:
