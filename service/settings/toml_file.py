@@ -69,6 +69,8 @@ def _line(path: Path, text: str, error: ErrorDetails, tags: Sequence[str]) -> st
     key = "".join(f"[{p + 1}]" if isinstance(p, int) else f".{p}" for p in at).lstrip(".")
     words = str(reason) if isinstance(reason, MisfitError) else error["msg"]
     value = error["input"]
+    for part in reason.at if isinstance(reason, MisfitError) else ():
+        value = value.get(part) if isinstance(value, dict) else None
     shown = f" = {value!r}"[:_MAX_SHOWN] if isinstance(value, int | float | str) else ""
     said = f"{key}{shown}: {words}".replace("\n", "\\n")  # a key may hold anything
     return f"{path}:{line_of(at, text)}: {said}"

@@ -1,0 +1,68 @@
+"""From which readings a baseline is learned, and which are compared with it."""
+
+import numpy as np
+import pytest
+
+from service.back_test.arguments import event_of, time_ns_of
+from service.back_test.periods import DAY_NS, Learning, MachineEvent, Period, periods_of
+
+DAYS = np.arange(100) * DAY_NS
+
+
+def event(day: float, text: str = "overhaul") -> MachineEvent:
+    return MachineEvent("U1", None, round(day * DAY_NS), text)
+
+
+def test_without_events_there_is_one_period() -> None:
+    assert periods_of(DAYS, [], Learning(30)) == [Period(1, 0, 30, 100)]
+
+
+def test_each_event_begins_to_learn_anew_from_its_first_reading() -> None:
+    events = [event(70.5, "second"), event(50, "first")]
+    assert periods_of(DAYS, events, Learning(20)) == [
+        Period(1, 0, 20, 50),
+        Period(2, 50, 70, 71, "first"),
+        Period(3, 71, 91, 100, "second"),
+    ]
+
+
+def test_an_end_of_learning_is_that_of_the_first_baseline_only() -> None:
+    learning = Learning(20, until_ns=10 * DAY_NS)
+    learned = [period.learned for period in periods_of(DAYS, [event(50)], learning)]
+    assert learned == [10, 70]
+
+
+def test_periods_that_are_too_short_are_learned_from_and_not_compared() -> None:
+    assert periods_of(DAYS, [event(10)], Learning(20))[0] == Period(1, 0, 10, 10)
+
+
+def test_events_before_and_after_all_readings_change_nothing_but_the_name() -> None:
+    assert periods_of(DAYS + DAY_NS, [event(0), event(200)], Learning(30)) == [
+        Period(1, 0, 30, 100, "overhaul")
+    ]
+
+
+def test_times_need_an_offset() -> None:
+    assert time_ns_of("2025-01-01T02:00:00.000001+02:00") == 1_735_689_600_000_001_000
+    with pytest.raises(ValueError, match="needs an offset from UTC"):
+        time_ns_of("2025-01-01T02:00:00")
+    with pytest.raises(ValueError, match="is not a time like"):
+        time_ns_of("yesterday")
+
+
+def test_an_event_is_a_place_a_time_and_words() -> None:
+    time_ns = 1_735_689_600 * 10**9
+    assert event_of("U1 2025-01-01T00:00:00Z new pads, LJB") == MachineEvent(
+        "U1", None, time_ns, "new pads, LJB"
+    )
+    assert event_of("U1/LJB 2025-01-01T00:00:00Z") == MachineEvent(
+        "U1", "LJB", time_ns, "machine event"
+    )
+    assert event_of("U1/LJB 2025-01-01T00:00:00Z").is_about("U1", "LJB")
+    assert not event_of("U1/LJB 2025-01-01T00:00:00Z").is_about("U1", "UJB")
+
+
+@pytest.mark.parametrize("text", ["", "U1", "U1/ 2025-01-01T00:00:00Z", "U/1/2 x", "Ü 2025-01-01Z"])
+def test_what_is_no_event_is_refused_with_an_example(text: str) -> None:
+    with pytest.raises(ValueError, match="is not an event like 'U1 2026-03-01T08:00:00Z overhaul'"):
+        event_of(text)
