@@ -15,7 +15,7 @@ HEADINGS = (TIME, *(key for key in (*NAMES, *NUMBERS, *OPTIONAL_NAMES) if key in
 
 MAX_COLUMNS = 100
 MAX_ROWS = 40_000_000
-"""Of one file: 20 units of 3 bearings for 6 years; about 100 bytes of memory each."""
+"""Of one file: 20 units of 3 bearings for 6 years; about 230 bytes of memory each."""
 
 
 class ReadingsError(Exception):
