@@ -1,0 +1,217 @@
+"""Films are read back from the store as they were written, and nothing written is changed."""
+
+import sqlite3
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.alarms.alarm import AlarmLevel
+from core.baseline.baseline import BearingBaseline, Origin
+from core.baseline.learning import learn
+from core.baseline.response import learn_response
+from core.baseline.settings import BaselineSettings
+from core.condition.operating_state import OperatingState
+from core.decision.attribution import Attribution, Cause
+from core.decision.decision import Decision
+from core.decision.gathered import Finding, GatheredEvidence, ScaleSums
+from core.decision.verdict import Verdict
+from core.estimators import Estimator
+from core.films.film_finding import FilmFinding
+from core.films.film_judge import FilmNews
+from core.stiffness_history import StiffnessHistory
+from service.store.film_port import BaselineStep, FilmQuery, StoredStep
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+from service.store.value_range import ValueRange
+
+FilmLife = Callable[..., StiffnessHistory]
+Tell = Callable[..., list[FilmNews]]
+DECISION = Decision(
+    Verdict.ALERT,
+    Finding(4.0, -0.1, 0.01),
+    -0.12,
+    0.02,
+    GatheredEvidence(7, scales=(ScaleSums(0.5, 0.4, -0.1 - 1e-17, 0.2, 1 / 3),)),
+    last_ns=5,
+    last_counted_ns=4,
+)
+FOUND = FilmFinding(
+    *(Verdict.ALERT, AlarmLevel.ALERT, -0.1, 0.01, 4.0, -0.12, 0.02, 3),
+    Attribution(Cause.FILM, "the shaft moves as it does with softer films"),
+)
+
+
+def query(**changes: object) -> FilmQuery:
+    return replace(FilmQuery("U1", "UJB", Estimator.DYNAMIC), **changes)  # type: ignore[arg-type]
+
+
+def test_readings_are_read_back_to_the_last_bit(
+    store: SqliteStore, told: Tell, film_life: FilmLife
+) -> None:
+    history = film_life(2, days=3)
+    ln_k = history.ln_k.copy()
+    ln_k[0, 5] = np.nan
+    evidence = np.where(np.isnan(ln_k), 2, 0).astype(np.int8)
+    history = replace(history, ln_k=ln_k, evidence=evidence)
+    news = told(history)
+    news[7] = replace(news[7], findings=(FOUND, FilmFinding(Verdict.NORMAL, baseline_version=3)))
+
+    store.append([], [], [], news)
+    found = store.films.history(query())
+
+    for column in fields(StiffnessHistory):
+        written, read = getattr(history, column.name), getattr(found.history, column.name)
+        if column.name == "u_random":
+            written = np.where(np.isnan(ln_k), read, written)
+        np.testing.assert_array_equal(written, read, column.name)
+    assert found.is_settled.tolist() == [n.reading.condition.is_settled for n in news]
+    assert found.state.tolist() == [n.reading.condition.state for n in news]
+    assert found.verdict[:, 7].tolist() == [Verdict.ALERT, Verdict.NORMAL]
+    assert found.level[:, 7].tolist() == [1, 0]
+    assert (found.change[0, 7], found.deviation_std[0, 7]) == (-0.1, 0.02)
+    assert found.baseline_version[[6, 7]].tolist() == [0, 3]
+    assert not found.is_simulated.any()
+    assert store.films.first_ns("U1", "UJB", Estimator.DYNAMIC) == history.time_ns[0]
+    assert store.films.first_ns("U1", "LJB", Estimator.DYNAMIC) is None
+
+
+def test_readings_are_picked_by_time_state_and_condition(
+    store: SqliteStore, told: Tell, film_life: FilmLife
+) -> None:
+    history = film_life(2, days=3)
+    store.append([], [], [], told(history))
+    e, oil, time_ns = history.eccentricity_ratio, history.oil_temperature_c, history.time_ns
+
+    inside = query(
+        start_ns=int(time_ns[10]),
+        end_ns=int(time_ns[200]),
+        eccentricity_ratio=ValueRange(0.3, 0.45),
+        oil_temperature_c=ValueRange(30.0, None),
+    )
+    wanted = (e >= 0.3) & (e <= 0.45) & (oil >= 30.0)
+    wanted &= (time_ns >= time_ns[10]) & (time_ns < time_ns[200])
+    assert store.films.history(inside).history.time_ns.tolist() == time_ns[wanted].tolist()
+
+    full = store.films.history(query(states=(OperatingState.FULL_LOAD,)))
+    assert 0 < len(full) < len(history)
+    assert set(full.state.tolist()) == {OperatingState.FULL_LOAD}
+    newest = store.films.history(query(newest=3))
+    assert newest.history.time_ns.tolist() == time_ns[-3:].tolist()
+    assert len(store.films.history(query(estimator=Estimator.RATIO_ORDER1))) == 0
+
+
+def test_what_is_written_twice_counts_once(
+    store: SqliteStore, told: Tell, film_life: FilmLife
+) -> None:
+    news = told(film_life(2, days=1))
+    store.append([], [], [], news)
+    store.append([], [], [], news)
+    assert len(store.films.history(query())) == len(news)
+
+
+def test_simulated_readings_stay_marked(
+    store: SqliteStore, told: Tell, film_life: FilmLife
+) -> None:
+    news = told(film_life(2, days=1))
+    store.films.add_simulated(news[:40])
+    store.append([], [], [], news)
+    assert store.films.history(query()).is_simulated.tolist() == [i < 40 for i in range(len(news))]
+
+
+def test_decisions_go_on_where_they_stood(
+    store: SqliteStore, told: Tell, film_life: FilmLife
+) -> None:
+    first, second, *_ = told(film_life(2, days=1))
+    store.append([], [], [], [replace(first, findings=(FOUND, FOUND))])
+    store.append(
+        [], [], [], [replace(second, decisions=(DECISION, DECISION), findings=(FOUND,) * 2)]
+    )
+
+    x, y = store.films.decisions("U1", "UJB")
+    assert (x.direction, y.direction) == ("x", "y")
+    assert x.decision == y.decision == DECISION
+    assert (x.baseline_version, x.estimator) == (3, Estimator.DYNAMIC)
+    assert store.films.decisions("U1", "LJB") == []
+
+
+@pytest.fixture
+def baseline(film_life: FilmLife) -> BearingBaseline:
+    history = film_life(2, days=40)
+    origin = Origin("U1", "UJB", "dynamic", 1, "Ada", 77, "overhaul")
+    return learn(history, np.ones(len(history), bool), origin, BaselineSettings())
+
+
+def test_baselines_and_what_was_done_to_them_are_read_back(
+    store: SqliteStore, baseline: BearingBaseline
+) -> None:
+    step = StoredStep("U1", "UJB", 1, BaselineStep.ACCEPTED, 78, "Ada", "looks right")
+    renewed = StoredStep("U1", "UJB", None, BaselineStep.RENEWED, 80, "Bo", "overhaul", 79)
+    store.films.add_baseline(baseline, [step])
+    store.films.add_steps([renewed])
+
+    assert store.films.baseline("U1", "UJB", 1) == baseline
+    assert store.films.baseline("U1", "UJB", 2) is None
+    [entry] = store.films.baselines("U1", "UJB")
+    assert (entry.version, entry.author, entry.event, entry.created_ns) == (
+        1,
+        "Ada",
+        "overhaul",
+        77,
+    )
+    assert entry.estimator is Estimator.DYNAMIC
+    assert store.films.steps("U1", "UJB") == [step, renewed]
+    assert store.films.steps("U1", "LJB") == []
+
+
+def test_a_version_is_written_once(store: SqliteStore, baseline: BearingBaseline) -> None:
+    step = StoredStep("U1", "UJB", 1, BaselineStep.LEARNED, 78, "Ada", "")
+    store.films.add_baseline(baseline, [])
+    with pytest.raises(StoreError, match="UNIQUE"):
+        store.films.add_baseline(baseline, [step])
+    assert store.films.steps("U1", "UJB") == []
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE baseline SET author = 'Eve'",
+        "DELETE FROM baseline",
+        "UPDATE baseline_step SET reason = ''",
+        "DELETE FROM baseline_step",
+    ],
+)
+def test_no_baseline_is_ever_changed_or_taken_away(
+    store: SqliteStore, baseline: BearingBaseline, tmp_path: Path, statement: str
+) -> None:
+    step = StoredStep("U1", "UJB", 1, BaselineStep.ACCEPTED, 78, "Ada", "looks right")
+    store.films.add_baseline(baseline, [step])
+    connection = sqlite3.connect(tmp_path / "padwatch.sqlite3")
+    with pytest.raises(sqlite3.IntegrityError, match="kept"):
+        connection.execute(statement)
+    connection.close()
+
+
+def test_a_damaged_baseline_is_refused_by_name(
+    store: SqliteStore, baseline: BearingBaseline, tmp_path: Path
+) -> None:
+    store.films.add_baseline(baseline, [])
+    connection = sqlite3.connect(tmp_path / "padwatch.sqlite3")
+    connection.execute("DROP TRIGGER baseline_kept_as_learned")
+    connection.execute("UPDATE baseline SET document = replace(document, 'knot', 'kn0t')")
+    connection.execute("UPDATE baseline SET document = substr(document, 1, 5000)")
+    connection.commit()
+    connection.close()
+    with pytest.raises(StoreError, match="baseline 1 of unit U1 bearing UJB"):
+        store.films.baseline("U1", "UJB", 1)
+
+
+def test_the_response_of_a_shaft_is_read_back(store: SqliteStore, film_life: FilmLife) -> None:
+    history = film_life(2, days=60)
+    response = learn_response({"UJB": history}, np.ones(len(history), bool))
+    assert response is not None
+    store.films.set_response("U1", response, 1)
+    store.films.set_response("U1", response, 2)
+    assert store.films.responses() == {"U1": response}
