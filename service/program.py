@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import uvicorn
 
 from acquisition.clock import Clock
+from service.alarms.health import health_of
 from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
+from service.bus import Bus
 from service.conversion import analysis_of
 from service.delivery.deliveries import Deliveries
 from service.delivery.facts import Around
@@ -22,7 +24,7 @@ from service.live import LiveView
 from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
-from service.runner import Runner, WatchedUnit
+from service.runner import BUS_CAPACITY, Runner, WatchedUnit
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.store.port import Store
@@ -133,13 +135,15 @@ async def _run(
     recorder = Recorder(store, live, clock, told=deliveries.wake)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
     captures = captures_of(plant, performance.origin, clock)
+    bus = Bus(BUS_CAPACITY, clock)
+    look = health_of(units, live, recorder, captures, bus)
     alarms = await alarm_engine(
-        plant, performance.origin, store, recorder.put, clock, captures, vector_rows(plant)
+        plant, performance.origin, store, recorder.put, clock, captures, vector_rows(plant), look
     )
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
     around.watch_films(films.newest)
-    runner = Runner(units, live, recorder, clock, alarms, films)
+    runner = Runner(units, live, recorder, clock, alarms, films, bus)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
     context = Context(

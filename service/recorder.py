@@ -60,11 +60,21 @@ class Recorder:
         self._capacity, self._told = capacity, told
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
+        self._waits_since_s = 0.0
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
 
+    @property
+    def behind_s(self) -> float:
+        """For how long something has been waiting without anything being written."""
+        if not (self._waiting or self._alarms):
+            return 0.0
+        return self._clock.monotonic_s() - self._waits_since_s
+
     def put(self, findings: Findings) -> None:
         """Queue findings."""
+        if not (self._waiting or self._alarms):
+            self._waits_since_s = self._clock.monotonic_s()
         if findings.assessments or findings.gaps:
             self._waiting.append(replace(findings, alarms=()))
         if len(self._waiting) > self._capacity:
@@ -121,6 +131,7 @@ class Recorder:
         if self._live.store_error is not None:
             log.info("results are being stored again")
         self._live.store_error = None
+        self._waits_since_s = self._clock.monotonic_s()
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
         if alarms:

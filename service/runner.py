@@ -58,10 +58,11 @@ class Runner:
         clock: Clock,
         alarms: AlarmEngine,
         films: FilmKeeper,
+        bus: Bus | None = None,
     ) -> None:
         self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
         self._alarms, self._films = alarms, films
-        self._bus = Bus(BUS_CAPACITY)
+        self._bus = bus or Bus(BUS_CAPACITY, clock)
         self._gate = ConnectGate(CONNECTS_PER_S, clock)
 
     async def run(self) -> None:

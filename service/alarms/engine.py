@@ -8,11 +8,14 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState, Condition
+from core.alarms.chatter import ChatterRule, ChatterWatch
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Action
 from core.alarms.unit_alarms import UnitAlarms
+from core.alarms.vector_change import VectorReference
 from core.assessment import Assessment
 from core.blocks import SampleBlock
+from service.alarms.service_alarms import ServiceAlarms
 from service.recorder import Findings
 
 log = structlog.get_logger()
@@ -60,6 +63,10 @@ class AlarmEngine:
         Takes what is to be stored.
     listener
         Told of every block with the news that it has brought.
+    service
+        Alarms about the service itself.
+    chatter
+        What counts as chattering.
     """
 
     def __init__(
@@ -68,8 +75,13 @@ class AlarmEngine:
         put: Callable[[Findings], None],
         clock: Clock,
         listener: Callable[[SampleBlock, Sequence[AlarmNews]], None] | None = None,
+        service: ServiceAlarms | None = None,
+        chatter: ChatterRule | None = None,
     ) -> None:
         self._units, self._put, self._clock, self._listener = units, put, clock, listener
+        self._service = service or ServiceAlarms()
+        self.chatter_rule = chatter or ChatterRule()
+        self._chatter = ChatterWatch(self.chatter_rule)
         self._witness: Callable[[Sequence[AlarmNews]], None] | None = None
 
     def show(self, witness: Callable[[Sequence[AlarmNews]], None]) -> None:
@@ -82,6 +94,13 @@ class AlarmEngine:
         for unit, own in self._units.items():
             mine = [alarm for alarm in found if alarm.identity.unit == unit]
             self._publish(own.restore(mine, now_ns))
+        others = [alarm for alarm in found if alarm.identity.unit not in self._units]
+        self._publish(self._service.restore(others, now_ns))
+
+    def recall(self, events: Iterable[AlarmEvent]) -> None:
+        """Remember what alarms did lately, oldest first, to know which are chattering."""
+        for event in events:
+            self._chatter.note(event, event.time_ns)
 
     def take(
         self,
@@ -116,7 +135,7 @@ class AlarmEngine:
 
     def tick(self) -> None:
         """Look at the host's clock once."""
-        for own in self._units.values():
+        for own in self._boards:
             self._publish(own.tick(self._clock.now_ns()))
 
     def operate(self, id_: str, action: Action) -> Alarm:
@@ -129,23 +148,34 @@ class AlarmEngine:
         ActionRefusedError
             If it does not fit the alarm as it is now.
         """
-        own = self._units[id_.partition(":")[0]]
+        own = self._owner(id_)
         self._publish(own.operate(id_, action, self._clock.now_ns()))
         return own.alarm(id_)
 
     def alarm(self, id_: str) -> Alarm:
         """Look an alarm up. Raises `LookupError` if there is none."""
-        return self._units[id_.partition(":")[0]].alarm(id_)
+        return self._owner(id_).alarm(id_)
+
+    def is_chattering(self, alarm: Alarm) -> bool:
+        """Whether an alarm has come and gone too often until a short while ago."""
+        return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
+
+    def refer_to(self, reference: VectorReference) -> None:
+        """Compare 1× vectors with a new reference; one of what is there no more is left alone."""
+        if reference.unit in self._units:
+            self._units[reference.unit].refer_to(reference)
 
     @property
     def alarms(self) -> list[Alarm]:
         """All alarms, whatever their state."""
-        return [alarm for own in self._units.values() for alarm in own.alarms]
+        return [alarm for own in self._boards for alarm in own.alarms]
 
     def is_judged(self, alarm: Alarm) -> bool:
         """Whether what an alarm watches is known now; without a link nothing but the link is."""
         if alarm.identity.kind is AlarmKind.LINK_LOST:
             return True
+        if alarm.identity.unit not in self._units:
+            return alarm.condition.is_known
         return alarm.condition.is_known and self._units[alarm.identity.unit].is_connected
 
     def count(self) -> AlarmCount:
@@ -169,8 +199,23 @@ class AlarmEngine:
 
     def _tell(self, news: list[AlarmNews]) -> None:
         _log(news)
+        self._count(news)
         if news and self._witness is not None:
             self._witness(news)
+
+    def _count(self, news: Iterable[AlarmNews]) -> None:
+        now_ns = self._clock.now_ns()
+        for told in news:
+            for event in told.events:
+                self._chatter.note(event, now_ns)
+
+    @property
+    def _boards(self) -> list[UnitAlarms | ServiceAlarms]:
+        return [*self._units.values(), self._service]
+
+    def _owner(self, id_: str) -> UnitAlarms | ServiceAlarms:
+        """Who keeps an alarm, if there is one of that name."""
+        return self._units.get(id_.partition(":")[0], self._service)
 
 
 def _log(news: Iterable[AlarmNews]) -> None:

@@ -6,11 +6,15 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from acquisition.clock import Clock
+from core.alarms.chatter import SHOWN_NS
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.films.film_rules import FilmRules
 from service.alarms.engine import AlarmEngine
-from service.alarms.rules import rules_of
+from service.alarms.health import LookAtHealth
+from service.alarms.rules import chatter_rule_of, references_of, rules_of
+from service.alarms.service_alarms import ServiceAlarms
+from service.alarms.service_rules import service_rules_of
 from service.capture.captures import Captures
 from service.conversion import machine_of
 from service.films.rules import film_rules_of
@@ -18,7 +22,10 @@ from service.origin import Origin
 from service.recorder import Findings
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.store.port import Store
+from service.store.port import AlarmQuery, Store
+
+MAX_RECALLED = 10_000
+"""Most events that are looked at for chattering alarms after a restart."""
 
 
 async def alarm_engine(
@@ -29,6 +36,7 @@ async def alarm_engine(
     clock: Clock,
     captures: Captures | None = None,
     rows: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    look: LookAtHealth | None = None,
 ) -> AlarmEngine:
     """Put the engine together and let it go on where the service stopped.
 
@@ -38,6 +46,8 @@ async def alarm_engine(
         Keeps the samples around an alarm, if they are kept.
     rows
         Of units whose blocks do not have a row for each channel: which channel each row is about.
+    look
+        How the service itself does.
 
     Raises
     ------
@@ -45,11 +55,22 @@ async def alarm_engine(
         If the alarms that there were cannot be read: to start without them would lose them.
     """
     units = {
-        unit.id: UnitAlarms(machine_of(unit), _rules(plant, unit, origin), rows.get(unit.id))
+        unit.id: UnitAlarms(
+            machine_of(unit),
+            _rules(plant, unit, origin),
+            rows.get(unit.id),
+            references_of(unit),
+        )
         for unit in plant.unit
     }
-    engine = AlarmEngine(units, put, clock, captures.take if captures else None)
+    service = ServiceAlarms(units, service_rules_of(plant.alarms), look)
+    chatter = chatter_rule_of(plant.alarms)
+    listener = captures.take if captures else None
+    engine = AlarmEngine(units, put, clock, listener, service, chatter)
     engine.restore(await asyncio.to_thread(store.alarms))
+    lately = AlarmQuery(start_ns=max(0, clock.now_ns() - SHOWN_NS), limit=MAX_RECALLED)
+    events = await asyncio.to_thread(store.alarm_events, lately)
+    engine.recall(stored.event for stored in reversed(events))
     return engine
 
 

@@ -24,6 +24,9 @@ WRITE_EVERY_S = 0.5
 PATIENCE_S = 30.0
 """How much longer than its time a capture waits for samples that no longer come."""
 
+MAX_BUSY_S = 60.0
+"""Longest that the disk may take for what is handed to it at once."""
+
 MAX_PENDING_SAMPLES = 50_000_000
 """Of all channels and captures together that wait for the disk: 200 MB."""
 
@@ -100,6 +103,7 @@ class Captures:
         self._ended: list[Capture] = []
         self._news = asyncio.Event()
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="captures")
+        self._busy_since_s: float | None = None
         self.error: str | None = None
         self.n_written = 0
 
@@ -107,6 +111,14 @@ class Captures:
     def n_running(self) -> int:
         """Captures that are being made now."""
         return len(self._all)
+
+    @property
+    def trouble(self) -> str | None:
+        """Why samples are not kept now: an error, or a disk that does not answer."""
+        since_s = self._busy_since_s
+        if since_s is not None and self._clock.monotonic_s() - since_s > MAX_BUSY_S:
+            return "the disk does not answer"
+        return self.error
 
     @property
     def _all(self) -> list[Capture]:
@@ -229,7 +241,9 @@ class Captures:
         self.error = error
 
     async def _in_thread(self, do: Callable[..., None], *arguments: object) -> None:
+        self._busy_since_s = self._clock.monotonic_s()
         await asyncio.get_running_loop().run_in_executor(self._thread, do, *arguments)
+        self._busy_since_s = None
 
 
 def _drained(pending: deque[SampleBlock]) -> list[SampleBlock]:

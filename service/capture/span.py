@@ -12,6 +12,12 @@ WITHOUT_SAMPLES = (
     AlarmKind.CLOCK_DRIFT,
     AlarmKind.TIME_STAMPS,
     AlarmKind.LINK_LOST,
+    AlarmKind.SAMPLES_LOST,
+    AlarmKind.RESULTS_NOT_STORED,
+    AlarmKind.RESULTS_LOST,
+    AlarmKind.BLOCKS_WAITING,
+    AlarmKind.ANALYSIS_LATE,
+    AlarmKind.CAPTURES_NOT_KEPT,
 )
 """Kinds of alarms that no sample can explain."""
 

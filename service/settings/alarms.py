@@ -104,8 +104,8 @@ class AlarmSettings(Settings):
     """Share of the queue from acquisition to analysis that may be filled; at nine tenths it is a
     danger."""
 
-    max_samples_lost_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.01
-    """Share of a unit's samples that may get lost or be refused in ten minutes."""
+    max_samples_lost_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
+    """Share of a unit's samples that may get lost or be refused in ten minutes: half a minute."""
 
     max_shelf_h: Annotated[float, Field(gt=0.0, le=8760.0)] = 24.0
     """Longest time for which an alarm can be shelved at once, hours."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from service.bus import Bus
 from service.live import LinkState
@@ -137,7 +138,7 @@ async def test_a_bug_in_the_analysis_ends_the_run(plant: Any, scripted: Make, bl
 
 
 async def test_a_full_bus_makes_the_publisher_wait_and_drops_nothing(block: Make) -> None:
-    bus = Bus(3)
+    bus = Bus(3, SystemClock())
     taken: list[int] = []
 
     async def publish() -> None:

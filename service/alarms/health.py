@@ -1,0 +1,64 @@
+"""`ServiceHealth`: how the service itself does, as far as alarms look at it."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from core.account import SampleAccount
+from service.bus import Bus
+from service.capture.captures import Captures
+from service.live import LiveView
+from service.recorder import Recorder
+
+
+@dataclass(frozen=True)
+class ServiceHealth:
+    """How the service does at one moment.
+
+    Parameters
+    ----------
+    store_error
+        Why the store refused what was written last; None if it did not.
+    store_behind_s
+        For how long something has been waiting for the store without anything being written.
+    n_unstored
+        Findings given up since the start because the store did not take them.
+    waiting_share
+        How far the queue from acquisition to analysis is filled, 0 to 1.
+    analysis_delay_s
+        For how long the oldest block in it has waited.
+    captures_error
+        Why samples around alarms are not kept; None if they are.
+    accounts
+        Where samples went, by unit.
+    """
+
+    store_error: str | None = None
+    store_behind_s: float = 0.0
+    n_unstored: int = 0
+    waiting_share: float = 0.0
+    analysis_delay_s: float = 0.0
+    captures_error: str | None = None
+    accounts: Mapping[str, SampleAccount] = field(default_factory=dict)
+
+
+LookAtHealth = Callable[[], ServiceHealth]
+
+
+def health_of(
+    units: Iterable[str], live: LiveView, recorder: Recorder, captures: Captures, bus: Bus
+) -> LookAtHealth:
+    """A look at the parts of the running service."""
+    names = list(units)
+
+    def look() -> ServiceHealth:
+        return ServiceHealth(
+            store_error=live.store_error,
+            store_behind_s=recorder.behind_s,
+            n_unstored=live.n_unstored,
+            waiting_share=bus.depth / bus.capacity,
+            analysis_delay_s=bus.oldest_wait_s,
+            captures_error=captures.trouble,
+            accounts={unit: live.status(unit).account for unit in names},
+        )
+
+    return look

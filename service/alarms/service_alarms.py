@@ -1,0 +1,143 @@
+"""`ServiceAlarms`: alarms about the store and the service itself, and about what is no more."""
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from core.account import SampleAccount
+from core.alarms.alarm import WITHIN, Alarm, AlarmKind, AlarmLevel, Condition
+from core.alarms.board import AlarmBoard
+from core.alarms.event import AlarmNews
+from core.alarms.limits import judge
+from core.alarms.operation import Action
+from core.alarms.watch import LimitWatch
+from core.quality import Reading
+from core.units import NS_PER_S
+from service.alarms.health import LookAtHealth, ServiceHealth
+from service.alarms.service_rules import LOSS_MINUTES, ServiceRules, loss_key, service_watches
+
+LOSS_NS = 60 * LOSS_MINUTES * NS_PER_S
+LOOK_EVERY_NS = 10 * NS_PER_S
+
+
+class SampleLoss:
+    """Which share of a unit's samples got lost or was refused in the last ten minutes."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[int, int, int]] = deque()
+
+    def share(self, account: SampleAccount, now_ns: int) -> float:
+        """Take in the unit's account; ask once in a while."""
+        offered = account.n_offered
+        lost = account.n_gap + sum(account.rejected.values())
+        if self._seen and offered < self._seen[-1][1]:
+            self._seen.clear()  # the account begins anew
+        if not self._seen or now_ns - self._seen[-1][0] >= LOOK_EVERY_NS:
+            self._seen.append((now_ns, offered, lost))
+        while len(self._seen) > 1 and now_ns - self._seen[0][0] > LOSS_NS:
+            self._seen.popleft()
+        _, offered_then, lost_then = self._seen[0]
+        return (lost - lost_then) / max(offered - offered_then, 1)
+
+
+class ServiceAlarms:
+    """Owns the alarms that belong to no unit, and those of units that are there no more.
+
+    Parameters
+    ----------
+    units
+        Whose samples may get lost.
+    rules
+        Limits of the service.
+    look
+        How the service does now; None where nobody looks at that.
+    """
+
+    def __init__(
+        self,
+        units: Iterable[str] = (),
+        rules: ServiceRules | None = None,
+        look: LookAtHealth | None = None,
+    ) -> None:
+        self._look = look
+        names = list(units) if look else []
+        self._watches = service_watches(names, rules or ServiceRules()) if look else {}
+        self._board = AlarmBoard(self._watches.values())
+        self._losses = {unit: SampleLoss() for unit in names}
+        self._n_unstored = 0
+
+    @property
+    def alarms(self) -> Sequence[Alarm]:
+        """All of them, whatever their state."""
+        return self._board.alarms
+
+    def alarm(self, id_: str) -> Alarm:
+        """Look one up. Raises `KeyError` if there is no such alarm."""
+        return self._board.alarm(id_)
+
+    def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
+        """Do what somebody asks for.
+
+        Raises
+        ------
+        KeyError
+            If there is no such alarm.
+        ActionRefusedError
+            If it does not fit the alarm as it is now.
+        """
+        self._board.operate(id_, action, host_ns)
+        return self._board.told()
+
+    def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
+        """Go on where the service stopped."""
+        self._board.restore(alarms, host_ns)
+        return self._board.told()
+
+    def tick(self, host_ns: int) -> list[AlarmNews]:
+        """Look at the service once."""
+        if self._look is not None:
+            self._judge(self._look(), host_ns)
+        self._board.expire(host_ns)
+        return self._board.told()
+
+    def _judge(self, health: ServiceHealth, now_ns: int) -> None:
+        self._find(AlarmKind.RESULTS_NOT_STORED, self._store(health), now_ns)
+        self._find(AlarmKind.RESULTS_LOST, self._lost(health), now_ns)
+        for kind, value in (
+            (AlarmKind.BLOCKS_WAITING, health.waiting_share),
+            (AlarmKind.ANALYSIS_LATE, health.analysis_delay_s),
+        ):
+            self._find(kind, self._compared(kind, value), now_ns)
+        self._find(AlarmKind.CAPTURES_NOT_KEPT, _captures(health), now_ns)
+        for unit, account in health.accounts.items():
+            share = self._losses[unit].share(account, now_ns)
+            self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)
+
+    def _store(self, health: ServiceHealth) -> Condition:
+        found = self._compared(AlarmKind.RESULTS_NOT_STORED, health.store_behind_s)
+        if found.level is None:
+            return found
+        return replace(found, reason=health.store_error or "the store does not answer")
+
+    def _lost(self, health: ServiceHealth) -> Condition:
+        n_more = health.n_unstored - self._n_unstored
+        self._n_unstored = health.n_unstored
+        if n_more <= 0:
+            return WITHIN
+        return Condition(AlarmLevel.DANGER, value=float(health.n_unstored), reason="given_up")
+
+    def _compared(self, key: str, value: float) -> Condition:
+        watch = self._watches[key]
+        if not isinstance(watch, LimitWatch):
+            raise TypeError(f"{key} has no limits")
+        held = self._board.alarm(watch.id).condition.level
+        return judge(Reading(value), watch.limits.strictest, held)
+
+    def _find(self, key: str, condition: Condition, now_ns: int) -> None:
+        self._board.find(self._watches[key], condition, now_ns)
+
+
+def _captures(health: ServiceHealth) -> Condition:
+    if health.captures_error is None:
+        return WITHIN
+    return Condition(AlarmLevel.ALERT, reason=health.captures_error)
