@@ -15,6 +15,7 @@ from core.blocks import SampleBlock
 from service.capture.file import CaptureError, CaptureFile, MakeWriter
 from service.capture.folders import clear_leftovers, make_room
 from service.capture.history import BlockHistory
+from service.capture.outcome import Outcome, unheeded
 from service.capture.span import CaptureSettings, Span, is_captured
 
 log = structlog.get_logger()
@@ -97,15 +98,33 @@ class Captures:
         self._root, self._settings, self._clock = root, settings, clock
         self._make_writer, self._rate_hz = make_writer, rate_hz
         self._histories = {
-            unit: BlockHistory(round(settings.pre_s * rate)) for unit, rate in rate_hz.items()
+            unit: BlockHistory(round(settings.longest_pre_s * rate))
+            for unit, rate in rate_hz.items()
         }
         self._running: dict[str, Capture] = {}
         self._ended: list[Capture] = []
         self._news = asyncio.Event()
+        self._ready: Callable[[Outcome], None] = unheeded
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="captures")
         self._busy_since_s: float | None = None
         self.error: str | None = None
         self.n_written = 0
+
+    def tell(self, ready: Callable[[Outcome], None]) -> None:
+        """Tell somebody, on the event loop, what becomes of each capture."""
+        self._ready = ready
+
+    def expects(self, event: AlarmEvent) -> bool:
+        """Whether samples are kept around an event."""
+        return is_captured(event) and event.identity.unit in self._histories
+
+    def is_made_for(self, alarm: str, occurrence: int) -> bool:
+        """Whether samples around an occurrence of an alarm are being written now."""
+        return any(
+            (event.identity.id, event.occurrence) == (alarm, occurrence)
+            for capture in self._all
+            for event in capture.alarms
+        )
 
     @property
     def n_running(self) -> int:
@@ -167,7 +186,7 @@ class Captures:
         first = events[0]
         capture = Capture(
             file=CaptureFile(self._root, first, self._make_writer[unit]),
-            span=Span.around(first.time_ns, self._rate_hz[unit], self._settings),
+            span=self._span_around(unit, events),
             alarms=[],
             deadline_s=0.0,
         )
@@ -177,6 +196,11 @@ class Captures:
                 capture.add(block)
         self._running[unit] = capture
         return capture
+
+    def _span_around(self, unit: str, events: Sequence[AlarmEvent]) -> Span:
+        """The span that begins first."""
+        spans = (Span.around(event, self._rate_hz[unit], self._settings) for event in events)
+        return min(spans, key=lambda span: span.start_ns)
 
     def _prolong(self, capture: Capture, events: Sequence[AlarmEvent]) -> None:
         for event in events:
@@ -206,9 +230,12 @@ class Captures:
         """Hand everything to the thread; what is over is finished there."""
         for capture in self._all:
             is_last = any(capture is ended for ended in self._ended)
+            was_closed = capture.file.is_closed
             await self._in_thread(self._put, capture, is_last)
             if is_last:
                 self._ended = [each for each in self._ended if each is not capture]
+            if not was_closed and (is_last or capture.file.is_closed):
+                self._ready(Outcome(tuple(capture.alarms), capture.file.finished, self.error))
         self._running = {u: c for u, c in self._running.items() if not c.file.is_closed}
 
     def _put(self, capture: Capture, is_last: bool) -> None:

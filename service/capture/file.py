@@ -24,12 +24,19 @@ class CaptureError(Exception):
 
 
 class CaptureFile:
-    """A recording with the alarms it was made for; complete with its name, or not there at all."""
+    """A recording with the alarms it was made for; complete with its name, or not there at all.
+
+    Attributes
+    ----------
+    finished
+        Where it is, once it is complete.
+    """
 
     def __init__(self, root: Path, event: AlarmEvent, make_writer: MakeWriter) -> None:
         self._root, self._event, self._make_writer = root, event, make_writer
         self._writer: RecordingWriter | None = None
         self.folder: Path | None = None
+        self.finished: Path | None = None
         self.is_closed = False
 
     def write(self, blocks: Sequence[SampleBlock]) -> None:
@@ -65,7 +72,7 @@ class CaptureFile:
             writer.finish()
         except (OSError, ConfigError) as error:
             raise self.given_up(str(error)) from error
-        self.is_closed = True
+        self.is_closed, self.finished = True, folder
 
     def _open(self) -> RecordingWriter:
         self._root.mkdir(parents=True, exist_ok=True)

@@ -21,6 +21,9 @@ WITHOUT_SAMPLES = (
 )
 """Kinds of alarms that no sample can explain."""
 
+FILMS = (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
+"""Kinds of alarms that stand on all samples of an averaging window."""
+
 
 @dataclass(frozen=True)
 class CaptureSettings:
@@ -34,12 +37,24 @@ class CaptureSettings:
         Longest capture.
     max_bytes
         Space of all of them together.
+    window_s
+        Length of an averaging window: as much is kept before an alarm of a film.
     """
 
     pre_s: float = 60.0
     post_s: float = 120.0
     max_s: float = 600.0
     max_bytes: int = 10_000_000_000
+    window_s: float = 0.0
+
+    @property
+    def longest_pre_s(self) -> float:
+        """How much before an alarm is kept at most, so that what follows it fits in too."""
+        return max(self.pre_s, min(self.window_s, self.max_s - self.post_s))
+
+    def pre_of(self, kind: AlarmKind) -> float:
+        """How much is kept before an alarm of a kind."""
+        return self.longest_pre_s if kind in FILMS else self.pre_s
 
 
 def is_captured(event: AlarmEvent) -> bool:
@@ -70,9 +85,10 @@ class Span:
     n_samples: int = 0
 
     @classmethod
-    def around(cls, time_ns: int, rate_hz: float, settings: CaptureSettings) -> "Span":
+    def around(cls, event: AlarmEvent, rate_hz: float, settings: CaptureSettings) -> "Span":
         """The span around an alarm."""
-        start_ns = time_ns - ns_from_s(settings.pre_s)
+        time_ns = event.time_ns
+        start_ns = time_ns - ns_from_s(settings.pre_of(event.identity.kind))
         last_end_ns = start_ns + ns_from_s(settings.max_s)
         end_ns = time_ns + ns_from_s(settings.post_s)
         return cls(start_ns, end_ns, last_end_ns, round(settings.max_s * rate_hz))

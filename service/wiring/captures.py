@@ -8,6 +8,8 @@ from acquisition.recording.writer import RecordingWriter
 from service.capture.captures import Captures
 from service.capture.file import MakeWriter
 from service.capture.span import CaptureSettings
+from service.conversion import analysis_of
+from service.films.rules import film_rules_of
 from service.origin import Origin
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
@@ -31,6 +33,7 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
         post_s=found.post_s,
         max_s=found.max_s,
         max_bytes=round(found.max_gb * BYTES_PER_GB),
+        window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
     )
     return Captures(
         Path(plant.service.data_folder) / CAPTURES,
@@ -39,6 +42,15 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
         {unit.id: unit.rate_hz for unit in units},
         clock,
     )
+
+
+def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
+    """How long the samples are that a film's stiffness stands on; none where none is watched."""
+    if isinstance(film_rules_of(unit, plant.films), str):
+        return 0.0
+    analysis = analysis_of(plant.analysis)
+    n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
+    return n_samples / unit.sampling_hz
 
 
 def _writer_of(unit: UnitSettings) -> MakeWriter:

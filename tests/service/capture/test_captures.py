@@ -22,6 +22,7 @@ from core.machine import Measurand
 from core.quality import GOOD, Reason, bad
 from service.capture import captures as module
 from service.capture.captures import Captures
+from service.capture.outcome import Outcome
 from service.capture.span import CaptureSettings
 
 RATE_HZ = 50.0
@@ -406,3 +407,35 @@ async def test_two_alarms_at_the_same_time_do_not_meet_in_one_folder(root: Path)
 
     names = sorted(path.name for path in root.iterdir())
     assert names == [names[0], f"{names[0]}-2"]
+
+
+async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root: Path) -> None:
+    settings = CaptureSettings(pre_s=3.0, post_s=2.0, max_s=12.0, window_s=8.0)
+    async with running(root, settings) as rig:
+        rig.send(0, 100, {49: raised(10.0, AlarmKind.STIFFNESS_X)})
+        [recording] = await rig.written(1)
+
+    assert samples(recording) == numbers(10, 60)
+
+
+async def test_what_becomes_of_a_capture_is_told_once(root: Path) -> None:
+    async with running(root) as rig:
+        told: list[Outcome] = []
+        rig.captures.tell(told.append)
+        rig.send(0, 100, {49: raised(10.0)})
+        [recording] = await rig.written(1)
+
+    assert [(outcome.folder, outcome.reason) for outcome in told] == [(recording.folder, None)]
+    assert [event.occurrence for event in told[0].alarms] == [1]
+
+
+async def test_a_capture_that_cannot_be_written_is_told_with_its_reason(root: Path) -> None:
+    async with running(root) as rig:
+        told: list[Outcome] = []
+        rig.captures.tell(told.append)
+        rig.refuse = OSError(28, "No space left on device")
+        rig.send(0, 60, {49: raised(10.0)})
+        await rig.until(lambda: bool(told))
+
+    assert told[0].folder is None
+    assert "No space left on device" in str(told[0].reason)
