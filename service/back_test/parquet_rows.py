@@ -14,6 +14,8 @@ MAGIC = b"PAR1"
 MAX_FOOTER_BYTES = 64_000_000
 _TAIL_BYTES = 8
 _ROWS = 65_536
+_BUFFER_BYTES = 1_000_000
+"""Of each column; without it all of a row group would be held at once."""
 
 
 def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
@@ -45,7 +47,7 @@ def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
 
 
 def _batches(stream: BinaryIO, size: int) -> Iterator[tuple[Any, int]]:
-    with pq.ParquetFile(stream) as file:
+    with pq.ParquetFile(stream, buffer_size=_BUFFER_BYTES) as file:
         headings = list(file.schema_arrow.names)
         check_headings(headings)
         n_rows = file.metadata.num_rows

@@ -100,9 +100,15 @@ def _gathered(
 def _last_words(process: "subprocess.Popen[bytes]", log: IO[bytes]) -> str:
     code = process.wait()
     log.seek(0)
-    said = log.read(2000).decode(errors="replace")
+    said = _printable(log.read(2000).decode(errors="replace"))
     if code == WRONG_FILE:
-        return said
+        return " ".join(said)
     if code < 0:
         return f"not readable: the reading process ended by {signal.Signals(-code).name}"
-    return f"not readable: {(said.strip().splitlines() or ['no reason given'])[-1][:200]}"
+    return f"not readable: {said[-1][:200] if said else 'no reason given'}"
+
+
+def _printable(text: str) -> list[str]:
+    """Lines as a terminal may have them: names in a file may be anything."""
+    lines = text.strip().splitlines()
+    return ["".join(c if c.isprintable() else "?" for c in line) for line in lines]
