@@ -5,9 +5,11 @@ from importlib.metadata import version
 from fastapi import Depends, FastAPI
 
 from service.api.alarm_routes import alarm_router, operation_router
+from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
 from service.api.delivery_routes import delivery_router
+from service.api.film_routes import film_router
 from service.api.health_routes import health_router
 from service.api.origin_header import OriginHeader
 from service.api.plant_routes import plant_router
@@ -46,6 +48,9 @@ def create_app(context: Context) -> FastAPI:
         gap_router(context),
         bearing_router(context),
         reference_router(context),
+        film_router(context),
+        baseline_router(context),
+        baseline_action_router(context),
         alarm_router(context),
         operation_router(context),
         delivery_router(context),

@@ -55,7 +55,7 @@ class FilmKeeper:
         store: FilmStore,
         clock: Clock,
     ) -> None:
-        self._store, self._clock, self._settings = store, clock, settings
+        self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
         self._acting = asyncio.Lock()  # what is done next stands on what was done before
         self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
@@ -122,7 +122,7 @@ class FilmKeeper:
 
     async def run(self) -> None:
         """Learn whatever is due, for ever."""
-        period_s = min(3600.0, 86_400.0 * self._settings.learn_every_days / 4)
+        period_s = min(3600.0, 86_400.0 * self.settings.learn_every_days / 4)
         while True:
             try:
                 await self.learn_due()
