@@ -68,6 +68,8 @@ async def alarm_engine(
     listener = captures.take if captures else None
     engine = AlarmEngine(units, put, clock, listener, service, chatter)
     engine.restore(await asyncio.to_thread(store.alarms))
+    for found in await asyncio.to_thread(store.order1_references.in_force):
+        engine.refer_to(found.reference)
     lately = AlarmQuery(start_ns=max(0, clock.now_ns() - SHOWN_NS), limit=MAX_RECALLED)
     events = await asyncio.to_thread(store.alarm_events, lately)
     engine.recall(stored.event for stored in reversed(events))

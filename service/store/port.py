@@ -15,6 +15,7 @@ from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.outbox_port import Outbox
 from service.store.value_range import ValueRange
+from service.store.vector_reference_port import VectorReferenceStore
 
 
 class StoreError(Exception):
@@ -133,6 +134,11 @@ class Store(Protocol):
     @property
     def films(self) -> FilmStore:
         """Readings and baselines of films."""
+        ...
+
+    @property
+    def order1_references(self) -> VectorReferenceStore:
+        """Where 1× vectors were when all was well."""
         ...
 
     def append(

@@ -6,6 +6,7 @@ from service.origin import Origin
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.port import StoreError
+from service.store.vector_references import VECTOR_REFERENCE_TABLES
 
 APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
 """Mark the file as padwatch's, and as what it is (``PRAGMA application_id``)."""
@@ -127,6 +128,7 @@ MIGRATIONS = (
     """,
     OUTBOX_TABLES,
     FILM_TABLES,
+    VECTOR_REFERENCE_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -34,6 +34,7 @@ from service.store.port import (
 from service.store.references import insert_reference, select_history, select_in_force
 from service.store.schema import migrate
 from service.store.trends import select_readings, storable
+from service.store.vector_references import SqliteVectorReferences
 
 BUSY_TIMEOUT_S = 5.0
 
@@ -68,6 +69,7 @@ class SqliteStore:
         self._lock = Lock()
         self.outbox = SqliteOutbox(self._writing, self._reader)
         self.films = SqliteFilms(self._writing, self._reader, self._series_id)
+        self.order1_references = SqliteVectorReferences(self._writing, self._reader)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
