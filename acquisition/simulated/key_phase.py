@@ -36,7 +36,10 @@ class KeyPhasePulses:
             return
         step = (turns[-1] - turns[0]) / (turns.size - 1)
         passed = np.fmod(turns, 1.0) + self._pulse.mark_turns
-        filled = (self._so_far(passed + step / 2) - self._so_far(passed - step / 2)) / step
+        if step > 0.0:
+            filled = (self._so_far(passed + step / 2) - self._so_far(passed - step / 2)) / step
+        else:  # standing still, under the mark or not
+            filled = (np.fmod(passed, 1.0) < self._pulse.width_turns).astype(np.float64)
         for row, direction in self._directions.items():
             readings[row] += self._pulse.rest_v + direction * self._pulse.height_v * filled
 

@@ -4,7 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from service.settings.base import Settings, refuse_twice
+from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.simulated_life import SimulatedLifeSettings
 
 
 class SimulatedBearingSettings(Settings):
@@ -38,16 +39,29 @@ class SimulatedBearingSettings(Settings):
     """Slow wander of the oil temperature, K rms."""
 
 
-class SimulationSettings(Settings):
-    """A unit on the paper's ten-degree-of-freedom model."""
+OF_A_LIFE = ("held_load", "damage")
+"""Keys that mean nothing without `life_seed`."""
+
+FIXED = (
+    *("speed_rpm", "power_mw", "power_wander_mw_rms", "unbalance_grade_mm_s", "bearing"),
+    *("hydraulic_force_n_rms", "hydraulic_cutoff_hz", "rope_force_n", "rope_order"),
+)
+"""Keys that a life decides on."""
+
+NEEDED = ("speed_rpm", "power_mw", "bearing")
+"""Keys that are needed without one."""
+
+
+class SimulationSettings(SimulatedLifeSettings):
+    """A unit on the paper's ten-degree-of-freedom model, with fixed films or with a life."""
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     """The same seed gives the same samples to the last bit."""
 
-    speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
+    speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)] | None = None
     """Running speed, r/min."""
 
-    power_mw: Annotated[float, Field(ge=-2000.0, le=2000.0)]
+    power_mw: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
     """Active power, MW."""
 
     power_wander_mw_rms: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
@@ -83,10 +97,17 @@ class SimulationSettings(Settings):
     n_slots: Annotated[int, Field(ge=2, le=4096)] = 64
     """Slots of the simulated DAQ's ring; with 12 channels, 64 slots of 50 samples fit."""
 
-    bearing: Annotated[tuple[SimulatedBearingSettings, ...], Field(min_length=3, max_length=3)]
+    bearing: Annotated[tuple[SimulatedBearingSettings, ...], Field(min_length=3, max_length=3)] = ()
     """The three bearings UJB, LJB and TJB."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        for key in FIXED if self.life_seed is not None else OF_A_LIFE:
+            if key in self.model_fields_set:
+                why = "follows from life_seed" if self.life_seed is not None else "needs life_seed"
+                raise MisfitError(why, key)
+        for key in NEEDED if self.life_seed is None else ():
+            if key not in self.model_fields_set:
+                raise MisfitError("is needed, or life_seed instead", key)
         refuse_twice(("bearing", n, "bearing", b.bearing) for n, b in enumerate(self.bearing))
         return self

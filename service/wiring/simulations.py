@@ -14,6 +14,7 @@ from core.film import Film
 from service.conversion import calibration_of, machine_of
 from service.settings.simulation import SimulatedBearingSettings, SimulationSettings
 from service.settings.units import UnitSettings
+from service.wiring.simulated_lives import course_of_life
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> RawFeed:
@@ -23,15 +24,26 @@ def simulated_feed(unit: UnitSettings, clock: Clock) -> RawFeed:
     ------
     LookupError
         If the unit has none.
+    ConfigError
+        If the unit cannot have the life that it is to live.
     """
-    simulation = simulation_of(unit)
-    scenario = scenario_of(simulation)
+    simulation, now_ns = simulation_of(unit), clock.now_ns()
+    lives = simulation.life_seed is not None
+    scenario = course_of_life(unit, simulation, now_ns) if lives else scenario_of(simulation)
     machine, calibration = machine_of(unit), calibration_of(unit)
-    return SimulatedUnit(machine, calibration, scenario, simulation.seed, clock.now_ns())
+    return SimulatedUnit(machine, calibration, scenario, simulation.seed, now_ns)
 
 
 def scenario_of(simulation: SimulationSettings) -> Scenario:
-    """What a simulated unit goes through."""
+    """What a simulated unit with fixed films goes through.
+
+    Raises
+    ------
+    LookupError
+        If it has a life instead.
+    """
+    if simulation.speed_rpm is None or simulation.power_mw is None:
+        raise LookupError("a simulated unit with a life has no fixed scenario")
     return Scenario(
         bearings={bearing.bearing: _bearing_scenario(bearing) for bearing in simulation.bearing},
         speed_rpm=simulation.speed_rpm,

@@ -69,6 +69,7 @@ def film_course(
     speed_rpm: FloatArray,
     centre_um: FloatArray,
     altered: Alteration | None = None,
+    worn: int = 0,
 ) -> FilmCourse:
     """Stiffness of a film where the shaft is put.
 
@@ -77,18 +78,27 @@ def film_course(
     speed_rpm : (n,)
     centre_um : (2, n)
         Where the shaft runs if nothing is altered; it follows pads that wear.
+    worn
+        The pad whose pivot wears.
     """
     pads_um = _pad_clearance_um(bearing, setting, thermal)
     viscosity_pa_s = bearing.oil.viscosity_pa_s(thermal.oil_temperature_c)
     factor: FloatArray | float = 1.0
     if altered is not None:
         pads_um, centre_um = pads_um * altered.clearance, centre_um * altered.clearance
-        pads_um[_nearest_pad(bearing, centre_um)] += altered.pivot_share * bearing.told_clearance_um
+        pads_um[worn] += altered.pivot_share * bearing.told_clearance_um
         viscosity_pa_s = viscosity_pa_s * altered.viscosity
         factor = altered.stiffness
     film = bearing.ring.film(pads_um, centre_um, viscosity_pa_s, speed_rpm)
     scaled = (factor * k for k in (film.k_xx_n_per_m, film.k_xy_n_per_m, film.k_yy_n_per_m))
     return FilmCourse(FilmColumns(*scaled), np.mean(pads_um, axis=0), centre_um)
+
+
+def mean_clearance_um(
+    bearing: LifeBearing, setting: PadSetting, thermal: ThermalCourse
+) -> FloatArray:
+    """Mean over the pads, undamaged, (n,)."""
+    return np.asarray(np.mean(_pad_clearance_um(bearing, setting, thermal), axis=0))
 
 
 def _pad_clearance_um(
@@ -100,7 +110,7 @@ def _pad_clearance_um(
     return cold_um - thermal.closing_um + ovality[:, np.newaxis] * thermal.opening_um
 
 
-def _nearest_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
+def worn_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
     """The pad that the shaft leans on most of the time, and wears."""
     x_um, y_um = np.median(centre_um, axis=1)
     angles = bearing.ring.pad_angles_rad

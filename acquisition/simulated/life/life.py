@@ -1,34 +1,25 @@
 """`live`: a unit's guide bearings over years, as readings with the truth beside them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from acquisition.simulated.life.columns import rows_of
 from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.damage import Alteration, Damage, alteration
-from acquisition.simulated.life.excitation import draw_grade_mm_s
-from acquisition.simulated.life.films import FilmCourse, PadSetting, draw_setting, film_course
+from acquisition.simulated.life.films import FilmCourse, film_course
+from acquisition.simulated.life.held_load import HeldLoad
+from acquisition.simulated.life.inputs import BearingInputs, LifeInputs, draw_inputs
 from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
 from acquisition.simulated.life.life_truth import BearingLifeTruth, UnitLife
-from acquisition.simulated.life.measured import Chain, draw_chain
-from acquisition.simulated.life.operation import Operation, time_grid_ns
-from acquisition.simulated.life.order1 import order1_um_pk
+from acquisition.simulated.life.measured import Chain
+from acquisition.simulated.life.operation import Operation
+from acquisition.simulated.life.order1 import order1_um_pk, rotor_of
 from acquisition.simulated.life.readings import ln_stiffness, readings
-from acquisition.simulated.life.schedule import draw_operation
-from acquisition.simulated.life.shaft_position import draw_positions_um
-from acquisition.simulated.life.thermal import (
-    ThermalCourse,
-    draw_closing_share,
-    draw_water_c,
-    thermal_course,
-)
+from acquisition.simulated.life.thermal import ThermalCourse
 from core.arrays import ComplexArray, FloatArray
-from core.rotor_parameters import RotorParameters
-
-RATED_SPEEDS_RPM = (92.3, 90.9)
-"""Of the units for 60 Hz and for 50 Hz (Brito et al., section 1): even and odd seeds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +41,7 @@ def live(
     damage: Iterable[Damage] = (),
     changes: Iterable[ConditionChange] = (),
     bearings: tuple[LifeBearing, ...] = LIFE_BEARINGS,
+    held: HeldLoad | None = None,
 ) -> UnitLife:
     """Let one unit live, with a reading every 10 minutes while it turns.
 
@@ -59,100 +51,79 @@ def live(
     ----------
     start_ns
         Midnight where the plant is.
+    held
+        By default the unit starts and stops as it will.
 
     Raises
     ------
     ValueError
         If years are too few or damage names an unknown bearing.
     """
-    damage, changes = tuple(damage), tuple(changes)
-    _check(damage, bearings)
-    random = _Streams(unit_seed, len(bearings))
-    time_ns = time_grid_ns(start_ns, years)
-    operation = draw_operation(random.operation, time_ns, RATED_SPEEDS_RPM[unit_seed % 2])
-    water_c = draw_water_c(random.water, operation)
-    positions_um = draw_positions_um(random.position, operation, bearings, changes)
-    grade_mm_s = draw_grade_mm_s(random.unbalance, operation)
-    turns = operation.is_turning
-    if not turns.any():
-        raise ValueError(f"unit {unit_seed} never turns in {years} years")
-    oil_offset_c = _oil_offset_c(operation, changes)
-    turning = rows_of(operation, turns)
-    lives = [
-        _bearing_life(
-            bearing,
-            draw_setting(setting, bearing),
-            rows_of(_thermal(setting, bearing, operation, water_c, oil_offset_c), turns),
-            rows_of(draw_chain(chain, operation), turns),
-            positions_um[bearing.id][:, turns],
-            turning,
-            damage,
-        )
-        for bearing, setting, chain in zip(bearings, random.settings, random.chains, strict=True)
-    ]
-    order1 = _order1(lives, turning, grade_mm_s[turns])
-    truth = {life.bearing.id: _truth(life, order1[life.bearing.id]) for life in lives}
-    measured = {
-        life.bearing.id: readings(noise, life.bearing, truth[life.bearing.id], life.chain, turning)
-        for life, noise in zip(lives, random.noises, strict=True)
-    }
-    return UnitLife(
-        unit_seed, turning, grade_mm_s[turns], water_c[turns], measured, truth, damage, changes
-    )
+    damage = tuple(damage)
+    refuse_strange(damage, bearings)
+    inputs = draw_inputs(unit_seed, start_ns, years, tuple(changes), bearings, held)
+    return life_of(inputs, damage, inputs.operation.is_turning)
 
 
-class _Streams:
-    """Independent randomness for every subject, so that none shifts another."""
+def refuse_strange(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
+    """Refuse damage of bearings that are not there.
 
-    def __init__(self, unit_seed: int, n_bearings: int) -> None:
-        plant, *own = np.random.SeedSequence(unit_seed).spawn(1 + 3 * n_bearings)
-        self.operation, self.water, self.position, self.unbalance = (
-            np.random.default_rng(seed) for seed in plant.spawn(4)
-        )
-        generators = [np.random.default_rng(seed) for seed in own]
-        self.settings, self.chains, self.noises = (generators[i::3] for i in range(3))
-
-
-def _check(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
+    Raises
+    ------
+    ValueError
+        With the name.
+    """
     known = {bearing.id for bearing in bearings}
     for one in damage:
         if one.bearing not in known:
             raise ValueError(f"bearing {one.bearing!r} is none of {', '.join(sorted(known))}")
 
 
-def _oil_offset_c(operation: Operation, changes: tuple[ConditionChange, ...]) -> FloatArray:
-    offset_c = np.zeros(len(operation))
-    for change in changes:
-        offset_c += change.oil_offset_c * change.holds(operation.time_ns)
-    return offset_c
+def life_of(
+    inputs: LifeInputs, damage: tuple[Damage, ...], turns: npt.NDArray[np.bool_]
+) -> UnitLife:
+    """What becomes of a life, and how it reads.
 
-
-def _thermal(
-    random: np.random.Generator,
-    bearing: LifeBearing,
-    operation: Operation,
-    water_c: FloatArray,
-    oil_offset_c: FloatArray,
-) -> ThermalCourse:
-    closing_share = draw_closing_share(random, operation)
-    return thermal_course(bearing, operation, water_c, closing_share, oil_offset_c)
+    Parameters
+    ----------
+    turns : (n,)
+        Rows that are wanted; the shaft turns in all of them.
+    """
+    turning, grade_mm_s = rows_of(inputs.operation, turns), inputs.grade_mm_s[turns]
+    lives = [_bearing_life(one, turns, turning, damage) for one in inputs.bearings]
+    order1 = _order1(lives, turning, grade_mm_s)
+    truth = {life.bearing.id: _truth(life, order1[life.bearing.id]) for life in lives}
+    measured = {
+        life.bearing.id: readings(
+            np.random.default_rng(seed), life.bearing, truth[life.bearing.id], life.chain, turning
+        )
+        for life, seed in zip(lives, inputs.noise, strict=True)
+    }
+    return UnitLife(
+        inputs.unit_seed,
+        turning,
+        grade_mm_s,
+        inputs.water_c[turns],
+        measured,
+        truth,
+        damage,
+        inputs.changes,
+    )
 
 
 def _bearing_life(
-    bearing: LifeBearing,
-    setting: PadSetting,
-    thermal: ThermalCourse,
-    chain: Chain,
-    position_um: FloatArray,
-    operation: Operation,
+    inputs: BearingInputs,
+    turns: npt.NDArray[np.bool_],
+    turning: Operation,
     damage: tuple[Damage, ...],
 ) -> _BearingLife:
-    speed_rpm = operation.speed_rpm
-    altered = alteration(damage, bearing.id, operation.time_ns)
-    healthy = film_course(bearing, setting, thermal, speed_rpm, position_um)
-    course = healthy
+    bearing, position_um = inputs.bearing, inputs.position_um[:, turns]
+    thermal, chain = rows_of(inputs.thermal, turns), rows_of(inputs.chain, turns)
+    altered = alteration(damage, bearing.id, turning.time_ns)
+    place = bearing, inputs.setting, thermal, turning.speed_rpm, position_um
+    course = healthy = film_course(*place)
     if any(one.bearing == bearing.id for one in damage):
-        course = film_course(bearing, setting, thermal, speed_rpm, position_um, altered)
+        course = film_course(*place, altered, inputs.worn_pad)
     return _BearingLife(bearing, course, healthy, thermal, altered, chain)
 
 
@@ -164,15 +135,8 @@ def _order1(
         {life.bearing.id: life.altered.bracket for life in lives},
         operation.rated_speed_rpm,
         grade_mm_s,
-        _rotor(lives),
+        rotor_of(tuple(life.bearing.id for life in lives)),
     )
-
-
-def _rotor(lives: list[_BearingLife]) -> RotorParameters:
-    """The paper's rotor on the brackets that the unit has."""
-    rotor = RotorParameters()
-    ids = [life.bearing.id for life in lives]
-    return replace(rotor, brackets=tuple(b for b in rotor.brackets if b.bearing in ids))
 
 
 def _truth(life: _BearingLife, order1: ComplexArray) -> BearingLifeTruth:

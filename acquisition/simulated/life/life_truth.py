@@ -16,19 +16,16 @@ from core.tilting_pad import FilmColumns
 
 
 @dataclass(frozen=True, eq=False)
-class BearingLifeTruth:
-    """One bearing; rows are those of its readings.
+class BearingMoments:
+    """All of one bearing that samples depend on, row by row.
 
     Parameters
     ----------
-    ln_k, ln_k_healthy : (2, n)
-        Of the film as it is, and as it would be without damage.
     clearance_um : (n,)
         Mean over the pads.
     centre_um : (2, n)
         Shaft centre from bearing centre.
-    order1_um_pk : (4, n)
-        Phasors of u_x, u_y, x_b, y_b at 1×.
+    oil_temperature_c : (n,)
     altered
         What damage has done to film, bracket and transducers.
     chain
@@ -36,14 +33,28 @@ class BearingLifeTruth:
     """
 
     film: FilmColumns
-    ln_k: FloatArray
-    ln_k_healthy: FloatArray
     clearance_um: FloatArray
     centre_um: FloatArray
     oil_temperature_c: FloatArray
-    order1_um_pk: ComplexArray
     altered: Alteration
     chain: Chain
+
+
+@dataclass(frozen=True, eq=False)
+class BearingLifeTruth(BearingMoments):
+    """One bearing; rows are those of its readings.
+
+    Parameters
+    ----------
+    ln_k, ln_k_healthy : (2, n)
+        Of the film as it is, and as it would be without damage.
+    order1_um_pk : (4, n)
+        Phasors of u_x, u_y, x_b, y_b at 1×.
+    """
+
+    ln_k: FloatArray
+    ln_k_healthy: FloatArray
+    order1_um_pk: ComplexArray
 
     @property
     def eccentricity_ratio(self) -> FloatArray:

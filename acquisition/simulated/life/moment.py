@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquisition.simulated.life.excitation import VORTEX_FORCE_N, has_vortex, hydraulic_force_n
-from acquisition.simulated.life.life_truth import BearingLifeTruth, UnitLife
+from acquisition.simulated.life.life_truth import BearingMoments, UnitLife
+from acquisition.simulated.life.order1 import rotor_of
 from acquisition.simulated.scenario import (
     BearingScenario,
     ChannelScenario,
@@ -45,14 +46,11 @@ def scenario_at(
     KeyError
         If the machine has a bearing that the life has not.
     """
-    row = row_at(life, time_ns)
+    row, grow = row_at(life, time_ns), growing(machine)
     operation = life.operation
     load = float(operation.load[row])
     return Scenario(
-        bearings={
-            bearing.id: bearing_at(life.truth[bearing.id], row, bearing)
-            for bearing in machine.bearings
-        },
+        bearings={id_: bearing_at(truth, row, id_ in grow) for id_, truth in life.truth.items()},
         speed_rpm=float(operation.speed_rpm[row]),
         active_power_mw=float(operation.power_mw[row]),
         unbalance_grade_mm_s=float(life.grade_mm_s[row]),
@@ -64,7 +62,13 @@ def scenario_at(
             for bearing in machine.bearings
             for channel, one in channels_at(life.truth[bearing.id], row, bearing)
         },
+        rotor=rotor_of(tuple(life.truth)),
     )
+
+
+def growing(machine: Unit) -> frozenset[str]:
+    """Bearings with four probes, which can tell growth from a displacement."""
+    return frozenset(b.id for b in machine.bearings if b.opposite_reference_um is not None)
 
 
 def row_at(life: UnitLife, time_ns: int) -> int:
@@ -94,17 +98,18 @@ def vortex_rope(load: float) -> VortexRope:
 
 
 def bearing_at(
-    truth: BearingLifeTruth, row: int, bearing: Bearing, usual_clearance_um: float | None = None
+    truth: BearingMoments, row: int, grows: bool, usual_clearance_um: float | None = None
 ) -> BearingScenario:
     """One bearing in one row.
 
     Parameters
     ----------
+    grows
+        Whether gaps show how the shaft grows.
     usual_clearance_um
         At which the gaps have their reference; by default the median over all rows.
     """
     usual_um = usual_clearance_um or float(np.median(truth.clearance_um))
-    has_four = bearing.opposite_reference_um is not None
     x_um, y_um = (float(x) for x in truth.centre_um[:, row])
     error_x_um, error_y_um = _position_error_um(truth, row).tolist()
     return BearingScenario(
@@ -112,7 +117,7 @@ def bearing_at(
         centre_x_um=x_um,
         centre_y_um=y_um,
         oil_temperature_c=float(truth.oil_temperature_c[row]),
-        gap_growth_um=float(truth.clearance_um[row]) - usual_um if has_four else 0.0,
+        gap_growth_um=float(truth.clearance_um[row]) - usual_um if grows else 0.0,
         bracket_stiffness_factor=float(truth.altered.bracket[row]),
         position_error_um=(error_x_um, error_y_um),
         oil_temperature_error_c=float(truth.chain.oil_error_c[row]),
@@ -120,7 +125,7 @@ def bearing_at(
 
 
 def channels_at(
-    truth: BearingLifeTruth, row: int, bearing: Bearing
+    truth: BearingMoments, row: int, bearing: Bearing
 ) -> Iterator[tuple[str, ChannelScenario]]:
     """What the transducers of a bearing are like in one row, by channel."""
     probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
@@ -133,11 +138,11 @@ def channels_at(
         yield bearing.channels[2 + axis], ChannelScenario(gain=float(accelerometer_gain[axis]))
 
 
-def _probe_gain(truth: BearingLifeTruth, row: int) -> FloatArray:
+def _probe_gain(truth: BearingMoments, row: int) -> FloatArray:
     return np.asarray(truth.chain.probe_gain * truth.altered.probe_gain[:, row])
 
 
-def _accelerometer_gain(truth: BearingLifeTruth, row: int) -> FloatArray:
+def _accelerometer_gain(truth: BearingMoments, row: int) -> FloatArray:
     """(2,) with all that makes stiffness stray alike over hours and days."""
     strays = np.exp(truth.chain.ln_k_error[:, row])
     return np.asarray(
@@ -145,7 +150,7 @@ def _accelerometer_gain(truth: BearingLifeTruth, row: int) -> FloatArray:
     )
 
 
-def _position_error_um(truth: BearingLifeTruth, row: int) -> FloatArray:
+def _position_error_um(truth: BearingMoments, row: int) -> FloatArray:
     """(2,) by which gaps err before the probe's gain, for readings to err as the life says.
 
     Mean gaps have a gain of their own there, that of four probes together.

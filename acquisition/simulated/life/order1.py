@@ -1,6 +1,7 @@
 """Amplitudes at 1× of a unit whose films change: the paper's rotor, row by row and all at once."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -62,6 +63,12 @@ def order1_um_pk(
     force[:, 0, 0], force[:, 1, 0] = unit_force_n * grade_mm_s, -1j * unit_force_n * grade_mm_s
     shaft = np.linalg.solve(dynamic, force)
     return {name: _split(share, motion @ shaft) for name, (share, motion) in shares.items()}
+
+
+def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
+    """The paper's rotor on the brackets of some bearings."""
+    rotor = RotorParameters()
+    return replace(rotor, brackets=tuple(b for b in rotor.brackets if b.bearing in ids))
 
 
 def shaft_motion(height_m: float) -> FloatArray:

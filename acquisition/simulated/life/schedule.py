@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from acquisition.simulated.life.held_load import HeldLoad
 from acquisition.simulated.life.operation import RATED_POWER_MW, STEP_S, Operation
 from acquisition.simulated.life.wander import wander
 from core.arrays import FloatArray
@@ -41,7 +42,10 @@ RUN_UP_SHARE = 0.3
 
 
 def draw_operation(
-    random: np.random.Generator, time_ns: TimeArray, rated_speed_rpm: float
+    random: np.random.Generator,
+    time_ns: TimeArray,
+    rated_speed_rpm: float,
+    held: HeldLoad | None = None,
 ) -> Operation:
     """Draw how a unit is run, on a grid of 10 min; its first row counts as midnight."""
     first_day = int(time_ns[0] // DAY_NS)
@@ -50,6 +54,8 @@ def draw_operation(
     load = load[: time_ns.size]
     _stop_for_outages(random, load, first_day % YEAR_DAYS)
     _trip(random, load)
+    if held is not None:
+        load[time_ns >= held.from_ns] = held.load
     speed = np.where(load > 0.0, 1.0, 0.0)
     _start(random, load, speed)
     speed *= 1.0 + wander(random, load.size, STEP_S, 1800.0, 3e-4)

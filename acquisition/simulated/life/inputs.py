@@ -1,0 +1,149 @@
+"""What makes a life: a unit's operation, warmth and shaft position, also while it stands still."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.simulated.life.condition_change import ConditionChange
+from acquisition.simulated.life.excitation import draw_grade_mm_s
+from acquisition.simulated.life.films import PadSetting, draw_setting, worn_pad
+from acquisition.simulated.life.held_load import HeldLoad
+from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
+from acquisition.simulated.life.measured import Chain, draw_chain
+from acquisition.simulated.life.operation import Operation, time_grid_ns
+from acquisition.simulated.life.schedule import draw_operation
+from acquisition.simulated.life.shaft_position import draw_positions_um
+from acquisition.simulated.life.thermal import (
+    ThermalCourse,
+    draw_closing_share,
+    draw_water_c,
+    thermal_course,
+)
+from core.arrays import FloatArray
+
+RATED_SPEEDS_RPM = (92.3, 90.9)
+"""Of the units for 60 Hz and for 50 Hz (Brito et al., section 1): even and odd seeds."""
+
+
+@dataclass(frozen=True, eq=False)
+class BearingInputs:
+    """One bearing on an even grid of times; damage comes later.
+
+    Parameters
+    ----------
+    position_um : (2, n)
+        Where the shaft runs if nothing is altered.
+    worn_pad
+        The pad that the shaft leans on most of the time it turns.
+    """
+
+    bearing: LifeBearing
+    setting: PadSetting
+    thermal: ThermalCourse
+    position_um: FloatArray
+    chain: Chain
+    worn_pad: int
+
+
+@dataclass(frozen=True, eq=False)
+class LifeInputs:
+    """One unit on an even grid of times.
+
+    Parameters
+    ----------
+    water_c, grade_mm_s : (n,)
+    noise
+        Where the scatter of readings comes from, by bearing.
+    """
+
+    unit_seed: int
+    operation: Operation
+    water_c: FloatArray
+    grade_mm_s: FloatArray
+    bearings: tuple[BearingInputs, ...]
+    noise: tuple[np.random.SeedSequence, ...]
+    changes: tuple[ConditionChange, ...]
+
+
+def draw_inputs(
+    unit_seed: int,
+    start_ns: int,
+    years: float,
+    changes: tuple[ConditionChange, ...] = (),
+    bearings: tuple[LifeBearing, ...] = LIFE_BEARINGS,
+    held: HeldLoad | None = None,
+) -> LifeInputs:
+    """Draw a life.
+
+    Parameters
+    ----------
+    start_ns
+        Midnight where the plant is.
+
+    Raises
+    ------
+    ValueError
+        If years are too few, or the unit never turns.
+    """
+    random = _Streams(unit_seed, len(bearings))
+    time_ns = time_grid_ns(start_ns, years)
+    operation = draw_operation(random.operation, time_ns, rated_speed_rpm(unit_seed), held)
+    if not operation.is_turning.any():
+        raise ValueError(f"unit {unit_seed} never turns in {years} years")
+    water_c = draw_water_c(random.water, operation)
+    positions_um = draw_positions_um(random.position, operation, bearings, changes)
+    drawn = (
+        _bearing(bearing, setting, chain, positions_um[bearing.id], operation, water_c, changes)
+        for bearing, setting, chain in zip(bearings, random.settings, random.chains, strict=True)
+    )
+    return LifeInputs(
+        unit_seed,
+        operation,
+        water_c,
+        draw_grade_mm_s(random.unbalance, operation),
+        tuple(drawn),
+        tuple(random.noises),
+        changes,
+    )
+
+
+def rated_speed_rpm(unit_seed: int) -> float:
+    """Rated speed of the unit with a seed."""
+    return RATED_SPEEDS_RPM[unit_seed % 2]
+
+
+class _Streams:
+    """Independent randomness for every subject, so that none shifts another."""
+
+    def __init__(self, unit_seed: int, n_bearings: int) -> None:
+        plant, *own = np.random.SeedSequence(unit_seed).spawn(1 + 3 * n_bearings)
+        self.operation, self.water, self.position, self.unbalance = (
+            np.random.default_rng(seed) for seed in plant.spawn(4)
+        )
+        self.settings, self.chains = (
+            [np.random.default_rng(seed) for seed in own[i::3]] for i in range(2)
+        )
+        self.noises = own[2::3]
+
+
+def _bearing(
+    bearing: LifeBearing,
+    setting: np.random.Generator,
+    chain: np.random.Generator,
+    position_um: FloatArray,
+    operation: Operation,
+    water_c: FloatArray,
+    changes: tuple[ConditionChange, ...],
+) -> BearingInputs:
+    pads, oil_offset_c = draw_setting(setting, bearing), np.zeros(len(operation))
+    for change in changes:
+        oil_offset_c += change.oil_offset_c * change.holds(operation.time_ns)
+    closing_share = draw_closing_share(setting, operation)
+    return BearingInputs(
+        bearing,
+        pads,
+        thermal_course(bearing, operation, water_c, closing_share, oil_offset_c),
+        position_um,
+        draw_chain(chain, operation),
+        worn_pad(bearing, position_um[:, operation.is_turning]),
+    )

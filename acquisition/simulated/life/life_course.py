@@ -1,0 +1,160 @@
+"""`LifeCourse`: a life as the course of a simulated unit, second by second."""
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.simulated.life.columns import row_between, rows_of
+from acquisition.simulated.life.damage import Damage, alteration
+from acquisition.simulated.life.films import film_course, mean_clearance_um
+from acquisition.simulated.life.inputs import BearingInputs, LifeInputs
+from acquisition.simulated.life.life import refuse_strange
+from acquisition.simulated.life.life_truth import BearingMoments
+from acquisition.simulated.life.moment import (
+    TRANSDUCER_NOISE,
+    bearing_at,
+    channels_at,
+    growing,
+    hydraulic_noise,
+    vortex_rope,
+)
+from acquisition.simulated.life.operation import Operation
+from acquisition.simulated.life.order1 import rotor_of
+from acquisition.simulated.scenario import HydraulicNoise, Scenario, TransducerNoise
+from core.machine import Unit
+from core.units import ns_from_s
+
+LEAST_FILM_SPEED = 0.2
+"""Share of rated speed: below it films count as stiff as there. What holds a shaft that hardly
+turns is no film, but nothing shakes it either."""
+
+
+class LifeCourse:
+    """A life from some moment on; between two readings everything runs in straight lines.
+
+    A unit that stands still is simulated too: forces fall with the square of speed, so that only
+    the noise of transducers is left, and gaps and oil go on as they do.
+
+    Parameters
+    ----------
+    damage
+        Sets in to the second, not with the next reading.
+    machine
+        The unit to be sampled; see `scenario_at`.
+    start_ns
+        Time of the first sample.
+
+    Raises
+    ------
+    ValueError
+        If damage names an unknown bearing, or the moment does not lie within the life.
+    KeyError
+        If the machine has a bearing that the life has not.
+    """
+
+    def __init__(
+        self,
+        inputs: LifeInputs,
+        damage: tuple[Damage, ...],
+        machine: Unit,
+        start_ns: int,
+        noise: TransducerNoise = TRANSDUCER_NOISE,
+    ) -> None:
+        refuse_strange(damage, tuple(one.bearing for one in inputs.bearings))
+        self._inputs, self._damage, self._noise = inputs, damage, noise
+        self._machine, self._start_ns = machine, start_ns
+        self._bearings = {one.bearing.id: one for one in inputs.bearings}
+        turns = inputs.operation.is_turning
+        self._usual_um = {
+            one.bearing.id: _usual_clearance_um(one, turns) for one in inputs.bearings
+        }
+        self._growing = growing(machine)
+        self._n_rows = len(inputs.operation)
+        self._rotor = rotor_of(tuple(self._bearings))
+        self.at(0.0)
+
+    @property
+    def rated_speed_rpm(self) -> float:
+        """Speed that the unit has while it runs."""
+        return self._inputs.operation.rated_speed_rpm
+
+    def at(self, elapsed_s: float) -> Scenario:
+        """What holds some time after the first sample.
+
+        Raises
+        ------
+        ValueError
+            If the life does not last so long.
+        """
+        time_ns = self._start_ns + ns_from_s(elapsed_s)
+        row, share = self._place(time_ns)
+        operation = row_between(self._inputs.operation, self._n_rows, row, share)
+        moments = {
+            id_: self._moment(inputs, operation, time_ns, (row, share))
+            for id_, inputs in self._bearings.items()
+        }
+        grade_mm_s = self._inputs.grade_mm_s[row : row + 2]
+        return Scenario(
+            bearings={
+                id_: bearing_at(moment, 0, id_ in self._growing, self._usual_um[id_])
+                for id_, moment in moments.items()
+            },
+            speed_rpm=float(operation.speed_rpm[0]),
+            active_power_mw=float(operation.power_mw[0]),
+            unbalance_grade_mm_s=float(grade_mm_s @ (1.0 - share, share)),
+            hydraulic=self._hydraulic(operation),
+            rope=vortex_rope(float(operation.load[0])),
+            noise=self._noise,
+            channels={
+                channel: one
+                for bearing in self._machine.bearings
+                for channel, one in channels_at(moments[bearing.id], 0, bearing)
+            },
+            rotor=self._rotor,
+        )
+
+    def _place(self, time_ns: int) -> tuple[int, float]:
+        """Row before a moment, and how far the moment is on the way to the next row."""
+        grid_ns = self._inputs.operation.time_ns
+        row = int(np.searchsorted(grid_ns, time_ns, side="right")) - 1
+        if not 0 <= row < self._n_rows - 1:
+            seed = self._inputs.unit_seed
+            raise ValueError(f"{time_ns} ns is no time in the life of unit {seed}")
+        return row, float(time_ns - grid_ns[row]) / float(grid_ns[row + 1] - grid_ns[row])
+
+    def _moment(
+        self,
+        inputs: BearingInputs,
+        operation: Operation,
+        time_ns: int,
+        place: tuple[int, float],
+    ) -> BearingMoments:
+        n = self._n_rows
+        here = row_between(inputs, n, *place)
+        thermal = row_between(inputs.thermal, n, *place)
+        altered = alteration(self._damage, inputs.bearing.id, np.array([time_ns]))
+        least_rpm = LEAST_FILM_SPEED * self.rated_speed_rpm
+        speed_rpm = np.maximum(operation.speed_rpm, least_rpm)
+        course = film_course(
+            *(inputs.bearing, inputs.setting, thermal, speed_rpm, here.position_um),
+            altered,
+            inputs.worn_pad,
+        )
+        return BearingMoments(
+            film=course.film,
+            clearance_um=course.clearance_um,
+            centre_um=course.centre_um,
+            oil_temperature_c=thermal.oil_temperature_c,
+            altered=altered,
+            chain=row_between(inputs.chain, n, *place),
+        )
+
+    def _hydraulic(self, operation: Operation) -> HydraulicNoise:
+        """Broadband force: at standstill no water flows."""
+        share = min(float(operation.speed_rpm[0]) / self.rated_speed_rpm, 1.0)
+        running = hydraulic_noise(float(operation.load[0]))
+        return HydraulicNoise(share**2 * running.rms_n, running.cutoff_hz)
+
+
+def _usual_clearance_um(inputs: BearingInputs, turns: npt.NDArray[np.bool_]) -> float:
+    thermal = rows_of(inputs.thermal, turns)
+    return float(np.median(mean_clearance_um(inputs.bearing, inputs.setting, thermal)))
