@@ -152,7 +152,7 @@ class UnitSettings(Settings):
             if isinstance(self.source, SimulatedSettings):
                 raise MisfitError("needs a [unit.simulation] table", "source", "kind")
             return
-        names = [bearing.bearing for bearing in simulation.bearing]
+        names = [bearing.bearing for bearing in simulation.bearing] or ["UJB", "LJB", "TJB"]
         for number, bearing in enumerate(self.bearing):
             if bearing.id not in names:
                 allowed = " or ".join(names)
