@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from service.api.film_models import FilmConditionModel
 from service.api.models import ApiModel, Time
 
 AlarmLevelName = Literal["alert", "danger"]
@@ -123,6 +124,10 @@ class AlarmModel(ApiModel):
 
     value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
     """Unit of value and limit."""
+
+    film: FilmConditionModel | None
+    """For kinds of film stiffness, the condition of the newest reading: operating state and cell;
+    null for all others, and before the first reading."""
 
     suppressed_by: str | None
     """Why it counts for nothing by design; null if it counts."""

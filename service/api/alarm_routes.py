@@ -66,7 +66,9 @@ def alarm_router(context: Context) -> APIRouter:
     @router.get("", summary="All alarms that are not normal")
     async def alarms() -> AlarmListModel:
         """The alarm list, most urgent first, and what cannot be judged now."""
-        return alarm_list_model(context.alarms, context.origin, context.clock.now_ns())
+        return alarm_list_model(
+            context.alarms, context.films, context.origin, context.clock.now_ns()
+        )
 
     @router.get("/events", summary="History of all alarms", responses=EVENT_PROBLEMS)
     async def events(query: Annotated[AlarmQuery, Depends(event_query)]) -> AlarmEventsModel:
@@ -191,4 +193,4 @@ async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
             " a restart now would undo it. It is tried again until it is stored"
         )
         raise ProblemError(503, "Not on the disk yet", detail) from error
-    return alarm_model(context.alarms, alarm)
+    return alarm_model(context.alarms, context.films, alarm)

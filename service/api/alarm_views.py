@@ -1,6 +1,14 @@
 """Alarms in the words of the API."""
 
-from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState, Condition, Hold
+from core.alarms.alarm import (
+    Alarm,
+    AlarmIdentity,
+    AlarmKind,
+    AlarmLevel,
+    AlarmState,
+    Condition,
+    Hold,
+)
 from service.alarms.engine import AlarmEngine
 from service.api.alarm_models import (
     AlarmCountModel,
@@ -12,7 +20,10 @@ from service.api.alarm_models import (
     ConditionName,
     HoldModel,
 )
+from service.api.film_conditions import condition_model
+from service.api.film_models import FilmConditionModel
 from service.api.times import rfc3339
+from service.films.keeper import KINDS, FilmKeeper
 from service.origin import Origin
 from service.store.port import StoredEvent
 
@@ -32,7 +43,9 @@ LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
 }
 
 
-def alarm_list_model(engine: AlarmEngine, origin: Origin, now_ns: int) -> AlarmListModel:
+def alarm_list_model(
+    engine: AlarmEngine, films: FilmKeeper, origin: Origin, now_ns: int
+) -> AlarmListModel:
     """The list of alarms as it stands."""
     alarms = engine.alarms
     listed = [alarm for alarm in alarms if alarm.state is not AlarmState.NORMAL]
@@ -41,8 +54,8 @@ def alarm_list_model(engine: AlarmEngine, origin: Origin, now_ns: int) -> AlarmL
         time=rfc3339(now_ns),
         origin=origin.value,
         count=alarm_count_model(engine),
-        alarms=[alarm_model(engine, alarm) for alarm in sorted(listed, key=_urgency)],
-        unjudged=[alarm_model(engine, alarm) for alarm in unjudged],
+        alarms=[alarm_model(engine, films, alarm) for alarm in sorted(listed, key=_urgency)],
+        unjudged=[alarm_model(engine, films, alarm) for alarm in unjudged],
     )
 
 
@@ -51,7 +64,7 @@ def alarm_count_model(engine: AlarmEngine) -> AlarmCountModel:
     return AlarmCountModel(**vars(engine.count()))
 
 
-def alarm_model(engine: AlarmEngine, alarm: Alarm) -> AlarmModel:
+def alarm_model(engine: AlarmEngine, films: FilmKeeper, alarm: Alarm) -> AlarmModel:
     """One alarm as it is shown."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
@@ -73,10 +86,21 @@ def alarm_model(engine: AlarmEngine, alarm: Alarm) -> AlarmModel:
         value=condition.value,
         limit=condition.limit,
         value_unit=VALUE_UNITS.get(identity.kind),
+        film=_film(films, identity),
         suppressed_by=alarm.suppressed_by,
         shelf=_hold(alarm.shelf),
         outage=_hold(alarm.outage),
     )
+
+
+def _film(films: FilmKeeper, identity: AlarmIdentity) -> FilmConditionModel | None:
+    """Condition of the newest reading of a film, if the alarm is about one."""
+    if identity.kind not in KINDS.values():
+        return None
+    news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
+    if news is None or rules is None:
+        return None
+    return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
 
 
 def alarm_events_model(

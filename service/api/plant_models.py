@@ -3,6 +3,7 @@
 from typing import Literal
 
 from service.api.alarm_models import AlarmCountModel
+from service.api.film_models import FilmBriefModel
 from service.api.models import ApiModel, LatestModel, Time
 
 
@@ -105,6 +106,9 @@ class UnitOverviewModel(ApiModel):
 
     bearings: list[LatestModel]
     """Its guide bearings now."""
+
+    films: list[FilmBriefModel]
+    """Their films, in the same order."""
 
 
 class PlantModel(ApiModel):

@@ -5,6 +5,7 @@ from fastapi import APIRouter
 from core.quantities import CATALOGUE
 from service.api.alarm_views import alarm_count_model
 from service.api.context import Context, UnitId
+from service.api.film_views import film_brief
 from service.api.plant_models import (
     CapturesModel,
     OverviewModel,
@@ -77,4 +78,5 @@ def _unit_overview(context: Context, unit: str) -> UnitOverviewModel:
         rated_speed_rpm=settings.rated_speed_rpm,
         source=source_model(context.live, unit),
         bearings=[latest_model(context.live, unit, bearing.id) for bearing in settings.bearing],
+        films=[film_brief(context, unit, bearing.id) for bearing in settings.bearing],
     )
