@@ -4,51 +4,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from service.api.alarm_names import (
+    AlarmChangeName,
+    AlarmKindName,
+    AlarmLevelName,
+    AlarmStateName,
+)
 from service.api.film_models import FilmConditionModel
 from service.api.models import ApiModel, Time
-
-AlarmLevelName = Literal["alert", "danger"]
-
-AlarmStateName = Literal[
-    "normal",
-    "unacknowledged",
-    "acknowledged",
-    "returned_unacknowledged",
-    "shelved",
-    "suppressed",
-    "out_of_service",
-]
-
-AlarmKindName = Literal[
-    "channel_not_ok",
-    "order1_shaft_x",
-    "order1_shaft_y",
-    "oil_temperature",
-    "stiffness_x",
-    "stiffness_y",
-    "clock_offset",
-    "clock_drift",
-    "time_stamps",
-    "link_lost",
-]
-
-AlarmChangeName = Literal[
-    "raised",
-    "escalated",
-    "eased",
-    "returned",
-    "latched",
-    "reset",
-    "acknowledged",
-    "shelved",
-    "unshelved",
-    "suppressed",
-    "unsuppressed",
-    "taken_out_of_service",
-    "returned_to_service",
-    "condition_unknown",
-    "condition_known",
-]
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 
@@ -80,10 +43,11 @@ class AlarmModel(ApiModel):
     """Stable identifier: unit, subject and kind."""
 
     unit: str
-    """Unit."""
+    """Unit; "plant" if it is about the service itself."""
 
     subject: str
-    """Channel or bearing it is about; "device" or "link" if it is about the whole unit."""
+    """Channel or bearing it is about; "device" or "link" if it is about the whole unit; of "plant",
+    a part of the service, or the unit whose samples got lost."""
 
     kind: AlarmKindName
     """What is wrong."""
@@ -102,6 +66,9 @@ class AlarmModel(ApiModel):
 
     is_latched: bool
     """Whether only its latch keeps it active: its condition has gone, and it waits for a reset."""
+
+    is_chattering: bool
+    """Whether it has come and gone too often within a short time, until ten minutes ago."""
 
     occurrence: int
     """How often it was raised or rose in level; what is acknowledged."""

@@ -35,18 +35,20 @@ Comment = Annotated[
 ]
 
 
-class _Request(ApiModel):
+class RequestModel(ApiModel):
+    """What all requests share: nothing unknown, nothing converted."""
+
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 
 
-class ActorModel(_Request):
+class ActorModel(RequestModel):
     """Who does something to an alarm. There is no login yet: the name is believed."""
 
     actor: Actor
     """Who, 1 to 80 printable characters."""
 
 
-class AcknowledgeModel(_Request):
+class AcknowledgeModel(RequestModel):
     """That somebody has seen an occurrence of an alarm."""
 
     actor: Actor
@@ -59,7 +61,17 @@ class AcknowledgeModel(_Request):
     """What to remember, at most 500 printable characters."""
 
 
-class ShelveModel(_Request):
+class CommentModel(RequestModel):
+    """What somebody has to say about an alarm."""
+
+    actor: Actor
+    """Who, 1 to 80 printable characters."""
+
+    text: Words
+    """What, 1 to 500 printable characters."""
+
+
+class ShelveModel(RequestModel):
     """That somebody takes an alarm off the list for a while."""
 
     actor: Actor
@@ -72,7 +84,7 @@ class ShelveModel(_Request):
     """For how long, s; at most what the plant file allows."""
 
 
-class OutageModel(_Request):
+class OutageModel(RequestModel):
     """That somebody takes an alarm off the list until further notice."""
 
     actor: Actor

@@ -10,6 +10,7 @@ from core.alarms.operation import (
     Acknowledge,
     Action,
     ActionRefusedError,
+    Comment,
     Reset,
     ReturnToService,
     Shelve,
@@ -19,15 +20,21 @@ from core.alarms.operation import (
 from core.units import ns_from_s
 from service.api.alarm_models import (
     AlarmEventsModel,
-    AlarmKindName,
     AlarmListModel,
     AlarmModel,
 )
-from service.api.alarm_requests import AcknowledgeModel, ActorModel, OutageModel, ShelveModel
+from service.api.alarm_names import AlarmKindName
+from service.api.alarm_requests import (
+    AcknowledgeModel,
+    ActorModel,
+    CommentModel,
+    OutageModel,
+    ShelveModel,
+)
 from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model
 from service.api.bearing_routes import Moment
 from service.api.context import Context
-from service.api.problems import ProblemError, described_problems
+from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.same_host import require_same_host
 from service.api.times import ns_from_datetime, rfc3339
 from service.store.port import AlarmQuery
@@ -122,6 +129,26 @@ def operation_router(context: Context) -> APIRouter:
     async def reset(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an alarm that was acknowledged and whose condition has gone."""
         return await _done(context, alarm, Reset(asked.actor))
+
+    @router.post("/comment", summary="Comment", responses=ACTION_PROBLEMS)
+    async def comment(alarm: AlarmId, asked: CommentModel) -> AlarmModel:
+        """Say something about an alarm; it stands in its history, and the alarm as it was."""
+        return await _done(context, alarm, Comment(asked.actor, asked.text))
+
+    return router
+
+
+def alarm_by_id_router(context: Context) -> APIRouter:
+    """The route of one alarm; after those whose names could be taken for an alarm's."""
+    router = APIRouter(prefix="/api/v1/alarms", tags=["alarms"])
+
+    @router.get("/{alarm}", summary="One alarm", responses=problem_responses(404))
+    async def one(alarm: AlarmId) -> AlarmModel:
+        """An alarm as it is, also when it is normal, with what was compared with its limit."""
+        try:
+            return alarm_model(context.alarms, context.films, context.alarms.alarm(alarm))
+        except LookupError as error:
+            raise ProblemError(404, "Unknown alarm", f"there is no alarm {alarm!r}") from error
 
     return router
 

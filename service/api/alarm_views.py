@@ -14,12 +14,12 @@ from service.api.alarm_models import (
     AlarmCountModel,
     AlarmEventModel,
     AlarmEventsModel,
-    AlarmLevelName,
     AlarmListModel,
     AlarmModel,
     ConditionName,
     HoldModel,
 )
+from service.api.alarm_names import AlarmLevelName
 from service.api.film_conditions import condition_model
 from service.api.film_models import FilmConditionModel
 from service.api.times import rfc3339
@@ -30,11 +30,34 @@ from service.store.port import StoredEvent
 VALUE_UNITS = {
     AlarmKind.SHAFT_X: "µm 0-pk",
     AlarmKind.SHAFT_Y: "µm 0-pk",
+    AlarmKind.CHANGE_SHAFT_X: "µm 0-pk",
+    AlarmKind.CHANGE_SHAFT_Y: "µm 0-pk",
+    AlarmKind.CHANGE_BEARING_X: "µm 0-pk",
+    AlarmKind.CHANGE_BEARING_Y: "µm 0-pk",
+    AlarmKind.OVERALL_SHAFT_X: "µm pk-pk",
+    AlarmKind.OVERALL_SHAFT_Y: "µm pk-pk",
+    AlarmKind.OVERALL_BEARING_X: "mm/s rms",
+    AlarmKind.OVERALL_BEARING_Y: "mm/s rms",
+    AlarmKind.ZONE_SHAFT_X: "µm pk-pk",
+    AlarmKind.ZONE_SHAFT_Y: "µm pk-pk",
+    AlarmKind.ZONE_SHAFT: "µm 0-pk",
+    AlarmKind.ZONE_BEARING_X: "mm/s rms",
+    AlarmKind.ZONE_BEARING_Y: "mm/s rms",
+    AlarmKind.ECCENTRICITY: "1",
+    AlarmKind.GAP_X: "µm",
+    AlarmKind.GAP_Y: "µm",
+    AlarmKind.OPPOSITE_GAP_X: "µm",
+    AlarmKind.OPPOSITE_GAP_Y: "µm",
     AlarmKind.OIL_TEMPERATURE: "°C",
     AlarmKind.STIFFNESS_X: "1",
     AlarmKind.STIFFNESS_Y: "1",
     AlarmKind.CLOCK_OFFSET: "s",
     AlarmKind.CLOCK_DRIFT: "ppm",
+    AlarmKind.SAMPLES_LOST: "1",
+    AlarmKind.RESULTS_NOT_STORED: "s",
+    AlarmKind.RESULTS_LOST: "findings",
+    AlarmKind.BLOCKS_WAITING: "1",
+    AlarmKind.ANALYSIS_LATE: "s",
 }
 
 LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
@@ -79,6 +102,7 @@ def alarm_model(engine: AlarmEngine, films: FilmKeeper, alarm: Alarm) -> AlarmMo
         is_active=alarm.level is not None,
         is_acknowledged=alarm.is_acknowledged,
         is_latched=alarm.is_latched,
+        is_chattering=engine.is_chattering(alarm),
         occurrence=alarm.occurrence,
         raised=None if alarm.raised_ns is None else rfc3339(alarm.raised_ns),
         condition=_condition(condition) if is_judged else "unknown",

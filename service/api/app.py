@@ -4,13 +4,15 @@ from importlib.metadata import version
 
 from fastapi import Depends, FastAPI
 
-from service.api.alarm_routes import alarm_router, operation_router
+from service.api.alarm_rate_routes import alarm_rate_router
+from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
 from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
 from service.api.delivery_routes import delivery_router
 from service.api.film_routes import film_router
 from service.api.health_routes import health_router
+from service.api.order1_reference_routes import order1_reference_router
 from service.api.origin_header import OriginHeader
 from service.api.plant_routes import plant_router
 from service.api.problems import (
@@ -19,6 +21,7 @@ from service.api.problems import (
     refuse_unknown_parameters,
 )
 from service.api.reference_routes import reference_router
+from service.api.trend_routes import trend_router
 from service.dashboard.routes import dashboard_router
 
 DESCRIPTION = """
@@ -47,13 +50,17 @@ def create_app(context: Context) -> FastAPI:
         plant_router(context),
         gap_router(context),
         bearing_router(context),
+        trend_router(context),
         reference_router(context),
         film_router(context),
         baseline_router(context),
         baseline_action_router(context),
         alarm_router(context),
+        alarm_rate_router(context),
+        order1_reference_router(context),
         operation_router(context),
         delivery_router(context),
+        alarm_by_id_router(context),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     app.include_router(dashboard_router())

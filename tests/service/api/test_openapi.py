@@ -21,7 +21,7 @@ async def test_the_description_is_served(service: Any) -> None:
 
 
 def test_every_operation_is_explained(operations: list[tuple[str, dict[str, Any]]]) -> None:
-    assert len(operations) == 34
+    assert len(operations) == 39
     for name, operation in operations:
         assert operation["summary"], name
         assert len(operation["description"]) > 20, name
@@ -56,6 +56,12 @@ def test_every_error_is_documented_as_a_problem(
             *("403", "404", "409", "422", "503"),
         },
         "GET /api/v1/alarms/events": {"422", "503"},
+        "GET /api/v1/alarms/rates": {"404", "422", "503"},
+        "GET /api/v1/alarms/{alarm}": {"404"},
+        "POST /api/v1/alarms/{alarm}/comment": {"403", "404", "409", "422", "503"},
+        "POST /api/v1/units/{unit}/bearings/{bearing}/order1-references": {
+            *("403", "404", "409", "422", "503"),
+        },
         "POST /api/v1/alarms/{alarm}/acknowledge": {"403", "404", "409", "422", "503"},
         "POST /api/v1/alarms/{alarm}/shelve": {"403", "404", "409", "422", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/spectrum": {"404", "409"},
