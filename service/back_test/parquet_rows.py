@@ -41,6 +41,8 @@ def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
     stream.seek(0)
     try:
         yield from _batches(stream, size)
+    except pa.ArrowMemoryError:
+        raise  # of the process, not of the file
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         words = str(error) or type(error).__name__
         raise ReadingsError(f"not a sound Parquet file: {words.splitlines()[0][:200]}") from error

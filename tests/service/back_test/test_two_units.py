@@ -10,9 +10,13 @@ import pytest
 from core.baseline.baseline import BearingBaseline, Origin, Watched
 from core.baseline.exchange import from_json
 from core.baseline.learning import learn
+from core.baseline.response import learn_response, place_columns
 from core.baseline.settings import BaselineSettings
+from core.baseline.watched import watched_values
+from core.condition.film_conditions import FilmConditions
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
+from core.decision.attribution import attribute
 from core.decision.back_test import back_test
 from core.decision.limits import ChangeLimits
 from core.history_rows import BearingRows, Place
@@ -110,6 +114,39 @@ def test_the_damage_is_told_with_its_evidence(found: Found) -> None:
     )
     assert alarm.cause.reason != "the response of the shaft has not been learned"
     assert alarm.cause.film_share is not None
+
+
+def test_causes_are_told_by_the_newest_readings_of_all_bearings(
+    two_units: Any, found: Found
+) -> None:
+    alarm = next(a for a in found.alarms if (a.unit, a.bearing, a.direction) == ("U2", "LJB", "x"))
+    life, baselines = two_units.lives["U2"], [b for b in found.baselines if b.origin.unit == "U2"]
+    operation, histories = life.operation, life.readings
+    limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
+    is_settled = operation_history(
+        operation.time_ns, operation.speed_rpm, operation.power_mw, limits
+    ).is_settled
+    n = int(np.searchsorted(operation.time_ns, operation.time_ns[0] + 365 * DAY_NS))
+    places = [(b, d) for b in sorted(histories) for d in DIRECTIONS]
+    ordered = {b: histories[b] for b in sorted(histories)}
+    response = learn_response({b: h.rows(0, n) for b, h in ordered.items()}, is_settled[:n])
+    deviation = np.stack([_deviation(ordered[b], baselines, b, d) for b, d in places])
+    row = int(np.flatnonzero([rfc3339(int(t)) == alarm.begin for t in operation.time_ns])[0])
+    known = np.isfinite(deviation[places.index(("LJB", "x"))]) & is_settled
+    newest = np.flatnonzero(known[: row + 1])[-24:]
+    columns = [column[:, newest] for column in (*place_columns(ordered), deviation)]
+    brackets = np.repeat([BRACKETS["U2", bearing] for bearing in sorted(histories)], 2)
+    expected = attribute(("LJB", "x"), response, *columns, brackets)
+    assert (alarm.cause.cause, alarm.cause.reason) == (expected.cause, expected.reason)
+    assert alarm.cause.film_share == pytest.approx(expected.film_share, rel=1e-6)
+    assert alarm.cause.u_film_share == pytest.approx(expected.film_share_std, rel=1e-6)
+
+
+def _deviation(history: Any, baselines: Any, bearing: str, direction: str) -> Any:
+    (baseline,) = (b for b in baselines if b.origin.bearing == bearing)
+    film = baseline.of(Watched.STIFFNESS, direction)
+    value, u_random = watched_values(history, Watched.STIFFNESS, direction)
+    return film.compare(FilmConditions.of(history), value, u_random).deviation
 
 
 def test_every_reading_is_counted_once(
