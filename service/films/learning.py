@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from core.baseline.agreement import mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
+from core.baseline.drift import learning_drift
 from core.baseline.learning import learn
 from core.baseline.response import ShaftResponse, learn_response
 from core.estimators import Estimator
@@ -27,6 +28,9 @@ from service.store.film_port import (
 DAY_NS = 86_400 * NS_PER_S
 PADWATCH = "padwatch"
 """Who learns, and accepts where engineers leave it to padwatch."""
+
+SURE = 3.0
+"""Standard uncertainties of a drift that is none by chance."""
 
 
 @dataclass(frozen=True)
@@ -82,15 +86,19 @@ class Learner:
         found = self._readings(place, versions, now_ns)
         if not len(found):
             return None
+        is_healthy = found.is_settled & ~np.any(found.level > 0, axis=0)
         baseline = learn(
             found.history,
-            found.is_settled & ~np.any(found.level > 0, axis=0),
+            is_healthy,
             self._origin(place, now_ns, author, reason),
             self._settings.baseline.settings(self._settings.reading_h),
         )
         if not baseline.quantities:
             return None
-        self._store.add_baseline(baseline, self._steps(baseline, versions))
+        limit = self._settings.change.alert_change
+        doubt = drifted(found.history, is_healthy, baseline, limit)
+        doubt = doubt or self._disagreement(baseline, versions)
+        self._store.add_baseline(baseline, self._steps(baseline, doubt))
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
@@ -124,18 +132,17 @@ class Learner:
             place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason
         )
 
-    def _steps(self, baseline: BearingBaseline, versions: Versions) -> list[StoredStep]:
-        doubt = self._doubt(baseline, versions)
+    def _steps(self, baseline: BearingBaseline, doubt: str | None) -> list[StoredStep]:
         steps = [_step(baseline, BaselineStep.LEARNED, doubt or baseline.origin.event)]
         if self._settings.acceptance == "automatic" and doubt is None:
-            steps.append(_step(baseline, BaselineStep.ACCEPTED, "agrees with what was learned"))
+            steps.append(_step(baseline, BaselineStep.ACCEPTED, "nothing speaks against it"))
         return steps
 
-    def _doubt(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """Why an engineer should look before this is put in force; None if nothing speaks against.
+    def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
+        """How it differs from the first that was accepted, if it does.
 
-        Compared is with the first that was accepted: films that soften slowly would be learned
-        little by little.
+        From the first and not from the last: a film that softens slowly would be learned little by
+        little.
         """
         origin = baseline.origin
         if versions.first_accepted is None:
@@ -147,6 +154,23 @@ class Learner:
         if abs(worst) < self._settings.change.alert_change:
             return None
         return f"{100 * worst:+.1f} % from version {versions.first_accepted} under like conditions"
+
+
+def drifted(
+    history: StiffnessHistory,
+    is_healthy: npt.NDArray[np.bool_],
+    baseline: BearingBaseline,
+    limit: float,
+) -> str | None:
+    """By how much films changed while they were learned, if they did: a fault may be in it."""
+    for quantity in baseline.quantities:
+        found = learning_drift(history, is_healthy, quantity)
+        if found and abs(found.change) >= max(limit, SURE * found.std):
+            return (
+                f"{quantity.direction} changed by {100 * found.change:+.1f} %"
+                f" ± {200 * found.std:.1f} % under like conditions while it was learned"
+            )
+    return None
 
 
 def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredStep:
