@@ -1,4 +1,4 @@
-"""One bearing: as configured, now, over time, as spectrum and as orbit."""
+"""One bearing: as configured, now, as spectrum and as orbit."""
 
 import asyncio
 from datetime import datetime
@@ -9,31 +9,22 @@ from pydantic import BeforeValidator
 
 from core.estimators import STIFFNESS_OF
 from core.quantities import BY_NAME
-from core.units import ns_from_s
 from service.api.bearing_models import BearingModel
 from service.api.bearing_views import bearing_model
 from service.api.budget_models import BudgetModel
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.models import LatestModel
 from service.api.problems import ProblemError, problem_responses
-from service.api.series_models import GapModel, OrbitModel, SpectrumModel, TrendModel
+from service.api.series_models import GapModel, OrbitModel, SpectrumModel
 from service.api.times import ns_from_datetime, rfc3339, written_as_date
 from service.api.views import (
     budget_model,
     latest_model,
     orbit_model,
     spectrum_model,
-    trend_columns,
-    trend_model,
 )
 from service.live import CurrentBearing
-from service.store.port import TrendQuery
 from service.store.value_range import ValueRange
-
-MAX_POINTS = 5000
-MAX_QUANTITIES = 40
-HOLE_HOPS = 2.5
-"""Results further apart than this many refreshes have a hole between them."""
 
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]
 Start = Annotated[
@@ -82,7 +73,6 @@ def bearing_router(context: Context) -> APIRouter:
     """Routes about one bearing."""
     router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
     unknown, no_result = problem_responses(404), problem_responses(404, 409)
-    reading = problem_responses(404, 422, 503)
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
     async def bearings(unit: UnitId) -> list[BearingModel]:
@@ -99,42 +89,6 @@ def bearing_router(context: Context) -> APIRouter:
         """The newest result, without numbers where they are not current."""
         context.bearing(unit, bearing)
         return latest_model(context.live, unit, bearing)
-
-    @router.get("/{bearing}/trends", summary="Trends", responses=reading)
-    async def trends(
-        unit: UnitId,
-        bearing: BearingId,
-        times: TimeRange,
-        eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
-        oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
-        quantity: Annotated[
-            list[str],
-            Query(
-                min_length=1,
-                max_length=MAX_QUANTITIES,
-                description="Names from the catalogue; may be repeated.",
-                examples=[["order1_k_eff_xx_n_per_m", "speed_rpm"]],
-            ),
-        ],
-        max_points: Annotated[
-            int,
-            Query(ge=2, le=MAX_POINTS, description="More readings are gathered into buckets."),
-        ] = 1000,
-    ) -> TrendModel:
-        """Quantities over time: single readings, or buckets with min, max, mean, count, quality."""
-        context.bearing(unit, bearing)
-        query = TrendQuery(
-            unit=unit,
-            bearing=bearing,
-            quantities=trend_columns(_known(quantity)),
-            start_ns=times[0],
-            end_ns=times[1],
-            max_points=max_points,
-            hole_ns=ns_from_s(HOLE_HOPS * context.refresh_s),
-            eccentricity_ratio=eccentricity,
-            oil_temperature_c=oil_temperature,
-        )
-        return trend_model(query, await asyncio.to_thread(context.store.trend, query))
 
     @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
     async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
@@ -210,14 +164,6 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
         source = STIFFNESS_OF[estimator].format(axes=axes) if estimator else quantity
     budget = assessment.budgets.get(source)
     return None if budget is None else budget_model(quantity, assessment.time_ns, budget)
-
-
-def _known(quantities: list[str]) -> tuple[str, ...]:
-    for name in quantities:
-        if name not in BY_NAME:
-            detail = f"quantity {name!r} is not in the catalogue; see /api/v1/quantities"
-            raise ProblemError(422, "Wrong parameter", detail, "quantity")
-    return tuple(dict.fromkeys(quantities))
 
 
 def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRange:

@@ -1,6 +1,8 @@
 """What the API answers about time and frequency: trends, gaps, spectra and orbits, by column."""
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from service.api.models import ApiModel, LevelName, Time
 
@@ -33,6 +35,28 @@ class TrendSeriesModel(ApiModel):
     """Mean systematic standard uncertainty; null for quantities without."""
 
 
+class TrendGroupModel(ApiModel):
+    """Trends of the readings under one condition, by column."""
+
+    name: Annotated[str, Field(examples=["full_load"])]
+    """Operating state, or bounds of the cell."""
+
+    low: float | None
+    """Eccentricity ratio or oil temperature in °C from which on; null for operating states."""
+
+    high: float | None
+    """Up to which, likewise."""
+
+    bucket_s: float | None
+    """Width of the buckets; null if each reading stands alone."""
+
+    time: list[float]
+    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
+
+    series: dict[str, TrendSeriesModel]
+    """The quantities asked for."""
+
+
 class TrendModel(ApiModel):
     """Trends of one bearing, by column."""
 
@@ -56,6 +80,10 @@ class TrendModel(ApiModel):
 
     series: dict[str, TrendSeriesModel]
     """The quantities asked for."""
+
+    groups: list[TrendGroupModel] | None
+    """With ``group_by``, the same for each operating state or cell that has readings; readings
+    whose condition is not known are in none."""
 
 
 class GapModel(ApiModel):

@@ -24,10 +24,12 @@ from service.api.series_models import (
     OrbitModel,
     SpectrumChannelModel,
     SpectrumModel,
+    TrendGroupModel,
     TrendModel,
     TrendSeriesModel,
 )
 from service.api.times import rfc3339
+from service.api.trend_groups import TrendGroup
 from service.live import CurrentBearing, LiveView, UnitStatus
 from service.store.codec import U_RANDOM, U_SYSTEMATIC, columns_of
 from service.store.port import Trend, TrendQuery, TrendSeries
@@ -185,19 +187,43 @@ def _clock_model(status: UnitStatus) -> DeviceClockModel | None:
     )
 
 
-def trend_model(query: TrendQuery, trend: Trend) -> TrendModel:
-    """Trends by column."""
+def trend_model(
+    query: TrendQuery, trend: Trend, groups: list[TrendGroup] | None = None
+) -> TrendModel:
+    """Trends by column, and those of each condition where they were asked for."""
     return TrendModel(
         unit=query.unit,
         bearing=query.bearing,
         start=rfc3339(query.start_ns),
         end=rfc3339(query.end_ns),
-        bucket_s=None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S,
-        time=[time_ns / NS_PER_S for time_ns in trend.time_ns],
-        series={
-            name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME
-        },
+        bucket_s=_bucket_s(trend),
+        time=_times_s(trend),
+        series=_series_models(trend),
+        groups=None if groups is None else [_group_model(group) for group in groups],
     )
+
+
+def _group_model(group: TrendGroup) -> TrendGroupModel:
+    return TrendGroupModel(
+        name=group.name,
+        low=group.low,
+        high=group.high,
+        bucket_s=_bucket_s(group.trend),
+        time=_times_s(group.trend),
+        series=_series_models(group.trend),
+    )
+
+
+def _bucket_s(trend: Trend) -> float | None:
+    return None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S
+
+
+def _times_s(trend: Trend) -> list[float]:
+    return [time_ns / NS_PER_S for time_ns in trend.time_ns]
+
+
+def _series_models(trend: Trend) -> dict[str, TrendSeriesModel]:
+    return {name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME}
 
 
 def spectrum_model(assessment: Assessment) -> SpectrumModel:

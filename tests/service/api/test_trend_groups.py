@@ -1,0 +1,111 @@
+"""Trends parted by operating state and by cells of eccentricity and oil temperature."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from core.assessment import Assessment
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
+
+TRENDS = "/api/v1/units/U1/bearings/UJB/trends"
+START_NS = 1_767_225_600_000_000_000
+WHOLE = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
+K = "stiffness_xx_n_per_m"
+
+SEEN = [
+    (OperatingState.PART_LOAD, 0.31, 44.0),
+    (OperatingState.PART_LOAD, 0.35, 45.0),
+    (OperatingState.FULL_LOAD, 0.36, 47.4),
+    (OperatingState.FULL_LOAD, 0.42, 47.5),
+    (OperatingState.STANDSTILL, None, 30.0),
+]
+"""State, eccentricity ratio and oil temperature of one result a minute."""
+
+
+@pytest.fixture
+def seen(service: Any, assessment: Callable[..., Assessment]) -> Any:
+    """A service that has stored results under several conditions."""
+    for minute, (state, eccentricity, oil_c) in enumerate(SEEN):
+        known = {} if eccentricity is None else {"eccentricity_ratio": eccentricity}
+        found = assessment(
+            START_NS + minute * 60_000_000_000,
+            stiffness_xx_n_per_m=1e9 + minute,
+            oil_temperature_c=oil_c,
+            **known,
+        )
+        condition = BearingCondition(state, True, None)
+        service.store.append([replace(found, condition=condition)], [])
+    return service
+
+
+def minutes(series: Any) -> list[int]:
+    return [round(mean - 1e9) for mean in series["series"][K]["mean"] if mean is not None]
+
+
+async def test_a_trend_of_some_states_leaves_the_others_out(seen: Any) -> None:
+    found = await seen.json(TRENDS, **WHOLE, quantity=K, state=["part_load", "standstill"])
+
+    assert minutes(found) == [0, 1, 4]
+    assert found["groups"] is None
+
+
+async def test_a_trend_by_state_has_a_series_for_each_state_that_there_was(seen: Any) -> None:
+    found = await seen.json(TRENDS, **WHOLE, quantity=K, group_by="state")
+
+    assert {group["name"]: minutes(group) for group in found["groups"]} == {
+        "standstill": [4],
+        "part_load": [0, 1],
+        "full_load": [2, 3],
+    }
+    assert minutes(found) == [0, 1, 2, 3, 4]
+
+
+async def test_cells_of_a_trend_are_as_wide_as_the_grid_and_share_no_reading(seen: Any) -> None:
+    by_eccentricity = await seen.json(TRENDS, **WHOLE, quantity=K, group_by="eccentricity")
+    by_oil = await seen.json(TRENDS, **WHOLE, quantity=K, group_by="oil_temperature")
+
+    assert [(g["low"], g["high"], minutes(g)) for g in by_eccentricity["groups"]] == [
+        (0.3, 0.35, [0]),
+        (0.35, 0.4, [1, 2]),
+        (0.4, 0.45, [3]),
+    ]
+    assert [(g["low"], minutes(g)) for g in by_oil["groups"]] == [
+        (30.0, [4]),
+        (42.5, [0]),
+        (45.0, [1, 2]),
+        (47.5, [3]),
+    ]
+
+
+async def test_groups_keep_to_the_range_that_was_asked_for(seen: Any) -> None:
+    found = await seen.json(
+        TRENDS, **WHOLE, quantity=K, group_by="eccentricity", eccentricity_min=0.355
+    )
+
+    assert [(g["name"], minutes(g)) for g in found["groups"]] == [
+        ("0.35 to 0.4", [2]),
+        ("0.4 to 0.45", [3]),
+    ]
+
+
+async def test_an_unknown_state_or_grouping_is_refused(seen: Any) -> None:
+    state = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, state="overload")
+    group = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, group_by="weekday")
+
+    assert "'full_load'" in state["detail"]
+    assert group["errors"][0]["parameter"] == "group_by"
+
+
+async def test_more_groups_than_anybody_looks_at_are_refused(
+    seen: Any, assessment: Callable[..., Assessment]
+) -> None:
+    start_ns = START_NS + 3_600_000_000_000
+    wild = [assessment(start_ns + n, eccentricity_ratio=1.0 + 0.05 * n) for n in range(61)]
+    seen.store.append(wild, [])
+
+    found = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, group_by="eccentricity")
+
+    assert "60 groups" in found["detail"]
