@@ -118,13 +118,11 @@ class Captures:
         """Whether samples are kept around an event."""
         return is_captured(event) and event.identity.unit in self._histories
 
-    def is_made_for(self, alarm: str, occurrence: int) -> bool:
-        """Whether samples around an occurrence of an alarm are being written now."""
-        return any(
-            (event.identity.id, event.occurrence) == (alarm, occurrence)
-            for capture in self._all
-            for event in capture.alarms
-        )
+    @property
+    def being_made(self) -> frozenset[tuple[str, int]]:
+        """Alarms and occurrences around which samples are being written now."""
+        events = (event for capture in self._all for event in capture.alarms)
+        return frozenset((event.identity.id, event.occurrence) for event in events)
 
     @property
     def n_running(self) -> int:

@@ -9,6 +9,7 @@ from core.units import hz_from_rpm
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
 from service.settings.delivery import DeliverySettings
+from service.settings.evidence import EvidenceSettings
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
@@ -167,6 +168,9 @@ class PlantFile(Settings):
 
     capture: CaptureSettings = CaptureSettings()
     """Samples that are kept around an alarm."""
+
+    evidence: EvidenceSettings = EvidenceSettings()
+    """What is kept of alarms beside their samples."""
 
     delivery: DeliverySettings = DeliverySettings()
     """Who is told of alarms, beside the dashboard."""

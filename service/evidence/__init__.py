@@ -1,0 +1,1 @@
+"""Evidence of alarms: what was known when one was raised, kept, shown and printed."""

@@ -1,0 +1,23 @@
+"""`Maker`: who makes bundles, and of which plant."""
+
+from dataclasses import dataclass
+
+from service.evidence.configuration import Configuration
+from service.origin import Origin
+from service.settings.plant import PlantFile
+
+
+@dataclass(frozen=True)
+class Maker:
+    """Who makes bundles, and of which plant.
+
+    Parameters
+    ----------
+    made_by
+        Program, person and host.
+    """
+
+    plant: PlantFile
+    configuration: Configuration
+    made_by: str
+    origin: Origin

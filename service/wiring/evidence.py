@@ -1,0 +1,72 @@
+"""Evidence of alarms, below the data folder."""
+
+from importlib.metadata import version
+from pathlib import Path
+
+from acquisition.clock import Clock
+from service.alarms.engine import AlarmEngine
+from service.capture.captures import Captures
+from service.cli.made_by import made_by
+from service.evidence.archive import EvidenceArchive
+from service.evidence.configuration import built_from, configuration_of
+from service.evidence.folders import EvidenceLimits
+from service.evidence.keeper import EvidenceFolders, EvidenceKeeper
+from service.evidence.maker import Maker
+from service.evidence.snapshot import Camera
+from service.evidence.writer import EvidenceWriter
+from service.films.keeper import FilmKeeper
+from service.live import LiveView
+from service.origin import Origin
+from service.settings.plant import PlantFile
+from service.store.port import Store
+from service.wiring.captures import BYTES_PER_GB, CAPTURES
+
+EVIDENCE, CONFIGURATIONS = "evidence", "configurations"
+
+
+def evidence_folders(plant: PlantFile) -> EvidenceFolders:
+    """Where evidence of a plant is kept."""
+    root = Path(plant.service.data_folder)
+    return EvidenceFolders(root / EVIDENCE, root / CAPTURES, root / CONFIGURATIONS)
+
+
+def evidence_archive(plant: PlantFile, store: Store) -> EvidenceArchive:
+    """What there is of it."""
+    return EvidenceArchive(evidence_folders(plant), store)
+
+
+def evidence_of(
+    plant: PlantFile,
+    origin: Origin,
+    live: LiveView,
+    films: FilmKeeper,
+    store: Store,
+    captures: Captures,
+    clock: Clock,
+) -> EvidenceKeeper:
+    """The keeper of all evidence; `watch` lets it see alarms."""
+    limits, folders = limits_of(plant), evidence_folders(plant)
+    configuration = configuration_of(plant, version("padwatch"), built_from())
+    maker = Maker(plant, configuration, made_by(), origin)
+    writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
+    camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
+    return EvidenceKeeper(folders, camera, writer, limits, configuration, captures, clock)
+
+
+def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
+    """Let a keeper see alarms; what is replayed can be replayed again, and needs no evidence."""
+    if origin is Origin.LIVE:
+        alarms.show(keeper.see)
+        captures.tell(keeper.captured)
+
+
+def limits_of(plant: PlantFile) -> EvidenceLimits:
+    """How much is kept."""
+    found = plant.evidence
+    return EvidenceLimits(
+        max_bytes=round(found.max_gb * BYTES_PER_GB),
+        hard_max_bytes=round(found.hard_max_gb * BYTES_PER_GB),
+        keep_days=found.keep_days,
+        max_per_alarm=found.max_per_alarm,
+        trend_days=found.trend_days,
+    )
