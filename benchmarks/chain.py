@@ -1,4 +1,4 @@
-"""The whole chain at 600 Hz beside readings alone: another condition, then damage, and what is said.
+"""The whole chain at 600 Hz beside readings alone: another condition, then damage.
 
 ``python -m benchmarks.chain`` learns a simulated unit from a year of readings. In the second year a
 shaft goes from near the centre in warm oil far out into cold oil, which makes films several times

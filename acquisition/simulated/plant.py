@@ -100,10 +100,9 @@ class SimulatedPlant:
             speeds_rpm = self._scenario.speed_rpm, following.speed_rpm
             self._rotation.follow(self._index, CHUNK_SAMPLES, *speeds_rpm)
         self._index += CHUNK_SAMPLES
-        self._rotor.follow(self._scenario)
         forces = self._forces.advance(CHUNK_SAMPLES, self._scenario, following)
+        motion = self._rotor.advance(forces, self._scenario, following)
         self._scenario = following
-        motion = self._rotor.advance(forces)
         return self._chain.read(motion, self._rotation.turns(index), start, stop)
 
 

@@ -54,10 +54,10 @@ def draw_operation(
     load = load[: time_ns.size]
     _stop_for_outages(random, load, first_day % YEAR_DAYS)
     _trip(random, load)
-    if held is not None:
-        load[time_ns >= held.from_ns] = held.load
     speed = np.where(load > 0.0, 1.0, 0.0)
     _start(random, load, speed)
+    if held is not None:  # after all that is drawn by chance, which stays what it was before
+        load[time_ns >= held.from_ns], speed[time_ns >= held.from_ns] = held.load, 1.0
     speed *= 1.0 + wander(random, load.size, STEP_S, 1800.0, 3e-4)
     power_mw = RATED_POWER_MW * np.maximum(load, 0.0)
     power_mw[load > 0.0] += 3.0 * random.standard_normal(int(np.sum(load > 0.0)))

@@ -1,0 +1,112 @@
+"""A life second by second is the life of the readings."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.simulated.life.damage import Damage, DamageKind
+from acquisition.simulated.life.held_load import HeldLoad
+from acquisition.simulated.life.inputs import LifeInputs, draw_inputs
+from acquisition.simulated.life.life import live
+from acquisition.simulated.life.life_course import LifeCourse
+from acquisition.simulated.life.moment import scenario_at
+from acquisition.simulated.unit import SimulatedUnit
+from benchmarks.chain_unit import CALIBRATION, UNIT
+from core.units import NS_PER_S
+
+START_NS = 1_735_689_600 * NS_PER_S
+STEP_NS = 600 * NS_PER_S
+SEED, YEARS = 4, 0.3
+
+
+@pytest.fixture(scope="module")
+def inputs() -> LifeInputs:
+    return draw_inputs(SEED, START_NS, YEARS)
+
+
+def running_ns(inputs: LifeInputs) -> int:
+    """A reading in the middle of an hour under load."""
+    loaded = inputs.operation.load > 0.5
+    rows = np.flatnonzero(np.convolve(loaded, np.ones(7), "same") == 7)
+    return int(inputs.operation.time_ns[rows[rows.size // 2]])
+
+
+def test_at_a_reading_the_course_is_what_the_reading_was_made_of(inputs: LifeInputs) -> None:
+    now_ns = running_ns(inputs)
+    damage = (Damage(DamageKind.PIVOT_WEAR, "LJB", now_ns - 10 * STEP_NS, 0.1),)
+    found = LifeCourse(inputs, damage, UNIT, now_ns).at(0.0)
+    wanted = scenario_at(live(SEED, START_NS, YEARS, damage), now_ns, UNIT)
+
+    assert found.speed_rpm == wanted.speed_rpm
+    assert found.channels == wanted.channels
+    assert found.unbalance_grade_mm_s == wanted.unbalance_grade_mm_s
+    for name, bearing in wanted.bearings.items():
+        here = found.bearings[name]
+        assert here.film.k_xx_n_per_m == pytest.approx(bearing.film.k_xx_n_per_m)
+        assert here.position_error_um == pytest.approx(bearing.position_error_um)
+        assert (here.centre_x_um, here.centre_y_um) == pytest.approx(
+            (bearing.centre_x_um, bearing.centre_y_um)
+        )
+        assert here.gap_growth_um == pytest.approx(
+            bearing.gap_growth_um, abs=4.0
+        )  # its median has the damage in it
+
+
+def test_between_readings_everything_runs_in_straight_lines(inputs: LifeInputs) -> None:
+    course = LifeCourse(inputs, (), UNIT, running_ns(inputs))
+    first, middle, last = (course.at(s).bearings["UJB"] for s in (0.0, 300.0, 600.0))
+    for name in ("centre_x_um", "oil_temperature_c", "gap_growth_um"):
+        mean = (getattr(first, name) + getattr(last, name)) / 2.0
+        assert getattr(middle, name) == pytest.approx(mean, abs=1e-9), name
+
+
+def test_damage_sets_in_to_the_second_and_grows_as_told(inputs: LifeInputs) -> None:
+    now_ns = running_ns(inputs)
+    loss = Damage(DamageKind.STIFFNESS_LOSS, "UJB", now_ns + 100 * NS_PER_S, 0.2, 60.0 / 86_400.0)
+    healthy, damaged = (LifeCourse(inputs, d, UNIT, now_ns) for d in ((), (loss,)))
+    for seconds, left in ((99.0, 1.0), (130.0, 0.9), (161.0, 0.8)):
+        before, after = (c.at(seconds).bearings["UJB"].film for c in (healthy, damaged))
+        assert after.k_yy_n_per_m / before.k_yy_n_per_m == pytest.approx(left)
+
+
+def test_a_unit_that_stands_still_is_sampled_too(inputs: LifeInputs) -> None:
+    standing = np.flatnonzero(~inputs.operation.is_turning)
+    now_ns = int(inputs.operation.time_ns[standing[5]])
+    unit = SimulatedUnit(UNIT, CALIBRATION, LifeCourse(inputs, (), UNIT, now_ns), 1, now_ns)
+    unit.advance(9000)
+    block = unit.advance(6000)
+    gap_um = 250.0 * 20.0 / 32768.0 * block.counts[0].astype(np.float64)
+
+    assert block.slow[:2] == (0.0, 0.0)
+    assert 15.0 < block.slow[2] < 60.0
+    assert np.std(gap_um) == pytest.approx(1.2, rel=0.1)
+
+
+def test_a_unit_that_is_kept_running_never_stops_and_has_the_same_past(
+    inputs: LifeInputs,
+) -> None:
+    from_ns = START_NS + 60 * 144 * STEP_NS
+    held = draw_inputs(SEED, START_NS, YEARS, held=HeldLoad(from_ns, 0.9))
+    later = inputs.operation.time_ns >= from_ns
+
+    assert not inputs.operation.is_at_speed[later].all()
+    assert held.operation.is_at_speed[later][3:].all()
+    assert held.operation.load[later][3:] == pytest.approx(0.9, abs=0.03)
+    assert np.array_equal(held.operation.speed_rpm[~later], inputs.operation.speed_rpm[~later])
+    for one, other in zip(held.bearings, inputs.bearings, strict=True):
+        assert np.array_equal(one.position_um[:, ~later], other.position_um[:, ~later])
+
+
+def test_what_cannot_be_is_refused(inputs: LifeInputs) -> None:
+    with pytest.raises(ValueError, match=r"load = 1\.2 must lie above 0"):
+        HeldLoad(0, 1.2)
+    with pytest.raises(ValueError, match="no time in the life of unit 4"):
+        LifeCourse(inputs, (), UNIT, START_NS - 1)
+    strange = replace(UNIT, bearings=(replace(UNIT.bearings[0], id="XJB"),))
+    with pytest.raises(KeyError):
+        LifeCourse(inputs, (), strange, running_ns(inputs))
+    loss = Damage(DamageKind.STIFFNESS_LOSS, "XJB", START_NS, math.nextafter(0.2, 1.0))
+    with pytest.raises(ValueError, match="'XJB' is none of"):
+        LifeCourse(inputs, (loss,), UNIT, running_ns(inputs))
