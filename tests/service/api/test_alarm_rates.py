@@ -1,0 +1,183 @@
+"""How often alarms come, what is said of them, and references of 1×, over HTTP."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, get_args
+
+import httpx2
+import pytest
+
+from core.alarms.alarm import AlarmKind, AlarmState
+from core.alarms.event import AlarmChange
+from core.assessment import Assessment
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
+from service.api.alarm_names import AlarmChangeName, AlarmKindName, AlarmStateName
+
+AsProblem = Callable[[httpx2.Response], dict[str, Any]]
+
+RATES = "/api/v1/alarms/rates"
+LINK = "U1:link:link_lost"
+COMMENT = f"/api/v1/alarms/{LINK}/comment"
+REFERENCES = "/api/v1/units/U1/bearings/UJB/order1-references"
+SECOND = 1_000_000_000
+
+
+async def lose_link(service: Any, n_times: int, every_s: float) -> None:
+    """Lose the link for longer than its delay, again and again; that of the other unit is fine."""
+    service.alarms.link("U2", True)
+    for _ in range(n_times):
+        service.alarms.link("U1", False, "no route to host")
+        service.clock.ns += 11 * SECOND
+        service.alarms.tick()
+        service.alarms.link("U1", True)
+        service.clock.ns += round((every_s - 11.0) * SECOND)
+    await asyncio.wait_for(service.recorder.stored(), 30)
+
+
+def test_the_words_of_the_api_are_those_of_alarms() -> None:
+    assert set(get_args(AlarmKindName)) == {kind.value for kind in AlarmKind}
+    assert set(get_args(AlarmChangeName)) == {change.value for change in AlarmChange}
+    assert set(get_args(AlarmStateName)) == {state.value for state in AlarmState}
+
+
+async def test_a_quiet_plant_has_rates_of_zero(service: Any) -> None:
+    found = await service.json(RATES)
+
+    assert set(found["units"]) == {"U1", "U2"}
+    assert (found["all"]["n_alarms"], found["all"]["per_day"]) == (0, 0.0)
+    assert found["all"]["share_by_level"] == {"alert": 0.0, "danger": 0.0}
+    assert (found["is_complete"], found["stale"]) == (True, [])
+
+
+async def test_a_link_that_comes_and_goes_is_counted_and_called_chattering(service: Any) -> None:
+    await lose_link(service, 4, every_s=20.0)
+
+    found = await service.json(RATES)
+    [listed] = (await service.json("/api/v1/alarms"))["alarms"]
+
+    assert found["units"]["U1"]["n_alarms"] == found["all"]["n_alarms"] == 4
+    assert found["units"]["U2"]["n_alarms"] == 0
+    assert found["all"]["per_day"] == pytest.approx(4 / 7)
+    assert found["all"]["most_in_10_min"] == 4
+    assert found["all"]["most_frequent"] == [{"alarm": LINK, "n_alarms": 4, "share": 1.0}]
+    assert (found["all"]["chattering"], found["all"]["n_fleeting"]) == ({LINK: 4}, 4)
+    assert (listed["id"], listed["is_chattering"]) == (LINK, True)
+
+
+async def test_a_link_that_is_lost_once_an_hour_does_not_chatter(service: Any) -> None:
+    await lose_link(service, 4, every_s=3600.0)
+
+    found = await service.json(RATES)
+    [listed] = (await service.json("/api/v1/alarms"))["alarms"]
+
+    assert (found["all"]["chattering"], listed["is_chattering"]) == ({}, False)
+
+
+async def test_what_stands_for_more_than_a_day_is_stale(service: Any) -> None:
+    service.alarms.link("U1", False, "no route to host")
+    service.clock.ns += 11 * SECOND
+    service.alarms.tick()
+    service.clock.ns += 86_400 * SECOND
+    before = (await service.json(RATES))["stale"]
+    service.clock.ns += SECOND
+    after = (await service.json(RATES))["stale"]
+
+    assert (before, [alarm["id"] for alarm in after]) == ([], [LINK])
+
+
+async def test_rates_of_a_span_count_what_happened_in_it(service: Any) -> None:
+    await lose_link(service, 3, every_s=3600.0)  # from midnight, 2026-01-01
+
+    span = {"start": "2026-01-01T01:00:00Z", "end": "2026-01-01T02:00:00Z"}
+    found = await service.json(RATES, unit="U1", **span)
+
+    assert (found["start"], found["end"]) == (
+        "2026-01-01T01:00:00.000Z",
+        "2026-01-01T02:00:00.000Z",
+    )
+    assert found["all"]["n_alarms"] == 1
+    assert found["all"]["per_day"] == pytest.approx(24.0)
+    assert set(found["units"]) == {"U1"}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "status", "said"),
+    [
+        ({"unit": "U9"}, 404, "no unit 'U9'"),
+        ({"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, 422, "must be before"),
+        ({"start": "2020-01-01T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, 422, "400 are counted"),
+    ],
+)
+async def test_a_span_that_cannot_be_counted_is_refused(
+    service: Any, parameters: dict[str, str], status: int, said: str
+) -> None:
+    assert said in (await service.problem(RATES, status, **parameters))["detail"]
+
+
+async def test_a_comment_is_an_event_and_leaves_the_alarm_as_it_is(service: Any) -> None:
+    await lose_link(service, 1, every_s=20.0)
+    before = await service.json(f"/api/v1/alarms/{LINK}")
+
+    body = {"actor": "A. Name", "text": "cable 7 is being replaced"}
+    response = await service.client.post(COMMENT, json=body)
+    events = (await service.json("/api/v1/alarms/events", alarm=LINK))["events"]
+
+    assert response.status_code == 200
+    assert response.json() == before
+    assert (events[0]["change"], events[0]["actor"]) == ("commented", "A. Name")
+    assert events[0]["reason"] == "cable 7 is being replaced"
+    assert events[0]["state_before"] == events[0]["state_after"] == "returned_unacknowledged"
+    assert [event["number"] for event in events] == [3, 2, 1]
+
+
+@pytest.mark.parametrize("text", ["", "   ", "x" * 501, "two\nlines", 7, None])
+async def test_a_comment_has_words_on_one_line(
+    service: Any, text: Any, as_problem: AsProblem
+) -> None:
+    response = await service.client.post(COMMENT, json={"actor": "A. Name", "text": text})
+
+    assert response.status_code == 422
+    assert "text" in as_problem(response)["errors"][0]["parameter"]
+
+
+async def test_an_alarm_that_is_not_there_is_not_found(service: Any) -> None:
+    for id_ in ("U1:nothing:link_lost", "U9:link:link_lost", "plant:store:results_lost", "x"):
+        assert id_ in (await service.problem(f"/api/v1/alarms/{id_}", 404))["detail"]
+
+
+@pytest.fixture
+def at_part_load(running: Any, assessments: list[Assessment]) -> Any:
+    condition = BearingCondition(OperatingState.PART_LOAD, is_settled=True, cell=None)
+    for assessment in assessments:
+        running.live.set_assessment(replace(assessment, condition=condition))
+    return running
+
+
+async def test_a_reference_is_taken_from_the_machine_as_it_runs(at_part_load: Any) -> None:
+    body = {"actor": "E. Name", "note": "after balancing"}
+    response = await at_part_load.client.post(REFERENCES, json=body)
+    taken, history = response.json(), await at_part_load.json(REFERENCES)
+
+    now = await at_part_load.json("/api/v1/units/U1/bearings/UJB/latest")
+    amplitude = now["readings"]["order1_shaft_x_um_pk"]["value"]
+    assert response.status_code == 200
+    assert (taken["state"], taken["author"], taken["note"]) == (
+        *("part_load", "E. Name", "after balancing"),
+    )
+    assert taken["vectors"]["shaft_x"]["amplitude_um_pk"] == pytest.approx(amplitude, rel=1e-3)
+    assert taken["vectors"]["shaft_x"]["phase_deg"] is None  # there is no key-phase
+    assert history == [taken]
+    in_force = at_part_load.store.order1_references.in_force()
+    assert [found.reference.state for found in in_force] == [OperatingState.PART_LOAD]
+
+
+async def test_no_reference_is_taken_of_a_machine_that_nobody_sees(
+    service: Any, as_problem: AsProblem
+) -> None:
+    response = await service.client.post(REFERENCES, json={"actor": "E. Name"})
+
+    assert response.status_code == 409
+    assert "no current result" in as_problem(response)["detail"]
+    assert await service.json(REFERENCES) == []
