@@ -149,7 +149,7 @@ class Sender:
         tell = log.info if is_delivered else log.error
         if not is_delivered or self.status.n_failures:
             words = "delivered again" if is_delivered else "refused for ever"
-            tell(words, receiver=self.receiver.name, event=letter.event_id, answer=outcome.answer)
+            tell(words, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
         self.status = SenderStatus(SenderState.SENDING)
 
     async def _wait_after(self, letter: StoredLetter, failed: Failed) -> None:

@@ -1,0 +1,295 @@
+"""Receivers on loopback that do as they are told, an outbox on a real file, a clock in hand."""
+
+import asyncio
+import itertools
+import ssl
+import subprocess
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.event import AlarmChange, AlarmNews
+from core.alarms.life_cycle import advance
+from service.delivery.facts import Surroundings
+from service.delivery.message import Composer, Plant
+from service.delivery.network import Timeouts, Trust
+from service.delivery.routing import Route, Router
+from service.delivery.sender import Receiver, Sender
+from service.delivery.webhook import Webhook, WebhookTarget
+from service.settings.delivery import TOLD
+from service.store.sqlite import SqliteStore
+
+T0 = 1_767_225_600_000_000_000
+PATIENCE_S = 30.0
+"""Until a test gives up; none waits that long when all is well."""
+
+ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+DANGER = Condition(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
+WELL = Condition(value=3.0)
+
+
+class HandClock:
+    """Time that passes at once where somebody waits, unless a test holds it."""
+
+    def __init__(self) -> None:
+        self.ns = T0
+        self.slept_s: list[float] = []
+        self.held_from_s = 30.0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def monotonic_s(self) -> float:
+        return (self.ns - T0) / 1e9
+
+    async def sleep(self, duration_s: float) -> None:
+        self.slept_s.append(duration_s)
+        if duration_s >= self.held_from_s:
+            await asyncio.Event().wait()
+        self.ns += round(duration_s * 1e9)
+        await asyncio.sleep(0)
+
+
+@pytest.fixture
+def clock() -> HandClock:
+    return HandClock()
+
+
+def news(number: int, *conditions: Condition, unit: str = "U1") -> AlarmNews:
+    """An alarm of its own that goes through some conditions."""
+    alarm, events = Alarm(AlarmIdentity(unit, f"B{number}", AlarmKind.SHAFT_X)), []
+    for step, condition in enumerate(conditions or (ALERT,)):
+        alarm, found = advance(alarm, condition, T0 + number * 10**9 + step, AlarmRule())
+        events += found
+    return AlarmNews(alarm, tuple(events))
+
+
+def route(receiver: str, changes: tuple[AlarmChange, ...] = TOLD, **wanted: object) -> Route:
+    return Route(receiver, frozenset(changes), **wanted)  # type: ignore[arg-type]
+
+
+def composer(prefix: str = "id") -> Composer:
+    """Numbers its messages in order."""
+    numbers = itertools.count()
+    plant = Plant("Itaipu", "https://padwatch.example/", {"U1": "Unit 1"})
+    return Composer(plant, lambda _: Surroundings(), lambda: f"{prefix}-{next(numbers)}")
+
+
+OpenStore = Callable[..., SqliteStore]
+
+
+@pytest.fixture
+def open_store(tmp_path: Path, clock: HandClock) -> Iterator[OpenStore]:
+    """Opens the database; the same one each time, with the receivers of the moment."""
+    opened: list[SqliteStore] = []
+
+    def open_(*routes: Route, prefix: str = "id") -> SqliteStore:
+        router = Router(routes or [route("desk")], composer(prefix), clock.now_ns)
+        opened.append(SqliteStore(tmp_path / "padwatch.sqlite3", address=router))
+        return opened[-1]
+
+    yield open_
+    for store in opened:
+        store.close()
+
+
+@dataclass
+class Request:
+    """What a web server was sent."""
+
+    line: str
+    headers: dict[str, str]
+    body: bytes
+
+    @property
+    def id(self) -> str:
+        return self.headers["padwatch-event-id"]
+
+
+Behaviour = Callable[[Request, asyncio.StreamWriter], Awaitable[None]]
+
+
+def answer(status: str, *headers: str, body: str = "") -> Behaviour:
+    """A web server that gives one answer and closes."""
+
+    async def behave(request: Request, writer: asyncio.StreamWriter) -> None:  # noqa: ARG001
+        lines = [f"HTTP/1.1 {status}", f"Content-Length: {len(body)}", *headers, "", body]
+        writer.write("\r\n".join(lines).encode())
+
+    return behave
+
+
+@dataclass
+class WebServer:
+    """A web server; each request is answered by the next behaviour, the last one for ever."""
+
+    behaviours: list[Behaviour]
+    requests: list[Request] = field(default_factory=list)
+    port: int = 0
+    scheme: str = "http"
+    came: asyncio.Condition = field(default_factory=asyncio.Condition)
+
+    @property
+    def url(self) -> str:
+        return f"{self.scheme}://127.0.0.1:{self.port}/alarms?plant=1"
+
+    async def until(self, n_requests: int) -> None:
+        async with asyncio.timeout(PATIENCE_S), self.came:
+            await self.came.wait_for(lambda: len(self.requests) >= n_requests)
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            head = (await reader.readuntil(b"\r\n\r\n")).decode().split("\r\n")
+            headers = dict(line.lower().split(": ", 1) for line in head[1:-2])
+            body = await reader.readexactly(int(headers["content-length"]))
+            request = Request(head[0], headers, body)
+            behave = self.behaviours[min(len(self.requests), len(self.behaviours) - 1)]
+            async with self.came:
+                self.requests.append(request)
+                self.came.notify_all()
+            await behave(request, writer)
+            await writer.drain()
+        except (ConnectionError, asyncio.IncompleteReadError):
+            pass
+        finally:
+            writer.close()
+
+
+@asynccontextmanager
+async def serving(
+    serve: Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
+    context: ssl.SSLContext | None = None,
+) -> AsyncIterator[int]:
+    """Serve on a free port; what still runs at the end is cancelled."""
+    tasks: set[asyncio.Task[None]] = set()
+
+    def begin(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async def one() -> None:
+            try:
+                await serve(reader, writer)
+            except ConnectionError:
+                pass  # the client has had enough
+            finally:
+                writer.close()
+
+        task = asyncio.create_task(one())
+        tasks.add(task)
+        task.add_done_callback(tasks.discard)
+
+    server = await asyncio.start_server(begin, "127.0.0.1", 0, ssl=context)
+    try:
+        yield server.sockets[0].getsockname()[1]
+    finally:
+        server.close()
+        for task in list(tasks):
+            task.cancel()
+        if tasks:
+            await asyncio.wait(list(tasks))
+        await server.wait_closed()
+
+
+ServeWeb = Callable[..., Awaitable[WebServer]]
+
+
+@pytest.fixture
+async def web() -> AsyncIterator[ServeWeb]:
+    """Starts web servers."""
+    async with AsyncExitStack() as stack:
+
+        async def start(*behaviours: Behaviour, context: ssl.SSLContext | None = None) -> WebServer:
+            server = WebServer(list(behaviours), scheme="https" if context else "http")
+            server.port = await stack.enter_async_context(serving(server.serve, context))
+            return server
+
+        yield start
+
+
+@pytest.fixture(scope="session")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A certificate of 127.0.0.1 with its key, in one file; nobody vouches for it but itself."""
+    folder = tmp_path_factory.mktemp("tls")
+    key, certificate = folder / "key.pem", folder / "certificate.pem"
+    subprocess.run(
+        [
+            *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"),
+            *("-nodes", "-keyout", key, "-out", certificate, "-days", "2", "-subj", "/CN=test"),
+            *("-addext", "subjectAltName=IP:127.0.0.1"),
+        ],
+        check=True,
+        capture_output=True,
+    )
+    both = folder / "both.pem"
+    both.write_text(key.read_text() + certificate.read_text())
+    return both
+
+
+@pytest.fixture
+def server_tls(certificate: Path) -> ssl.SSLContext:
+    """What a server needs for TLS."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificate)
+    return context
+
+
+Desk = Callable[..., Sender]
+
+
+@pytest.fixture
+def desk(clock: HandClock) -> Desk:
+    """Makes the sender of a receiver that is told by a webhook."""
+
+    def make(
+        server: WebServer, store: SqliteStore, name: str = "desk", **changes: object
+    ) -> Sender:
+        times = Timeouts(connect_s=20.0, answer_s=20.0, total_s=20.0)
+        target = WebhookTarget(server.url, timeouts=times)
+        receiver = Receiver(name, "webhook", server.url, Webhook(target, Trust(), clock))
+        return Sender(replace(receiver, **changes), store.outbox, clock)  # type: ignore[arg-type]
+
+    return make
+
+
+@asynccontextmanager
+async def at_work(*senders: Sender) -> AsyncIterator[None]:
+    """Senders that run for a while; an error of one fails the test."""
+    tasks = [asyncio.create_task(sender.run()) for sender in senders]
+    try:
+        yield
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+        for task in tasks:  # also where the test has failed: it may have failed by this
+            assert task.cancelled(), task.exception()
+
+
+async def until_settled(sender: Sender, store: SqliteStore) -> None:
+    """Wait until nothing waits for a receiver any more."""
+    async with asyncio.timeout(PATIENCE_S):
+        while store.outbox.waiting(sender.receiver.name, 1):
+            await asyncio.sleep(0.01)
+
+
+@dataclass
+class Room:
+    """Everything that a test of delivery needs."""
+
+    web: ServeWeb
+    open_store: OpenStore
+    sender: Desk
+    clock: HandClock
+    answers: Callable[..., Behaviour]
+    news: Callable[..., AlarmNews]
+    routed: Callable[..., Route]
+    running: Callable[..., AbstractAsyncContextManager[None]]
+    settled: Callable[[Sender, SqliteStore], Awaitable[None]]
+    serving: Callable[..., AbstractAsyncContextManager[int]]
+
+
+@pytest.fixture
+def room(web: ServeWeb, open_store: OpenStore, desk: Desk, clock: HandClock) -> Room:
+    return Room(web, open_store, desk, clock, answer, news, route, at_work, until_settled, serving)
