@@ -1,0 +1,135 @@
+"""A unit of a plant file that lives: its past as readings, its present as samples."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.delivery import Delivery
+from acquisition.errors import ConfigError
+from core.assessment import Assessment
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
+from core.estimators import Estimator
+from core.films.film_reading import film_reading
+from core.monitor import UnitMonitor
+from core.units import NS_PER_S
+from service.conversion import analysis_of, calibration_of, machine_of
+from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.plant import PlantFile
+from service.wiring.simulated_lives import simulated_history
+from service.wiring.simulations import scenario_of, simulated_feed
+
+DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
+CLEARANCE_UM = {"UJB": 500.0, "LJB": 615.0, "TJB": 425.0}
+UNKNOWN = BearingCondition(OperatingState.UNKNOWN, False, None)
+NOW_NS = 1_794_657_615 * NS_PER_S
+LIFE = """
+[unit.simulation]
+life_seed = 2
+held_load = 0.95
+
+[[unit.simulation.damage]]
+bearing = "UJB"
+kind = "stiffness_loss"
+size = 0.2
+after_s = 120.0
+ramp_s = 60.0
+"""
+
+
+class StoppedClock:
+    def now_ns(self) -> int:
+        return NOW_NS
+
+    def monotonic_s(self) -> float:
+        return 0.0
+
+    async def sleep(self, duration_s: float) -> None:
+        raise RuntimeError(f"nobody sleeps for {duration_s} s here")
+
+
+def plant_with(life: str, folder: Path) -> PlantFile:
+    """The demo plant, its units living."""
+    fixed = re.compile(r"\n\[unit\.simulation\]\n.*?(?=\n\[\[unit\]\]\n|\Z)", re.DOTALL)
+    text = fixed.sub(lambda _: life, DEMO.read_text())
+    for name, clearance_um in CLEARANCE_UM.items():
+        told = re.compile(rf'(id = "{name}"\n(?:[^\[]*\n)??clearance_um = )[0-9.]+')
+        text = told.sub(rf"\g<1>{clearance_um}", text)
+    path = folder / "plant.toml"
+    path.write_text(text)
+    return load_plant_file(path)
+
+
+def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path: Path) -> None:
+    plant = plant_with(LIFE.split("[[")[0], tmp_path)
+    unit = plant.unit[0]
+    feed, calibration = simulated_feed(unit, StoppedClock()), calibration_of(unit)
+    delivery = Delivery(calibration)
+    monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
+    newest: list[Assessment] = []
+    for _ in range(300):
+        for block in delivery.take(feed.advance(600)):
+            newest = monitor.ingest(block) or newest
+
+    history = simulated_history(unit, NOW_NS + 300 * NS_PER_S)
+    assert history.keys() == {"UJB", "LJB", "TJB"}
+    for assessment in newest:
+        past = history[assessment.bearing]
+        film = film_reading(assessment, UNKNOWN, Estimator.DYNAMIC)
+        for axis, value in enumerate(film.values):
+            apart = value.ln_k - past.ln_k[axis, -1]
+            assert abs(apart) < 4.0 * np.hypot(value.u_random, past.u_random[axis, -1]) + 0.01
+        assert film.eccentricity_ratio == pytest.approx(past.eccentricity_ratio[-1], abs=0.01)
+        assert film.oil_temperature_c == pytest.approx(past.oil_temperature_c[-1], abs=0.2)
+        assert film.power_mw == pytest.approx(665.0, abs=10.0)
+
+
+def test_a_unit_with_fixed_films_has_no_past() -> None:
+    assert simulated_history(load_plant_file(DEMO).unit[0], NOW_NS) == {}
+
+
+def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path) -> None:
+    odd = plant_with(LIFE.replace("life_seed = 2", "life_seed = 3"), tmp_path).unit[0]
+    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but its life is of 90\.9"):
+        simulated_feed(odd, StoppedClock())
+    living = plant_with(LIFE, tmp_path).unit[0]
+    narrow = living.bearing[0].model_copy(update={"clearance_um": 200.0})
+    unit = living.model_copy(update={"bearing": (narrow, *living.bearing[1:])})
+    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but its life is of 500"):
+        simulated_history(unit, NOW_NS)
+
+
+def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
+    simulation = plant_with(LIFE, tmp_path).unit[0].simulation
+    assert simulation is not None
+    with pytest.raises(LookupError, match="no fixed scenario"):
+        scenario_of(simulation)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("life_seed = 2", "life_seed = -1", "simulation.life_seed = -1"),
+        ("held_load = 0.95", "held_load = 0.0", "simulation.held_load = 0.0"),
+        ("held_load = 0.95", "power_mw = 300.0", "power_mw = 300.0: follows from life_seed"),
+        ("life_seed = 2\n", "speed_rpm = 92.3\n", "held_load = 0.95: needs life_seed"),
+        ("life_seed = 2\nheld_load = 0.95\n", "", "damage"),
+        ("size = 0.2", "size = 1.2", "damage[1].size = 1.2"),
+        ("size = 0.2", "size = -0.2", "damage[1].size = -0.2: must be above 0; only gains"),
+        ("size = 0.2", "size = 0.0", "damage[1].size = 0.0: must be above 0"),
+        ('"stiffness_loss"', '"rust"', "damage[1].kind = 'rust'"),
+        ('"UJB"', '"XJB"', "damage[1].bearing = 'XJB'"),
+        ("after_s = 120.0\n", "", "needs either after_s or at"),
+        ("after_s = 120.0", "after_s = 1.0\nat = 2026-01-01T00:00:00Z", "either after_s or at"),
+        ("after_s = 120.0", "at = 2026-01-01T00:00:00", "timezone"),
+    ],
+)
+def test_a_wrong_life_is_refused_with_key_and_value(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    assert old in LIFE
+    with pytest.raises(PlantFileError) as refusal:
+        plant_with(LIFE.replace(old, new, 1), tmp_path)
+    assert said in str(refusal.value)
