@@ -1,6 +1,7 @@
 """Readings as bytes: one float64 and one quality byte for each column of a layout."""
 
 import json
+import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -76,3 +77,13 @@ def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Qualit
         dot + which, reading.value
     )
     return np.nan if number is None else number, reading.quality
+
+
+def remember_layout(writer: sqlite3.Connection, layout: Layout) -> int:
+    """Number of a layout, given one within a transaction if it has none."""
+    key = layout.dumps()
+    writer.execute(
+        "INSERT INTO layout (quantities, reasons) VALUES (?, ?) ON CONFLICT DO NOTHING", key
+    )
+    found = writer.execute("SELECT id FROM layout WHERE quantities = ? AND reasons = ?", key)
+    return int(found.fetchone()[0])

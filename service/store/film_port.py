@@ -152,6 +152,27 @@ class FilmStore(Protocol):
         """Write readings of a simulation, marked as such."""
         ...
 
+    def add_past(
+        self,
+        unit: str,
+        bearing: str,
+        estimator: Estimator,
+        films: FilmHistory,
+        values: Mapping[str, FloatArray],
+    ) -> None:
+        """Write a bearing's simulated past: readings of its film, and results for its trends.
+
+        Parameters
+        ----------
+        values
+            Of its trends by column of the store's layout; (n,) each, NaN where there is no number.
+        """
+        ...
+
+    def past_end_ns(self, unit: str, bearing: str) -> int | None:
+        """Until when a bearing's past is simulated; None if none of it is."""
+        ...
+
     def history(self, query: FilmQuery) -> FilmHistory:
         """Read readings of one film, oldest first."""
         ...

@@ -40,6 +40,11 @@ FILM_TABLES = f"""
         baseline_version INTEGER,
         PRIMARY KEY (series, estimator, time_ns)
     ) STRICT, WITHOUT ROWID;
+    CREATE TABLE simulated_past (
+        series INTEGER PRIMARY KEY REFERENCES series (id),
+        start_ns INTEGER NOT NULL,
+        end_ns INTEGER NOT NULL
+    ) STRICT;
     CREATE TABLE film_decision (
         series INTEGER NOT NULL REFERENCES series (id),
         direction TEXT NOT NULL CHECK (direction IN ('x', 'y')),

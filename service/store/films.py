@@ -1,9 +1,10 @@
 """Films behind the store's interface, in SQLite."""
 
 import sqlite3
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 
+from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
 from core.baseline.response import ShaftResponse
 from core.estimators import Estimator
@@ -17,6 +18,7 @@ from service.store.baselines import (
     select_steps,
     set_response,
 )
+from service.store.codec import Layout, remember_layout
 from service.store.film_port import (
     BaselineEntry,
     FilmHistory,
@@ -26,6 +28,7 @@ from service.store.film_port import (
     StoredStep,
 )
 from service.store.film_readings import insert_film_news, select_decisions, select_film_history
+from service.store.simulated_past import insert_past, select_past_end
 
 Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
 
@@ -52,6 +55,24 @@ class SqliteFilms:
         """Write readings of a simulation, marked as such."""
         with self._writing() as writer:
             insert_film_news(writer, readings, self._series_of, Provenance.SIMULATED)
+
+    def add_past(
+        self,
+        unit: str,
+        bearing: str,
+        estimator: Estimator,
+        films: FilmHistory,
+        values: Mapping[str, FloatArray],
+    ) -> None:
+        """Write a bearing's simulated past: readings of its film, and results for its trends."""
+        with self._writing() as writer:
+            layout = remember_layout(writer, Layout.of(tuple(values)))
+            insert_past(writer, self._series_of(unit, bearing), layout, estimator, films, values)
+
+    def past_end_ns(self, unit: str, bearing: str) -> int | None:
+        """Until when a bearing's past is simulated; None if none of it is."""
+        with self._reading() as reader:
+            return select_past_end(reader, unit, bearing)
 
     def history(self, query: FilmQuery) -> FilmHistory:
         """Read readings of one film, oldest first."""

@@ -15,7 +15,7 @@ from core.quantities import CATALOGUE
 from service.origin import Origin
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.buckets import bucket_width_ns, bucketed, single_points
-from service.store.codec import Layout, columns_of
+from service.store.codec import Layout, columns_of, remember_layout
 from service.store.film_readings import insert_film_news
 from service.store.films import SqliteFilms
 from service.store.gap_reference import GapReference
@@ -201,18 +201,8 @@ class SqliteStore:
         )  # first: a file that is not ours stays as it is
         for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
             self._writer.execute(f"PRAGMA {setting}")
-        return self._remember_layout()
-
-    def _remember_layout(self) -> int:
-        key = self._layout.dumps()
         with self._transaction():
-            self._writer.execute(
-                "INSERT INTO layout (quantities, reasons) VALUES (?, ?) ON CONFLICT DO NOTHING", key
-            )
-        found = self._writer.execute(
-            "SELECT id FROM layout WHERE quantities = ? AND reasons = ?", key
-        )
-        return int(found.fetchone()[0])
+            return remember_layout(self._writer, self._layout)
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
