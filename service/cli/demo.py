@@ -5,11 +5,19 @@ from typing import Annotated
 
 import typer
 
+from acquisition.clock import SystemClock
+from acquisition.errors import AcquisitionError
 from service.cli.daq_process import RunningDaq, daq_process
-from service.cli.examples import DEMO, example_path
-from service.cli.plant_file import read_plant_file
+from service.cli.examples import DEMO, DEMO_LIFE, example_path
+from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import run_plant
 from service.cli.terminal import terminal_to_itself
+from service.demo.past import fill
+from service.origin import Origin
+from service.settings.plant import PlantFile
+from service.store.port import StoreError
+from service.wiring.simulated_lives import simulated_history
+from service.wiring.stores import open_store
 
 
 def demo(
@@ -17,16 +25,37 @@ def demo(
     data_folder: Annotated[
         Path | None, typer.Option(help="Folder of the database instead of ./var/demo.")
     ] = None,
+    plain: Annotated[
+        bool, typer.Option("--plain", help="Without a simulated past, and nothing goes wrong.")
+    ] = False,
 ) -> None:
     """Show padwatch at work on two simulated 700 MW units behind a real Modbus TCP DAQ."""
-    path = example_path(DEMO)
+    path = example_path(DEMO if plain else DEMO_LIFE)
     plant = read_plant_file(path)
     if data_folder is not None:
         service = plant.service.model_copy(update={"data_folder": str(data_folder)})
         plant = plant.model_copy(update={"service": service})
-    with terminal_to_itself(), daq_process([str(path)]) as running:
-        typer.echo("padwatch: simulated DAQs on loopback, ports " + _listed(running))
-        run_plant(running.attached(plant), port)
+    with terminal_to_itself():
+        if not plain:
+            _give_past(plant)
+        with daq_process([str(path)]) as running:
+            typer.echo("padwatch: simulated DAQs on loopback, ports " + _listed(running))
+            run_plant(running.attached(plant), port)
+
+
+def _give_past(plant: PlantFile) -> None:
+    """Fill an empty store with a simulated year; ends the command with one line if it cannot."""
+    now_ns = SystemClock().now_ns()
+    try:
+        store = open_store(plant, Origin.LIVE)
+        try:
+            lives = {unit.id: simulated_history(unit, now_ns) for unit in plant.unit}
+            if fill(store.films, plant, lives, now_ns):
+                typer.echo("padwatch: the year before this start is simulated, and marked so")
+        finally:
+            store.close()
+    except (StoreError, AcquisitionError) as error:
+        fail(f"padwatch: {error}")
 
 
 def _listed(daq: RunningDaq) -> str:

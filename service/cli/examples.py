@@ -3,6 +3,7 @@
 from pathlib import Path
 
 DEMO = "demo.toml"
+DEMO_LIFE = "demo-life.toml"
 EXAMPLE = "plant.toml"
 
 PACKAGED = Path(__file__).parent.parent / "deploy"

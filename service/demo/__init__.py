@@ -1,0 +1,1 @@
+"""The demonstration: simulated units with a past."""
