@@ -22,6 +22,7 @@ from core.history_rows import BearingRows, Place
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.back_test.file_columns import ReadingsError
 from service.back_test.periods import Learning, MachineEvent, Period, periods_of
+from service.films.learning import drifted
 
 _Bools = npt.NDArray[np.bool_]
 
@@ -62,6 +63,8 @@ class PeriodRun:
     ----------
     baseline
         None if there was no reading to learn from.
+    doubt
+        Why the service would leave the baseline to an engineer; empty if it would accept it.
     decided
         Rows from `period.learned` on.
     """
@@ -69,6 +72,7 @@ class PeriodRun:
     period: Period
     baseline: BearingBaseline | None
     decided: Mapping[str, DecisionHistory]
+    doubt: str = ""
 
     def stiffness(self, direction: str) -> QuantityBaseline | None:
         """What was learned of a film."""
@@ -122,14 +126,16 @@ def _run(
     rules: BackTestRules,
 ) -> PeriodRun:
     begin, learned, end = period.begin, period.learned, period.end
-    baseline = None
+    baseline, doubt = None, None
     if learned > begin:
         healthy = history.rows(begin, learned)
         settings = settings_for(history, rules.baseline)
         origin = _origin(place, period, rules)
         baseline = learn(healthy, is_settled[begin:learned], origin, settings)
+        limit = rules.change.alert_change
+        doubt = drifted(healthy, is_settled[begin:learned], baseline, limit)
     later, settled = history.rows(learned, end), is_settled[learned:end]
-    run = PeriodRun(period, baseline, {})
+    run = PeriodRun(period, baseline, {}, doubt or "")
     decided = {
         direction: _decided(later, settled, run.stiffness(direction), direction, rules.change)
         for direction in DIRECTIONS

@@ -1,7 +1,6 @@
 """What the alarms of one unit are put down to, by the motion of its shaft in all bearings."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
@@ -119,7 +118,6 @@ def _compared(history: StiffnessHistory, period: PeriodRun, direction: str) -> F
 def _taken(history: StiffnessHistory, rows: npt.NDArray[np.int64]) -> StiffnessHistory:
     if rows.size == len(history):
         return history
-    columns: Mapping[str, npt.NDArray[np.generic]] = {
-        field.name: getattr(history, field.name)[..., rows] for field in fields(history)
-    }
-    return StiffnessHistory(**columns)  # type: ignore[arg-type]
+    wanted = np.zeros(len(history), np.bool_)
+    wanted[rows] = True
+    return history.where(wanted)

@@ -78,6 +78,12 @@ def _take_unit(found: Found, unit: str, runs: Sequence[BearingRun], rules: BackT
     for run in runs:
         found.films += film_reports(run)
         found.baselines += [p.baseline for p in run.periods if p.baseline is not None]
+        found.doubts += [
+            f"{' '.join(run.place)} baseline {p.period.version}: {p.doubt}; the service would leave"
+            " it to an engineer"
+            for p in run.periods
+            if p.doubt
+        ]
     found.responses += [
         (unit, number, response)
         for number, response in enumerate(causes.responses, start=1)

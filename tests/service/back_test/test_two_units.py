@@ -29,6 +29,8 @@ from service.back_test.periods import DAY_NS, Learning, MachineEvent
 from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
 
+pytestmark = pytest.mark.slow
+
 START_NS = 19_723 * DAY_NS
 DAMAGED_NS = START_NS + 400 * DAY_NS
 YEAR = Learning(days=365)
@@ -183,6 +185,14 @@ def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
     assert [b.event for b in baselines["LJB"]] == ["", "new pads"]
     assert [b.event for b in baselines["UJB"]] == [""]
     assert not any(a.bearing == "LJB" and a.begin >= rfc3339(DAMAGED_NS) for a in found.alarms)
+
+
+def test_a_fault_that_was_learned_is_doubted(histories: Mapping[Place, BearingRows]) -> None:
+    place = ("U2", "LJB")
+    found = run_back_test({place: histories[place]}, BackTestRules(Learning(days=450)))
+    (doubt,) = found.doubts
+    assert doubt.startswith("U2 LJB baseline 1: x changed by -")
+    assert doubt.endswith("the service would leave it to an engineer")
 
 
 def test_an_event_of_a_bearing_without_readings_is_refused(
