@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.cell_table import CellTable
+from core.baseline.cell_table import NODES, CellTable
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid
 from core.condition.film_conditions import FilmConditions
@@ -77,8 +77,8 @@ class Deviations:
         ln of what was measured over what was learned.
     weight : (n,)
         1 for a typical reading, less for one that scatters more.
-    scatter : (n,)
-        Of readings in the cell.
+    scatter, lasting : (n,)
+        Scatter of readings in the cell: what averaging takes away, and what it does not.
     surface_std : (n,)
     """
 
@@ -86,7 +86,13 @@ class Deviations:
     deviation: FloatArray
     weight: FloatArray
     scatter: FloatArray
+    lasting: FloatArray
     surface_std: FloatArray
+
+    @property
+    def offset_std(self) -> FloatArray:
+        """(n,) uncertainty that stays, however long one averages."""
+        return np.asarray(np.sqrt(self.surface_std**2 + self.lasting**2))
 
 
 @dataclass(frozen=True)
@@ -154,7 +160,7 @@ class QuantityBaseline:
         place = self.table.find(self.grid.cells(conditions))
         place = np.where(self.is_known(conditions) & np.isfinite(value), place, -1)
         n = place.size
-        found = Deviations(place, np.full(n, np.nan), np.zeros(n), np.zeros(n), np.zeros(n))
+        found = Deviations(place, np.full(n, np.nan), *np.zeros((4, n)))
         rows = np.flatnonzero(place >= 0)
         if rows.size:
             cell = place[rows]
@@ -162,7 +168,8 @@ class QuantityBaseline:
             variance = self.table.scatter[cell] ** 2 + excess
             found.deviation[rows] = value[rows] - self.surface.at(conditions.rows(rows))
             found.weight[rows] = np.minimum(1.0, self.scatter**2 / variance)
-            found.scatter[rows] = self.table.scatter[cell]
+            found.scatter[rows] = self.table.passing[cell]
+            found.lasting[rows] = self.table.lasting[cell]
             found.surface_std[rows] = self._surface_std(conditions.rows(rows), cell)
             place[rows[found.surface_std[rows] > self.max_surface_std]] = -1
         return found
@@ -175,8 +182,8 @@ class QuantityBaseline:
         return known & np.isfinite(conditions.attitude_deg)
 
     def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
-        """(n,) that of the cell, and more where the shaft has turned away from where it was."""
-        std = self.table.surface_std[cell]
+        """(n,) between the nodes of the cell; more where the shaft has turned away meanwhile."""
+        std = self._between_nodes(conditions, cell)
         if not self.surface.shape.has_attitude:
             return std
         then = replace(conditions, attitude_deg=self.table.middle.attitude_deg[cell])
@@ -184,6 +191,23 @@ class QuantityBaseline:
         covariance = np.array(self.attitude_covariance)
         variance = std**2 + np.maximum(np.sum(turned * (covariance @ turned), axis=0), 0.0)
         return np.asarray(np.sqrt(variance))
+
+    def _between_nodes(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
+        """(n,) uncertainty of the surface, linear along both axes from node to node."""
+        i, along_e = _steps(conditions.eccentricity_ratio, self.grid.eccentricity_width)
+        j, along_t = _steps(conditions.oil_temperature_c, self.grid.temperature_width_c)
+        std = self.table.node_std
+        low, high = (
+            std[k, j, cell] * (1.0 - along_t) + std[k, j + 1, cell] * along_t for k in (i, i + 1)
+        )
+        return np.asarray(low * (1.0 - along_e) + high * along_e)
+
+
+def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Node of its cell below each x, and the way from there to the next."""
+    steps = x / width % 1.0 * (NODES - 1)
+    node = np.minimum(np.floor(steps), NODES - 2)
+    return node.astype(np.int64), steps - node
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,9 @@ from core.arrays import FloatArray
 from core.condition.cells import Cell, CellArray
 from core.condition.film_conditions import FilmConditions
 
+NODES = 3
+"""Along each axis of a cell, from edge to edge."""
+
 
 class Support(StrEnum):
     """Whether readings in a cell can be judged."""
@@ -32,8 +35,15 @@ class CellStatistics:
     scatter
         Robust standard deviation of readings about the surface; drawn towards that of all cells
         where there are few days.
+    lasting
+        Part of the scatter that averaging does not take away: what an error of the shaft's
+        position, which stays for weeks, makes of stiffness where it rises steeply.
     surface_std
         Standard uncertainty of the surface in the middle of what the cell has seen.
+    node_std
+        The same at its corners, in the middle of its sides and of itself, `NODES` by `NODES`:
+        temperatures of the low eccentricity first. Where a cell has been seen on one side only,
+        little is known of the other.
     eccentricity_ratio, oil_temperature_c, attitude_deg
         That middle; an attitude of zero where it is not known.
     """
@@ -43,7 +53,9 @@ class CellStatistics:
     n_days: int
     location: float
     scatter: float
+    lasting: float
     surface_std: float
+    node_std: tuple[float, ...]
     eccentricity_ratio: float
     oil_temperature_c: float
     attitude_deg: float
@@ -54,6 +66,12 @@ class CellStatistics:
             raise ValueError(f"n_readings = {self.n_readings}, n_days = {self.n_days}: below 0")
         if not (self.scatter > 0.0 and self.surface_std >= 0.0):
             raise ValueError(f"scatter = {self.scatter:g}, surface_std = {self.surface_std:g}")
+        if not 0.0 <= self.lasting < self.scatter:
+            raise ValueError(
+                f"lasting = {self.lasting:g} must be 0 or more and below scatter = {self.scatter:g}"
+            )
+        if len(self.node_std) != NODES**2 or not min(self.node_std) >= 0.0:
+            raise ValueError(f"node_std = {self.node_std}: not {NODES**2} numbers of 0 or more")
 
 
 @dataclass(frozen=True)
@@ -86,9 +104,20 @@ class CellTable:
         return np.array([cell.scatter for cell in self.cells], np.float64)
 
     @cached_property
-    def surface_std(self) -> FloatArray:
+    def lasting(self) -> FloatArray:
         """(n_cells,)."""
-        return np.array([cell.surface_std for cell in self.cells], np.float64)
+        return np.array([cell.lasting for cell in self.cells], np.float64)
+
+    @cached_property
+    def passing(self) -> FloatArray:
+        """(n_cells,) the part of the scatter that averaging takes away."""
+        return np.asarray(np.sqrt(self.scatter**2 - self.lasting**2))
+
+    @cached_property
+    def node_std(self) -> FloatArray:
+        """(NODES, NODES, n_cells) by eccentricity and temperature."""
+        rows = np.array([cell.node_std for cell in self.cells], np.float64)
+        return rows.reshape(-1, NODES, NODES).transpose(1, 2, 0)
 
     @cached_property
     def middle(self) -> FilmConditions:

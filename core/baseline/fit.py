@@ -3,7 +3,8 @@
 The coefficients have a prior: their second differences along each axis are normal with
 `bend_std` (P-splines as a Gaussian prior: Eilers and Marx 1996; Wood, Generalized Additive Models,
 5.4). The posterior covariance is the uncertainty of the surface; it grows where there are few
-readings, and there the surface follows its neighbours. Groups far off count as nothing (Tukey's
+readings, and there the surface follows its neighbours. Groups scatter further where the surface is
+steep, and are believed the less. Groups far off count as nothing (Tukey's
 bisquare after Huber's start), so that a fault in less than a third of the learning period, or
 single wrong days, do not bend it. Residuals of one day, and of neighbouring days, are alike: by as
 much as they are, less is known, and that is measured.
@@ -18,10 +19,11 @@ from scipy.linalg import cho_factor, cho_solve
 from core.arrays import FloatArray
 from core.baseline.groups import Groups
 from core.baseline.robust import bisquare, robust_std
+from core.baseline.slope_scatter import slope_scatter
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
 
 HUBER_LIMIT = 1.345
-HUBER_ROUNDS, BISQUARE_ROUNDS = 6, 8
+HUBER_ROUNDS, BISQUARE_ROUNDS, SLOPE_ROUNDS = 6, 8, 4
 
 SLOPE_STD = 2.0
 """Prior standard deviation of the change of ln k from knot to knot: so wide that it only decides
@@ -48,7 +50,7 @@ class Fit:
         (n_coefficients, n_coefficients)
     robust_weight : (n_groups,)
         1 for a group that fits, 0 for one that counts as nothing.
-    group_std
+    group_std : (n_groups,)
         Scatter of groups about the surface.
     clustering
         Groups that know as much as one, because they are alike.
@@ -57,7 +59,7 @@ class Fit:
     surface: Surface
     covariance: FloatArray
     robust_weight: FloatArray
-    group_std: float
+    group_std: FloatArray
     clustering: float
 
     @property
@@ -76,38 +78,76 @@ class Fit:
 
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
     """Fit a surface, and find out how much groups scatter and are alike."""
-    design, trust = shape.design(groups.conditions), _trust(groups)
-    prior = prior_precision(shape, bend_std)
     offset = float(np.median(groups.value))
-    y = groups.value - offset
-    robust, std = np.ones(y.size), max(robust_std(y), LEAST_STD)
-    for round_ in range(HUBER_ROUNDS + BISQUARE_ROUNDS):
-        coefficients, _ = _solve(design, y, trust * robust / std**2, prior)
-        standardised = (y - design @ coefficients) * np.sqrt(trust)
-        std = max(robust_std(standardised), LEAST_STD)
-        if round_ < HUBER_ROUNDS - 1:
-            robust = np.minimum(1.0, HUBER_LIMIT * std / np.maximum(np.abs(standardised), 1e-12))
-        else:
-            robust = bisquare(standardised / std)
-    clustering = _clustering(groups.day, (y - design @ coefficients) / std, trust * robust)
-    precision = trust * robust / (std**2 * clustering)
-    coefficients, factor = _solve(design, y, precision, prior)
+    points = _Points(
+        shape.design(groups.conditions), groups.value - offset, _trust(groups), groups.day
+    )
+    prior = prior_precision(shape, bend_std)
+    coefficients, robust = _resisting(points, prior)
+    for _ in range(SLOPE_ROUNDS):
+        slope = Surface(shape, offset, tuple(coefficients.tolist())).slope(groups.conditions)
+        std = _std(points, coefficients, robust, slope)
+        robust = bisquare(points.left(coefficients) / std)
+        coefficients, _ = points.solve(robust / std**2, prior)
+    clustering = _clustering(points, coefficients, robust, std)
+    coefficients, factor = points.solve(robust / (std**2 * clustering), prior)
     covariance = cho_solve((factor, True), np.eye(prior.shape[0]))
     surface = Surface(shape, offset, tuple(coefficients.tolist()))
     return Fit(surface, covariance, robust, std, clustering)
 
 
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Groups as rows of a regression; a group of few readings is trusted less."""
+
+    design: FloatArray
+    y: FloatArray
+    trust: FloatArray
+    day: npt.NDArray[np.int64]
+
+    def left(self, coefficients: FloatArray) -> FloatArray:
+        """(n,) what a surface leaves over, alike in scatter whatever the trust."""
+        return np.asarray((self.y - self.design @ coefficients) * np.sqrt(self.trust))
+
+    def solve(self, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Coefficients, and lower Cholesky factor of their precision."""
+        weighted = self.design * (self.trust * precision)[:, np.newaxis]
+        factor, _ = cho_factor(self.design.T @ weighted + prior, lower=True)
+        return cho_solve((factor, True), weighted.T @ self.y), factor
+
+
+def _resisting(points: _Points, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients and robust weights, with one scatter for all groups."""
+    robust, std = np.ones(points.y.size), max(robust_std(points.y), LEAST_STD)
+    for round_ in range(HUBER_ROUNDS + BISQUARE_ROUNDS):
+        coefficients, _ = points.solve(robust / std**2, prior)
+        left = points.left(coefficients)
+        std = max(robust_std(left), LEAST_STD)
+        if round_ < HUBER_ROUNDS - 1:
+            robust = np.minimum(1.0, HUBER_LIMIT * std / np.maximum(np.abs(left), 1e-12))
+        else:
+            robust = bisquare(left / std)
+    return coefficients, robust
+
+
+def _std(
+    points: _Points, coefficients: FloatArray, robust: FloatArray, slope: FloatArray
+) -> FloatArray:
+    """(n,) scatter of groups where the surface has a slope, from those that fit."""
+    fits = robust > 0.0
+    model = slope_scatter(slope[fits], points.left(coefficients)[fits])
+    return np.maximum(np.sqrt(model.variance(slope)), LEAST_STD)
+
+
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
     """The surface without some of the groups, all else as found with them."""
-    shape = fit.surface.shape
-    precision = is_used * _trust(groups) * fit.robust_weight / (fit.group_std**2 * fit.clustering)
-    coefficients, _ = _solve(
-        shape.design(groups.conditions),
-        groups.value - fit.surface.offset,
-        precision,
-        prior_precision(shape, bend_std),
+    shape, offset = fit.surface.shape, fit.surface.offset
+    points = _Points(
+        shape.design(groups.conditions), groups.value - offset, _trust(groups), groups.day
     )
-    return Surface(shape, fit.surface.offset, tuple(coefficients.tolist()))
+    precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
+    coefficients, _ = points.solve(precision, prior_precision(shape, bend_std))
+    return Surface(shape, offset, tuple(coefficients.tolist()))
 
 
 def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
@@ -129,20 +169,14 @@ def _trust(groups: Groups) -> FloatArray:
     return groups.n_readings / (groups.n_readings + FEW_READINGS)
 
 
-def _solve(
-    design: FloatArray, y: FloatArray, precision: FloatArray, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Coefficients, and lower Cholesky factor of their precision."""
-    weighted = design * precision[:, np.newaxis]
-    factor, _ = cho_factor(design.T @ weighted + prior, lower=True)
-    return cho_solve((factor, True), weighted.T @ y), factor
-
-
-def _clustering(day: npt.NDArray[np.int64], standardised: FloatArray, weight: FloatArray) -> float:
+def _clustering(
+    points: _Points, coefficients: FloatArray, robust: FloatArray, std: FloatArray
+) -> float:
     """How much the means over days, or over ten, scatter beyond what independent groups would."""
-    found = [1.0]
+    standardised = (points.y - points.design @ coefficients) / std
+    weight, found = points.trust * robust, [1.0]
     for span in SPANS_DAYS:
-        _, part = np.unique(day // span, return_inverse=True)
+        _, part = np.unique(points.day // span, return_inverse=True)
         total = np.bincount(part, weight * standardised)
         expected = np.bincount(part, weight**2)
         mean = total / np.sqrt(np.maximum(expected, 1e-12))

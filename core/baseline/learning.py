@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
-from core.baseline.cell_scatter import LEAST_SCATTER, with_scatter
+from core.baseline.cell_scatter import with_scatter
 from core.baseline.fit import Fit, fit_surface, surface_shape
 from core.baseline.groups import DAY_NS, Groups, group_readings
 from core.baseline.held_out import held_out_deviations
 from core.baseline.settings import BaselineSettings
+from core.baseline.slope_scatter import LEAST_SCATTER
 from core.baseline.tabulate import tabulate
 from core.baseline.time_scatter import time_scatter
 from core.baseline.watched import watched_values
@@ -101,8 +102,8 @@ def _fitted(
     deviation = held_out_deviations(time_ns, conditions, value, groups, fit, table, settings)
     counted = np.isfinite(deviation)
     deviation, place = deviation[counted], table.find(grid.cells(conditions))[counted]
-    slope = fit.surface.slope(table.middle, grid.eccentricity_width / 2.0)
-    table = with_scatter(table, slope, place, time_ns[counted] // DAY_NS, deviation)
+    slope, day = fit.surface.slope(table.middle), time_ns[counted] // DAY_NS
+    table = with_scatter(table, slope, place, day, deviation)
     scatter = table.scatter[place]
     return QuantityBaseline(
         quantity=quantity,
@@ -115,7 +116,7 @@ def _fitted(
         scatter=float(np.median(scatter)) if scatter.size else LEAST_SCATTER,
         u_random=float(np.median(u_random)),
         reading_h=settings.reading_h,
-        time_scatter=time_scatter(deviation, scatter, settings),
+        time_scatter=time_scatter(deviation, place, table, settings),
         rejected_share=float(np.mean(fit.robust_weight < REJECTED)),
     )
 

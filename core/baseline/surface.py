@@ -126,8 +126,9 @@ class Surface:
     def _coefficients(self) -> FloatArray:
         return np.array(self.coefficients)
 
-    def slope(self, conditions: FilmConditions, step: float) -> FloatArray:
-        """(n,) rise with eccentricity ratio, over a step either way."""
+    def slope(self, conditions: FilmConditions) -> FloatArray:
+        """(n,) rise with eccentricity ratio, over a quarter of a knot's width either way."""
+        step = self.shape.eccentricity.width / 4.0
         up, down = (
             self.at(replace(conditions, eccentricity_ratio=conditions.eccentricity_ratio + by))
             for by in (step, -step)

@@ -1,13 +1,14 @@
 """Filling the table of cells: what each has seen, and whether that is enough."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.cell_scatter import LEAST_SCATTER
 from core.baseline.cell_table import (
+    NODES,
     CellStatistics,
     CellTable,
     Support,
@@ -17,6 +18,7 @@ from core.baseline.cell_table import (
 from core.baseline.fit import Fit
 from core.baseline.groups import Groups, group_medians
 from core.baseline.settings import BaselineSettings
+from core.baseline.slope_scatter import LEAST_SCATTER
 from core.baseline.surface import Surface
 from core.condition.cells import Cell, CellArray, CellGrid
 from core.condition.film_conditions import FilmConditions
@@ -61,7 +63,7 @@ def tabulate(
     between |= {cell for cell in contents if _may_borrow(cell, contents, settings)}
     for cell in sorted(between - set(contents)):
         contents[cell] = _unseen(cell, enough, contents, fit.surface, settings.grid)
-    std = _surface_std(list(contents.values()), fit)
+    std, nodes = _surface_std(contents, fit), _node_std(contents, fit, settings.grid)
     return CellTable(
         tuple(
             CellStatistics(
@@ -69,8 +71,10 @@ def tabulate(
                 n_readings=content.n_readings,
                 n_days=content.n_days,
                 location=content.location,
-                scatter=max(fit.group_std, LEAST_SCATTER),  # until it is known
+                scatter=max(float(np.median(fit.group_std)), LEAST_SCATTER),  # until it is known
+                lasting=0.0,
                 surface_std=float(std[row]),
+                node_std=nodes[row],
                 eccentricity_ratio=content.eccentricity_ratio,
                 oil_temperature_c=content.oil_temperature_c,
                 attitude_deg=content.attitude_deg,
@@ -132,9 +136,29 @@ def _unseen(
     return _Contents(0, 0, height, e, oil_c, attitude_deg)
 
 
-def _surface_std(contents: list[_Contents], fit: Fit) -> FloatArray:
-    columns = [(c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents]
+def _surface_std(contents: dict[Cell, _Contents], fit: Fit) -> FloatArray:
+    """(n_cells,) in the middle of what each has seen."""
+    columns = [
+        (c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents.values()
+    ]
     return fit.std(fit.surface.shape.design(FilmConditions(*np.array(columns).T)))
+
+
+def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list[tuple[float, ...]]:
+    """Of each cell, in the order of `CellStatistics.node_std`."""
+    low = np.array([cell[:2] for cell in contents], np.float64)
+    attitude_deg = np.array([content.attitude_deg for content in contents.values()])
+    along = np.linspace(0.0, 1.0, NODES)
+    nodes = (
+        FilmConditions(
+            (low[:, 0] + along_e) * grid.eccentricity_width,
+            (low[:, 1] + along_t) * grid.temperature_width_c,
+            attitude_deg,
+        )
+        for along_e, along_t in itertools.product(along, along)
+    )
+    columns = (fit.std(fit.surface.shape.design(node)).tolist() for node in nodes)
+    return list(zip(*columns, strict=True))
 
 
 def _support_counts(

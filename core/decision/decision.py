@@ -130,7 +130,7 @@ def _compared(
     counted = Counted(
         *(
             float(column[0])
-            for column in (found.deviation, found.weight, found.scatter, found.surface_std)
+            for column in (found.deviation, found.weight, found.scatter, found.offset_std)
         )
     )
     evidence = decision.evidence.step(counted, baseline)
@@ -146,7 +146,7 @@ def _compared(
 
 def _deviation_std(counted: Counted, reading: WatchedReading, baseline: QuantityBaseline) -> float:
     excess = max(reading.u_random**2 - baseline.u_random**2, 0.0)
-    return math.sqrt(counted.scatter**2 + excess + counted.surface_std**2)
+    return math.sqrt(counted.scatter**2 + excess + counted.offset_std**2)
 
 
 def _judged(

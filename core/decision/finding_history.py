@@ -55,22 +55,22 @@ def finding_history(
     """Average the deviations of the counted rows."""
     middle = running_median(found.deviation[counted])
     weight, scatter = found.weight[counted], found.scatter[counted]
-    surface_std = found.surface_std[counted]
+    offset_std = found.offset_std[counted]
     times_h = np.array([time.time_scale_h for time in baseline.time_scatter])
     shape = (times_h.size, counted.size)
     change, significance = np.zeros(shape), np.full(shape, -1.0)
     seen_h = np.arange(1, counted.size + 1) * baseline.reading_h
     for row, time in enumerate(baseline.time_scatter):
         forgotten = forgetting(time.time_scale_h, baseline.reading_h)
-        fill, total, deviation, stray, surface = (
+        fill, total, deviation, stray, offset = (
             forgetting_sum(column, forgotten)
             for column in (
                 *(np.ones(weight.size), weight, weight * middle),
-                *(weight * scatter, weight * surface_std),
+                *(weight * scatter, weight * offset_std),
             )
         )
-        own, borrowed = time.share * (stray / total) / fill, surface / total
-        std = np.sqrt(own * own + borrowed * borrowed)
+        own, stays = time.share * (stray / total) / fill, offset / total
+        std = np.sqrt(own * own + stays * stays)
         is_full = seen_h >= time.time_scale_h
         change[row, is_full] = (deviation / total)[is_full]
         significance[row, is_full] = np.abs(change[row, is_full]) / std[is_full]

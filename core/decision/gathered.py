@@ -14,7 +14,7 @@ class Counted:
     deviation: float
     weight: float
     scatter: float
-    surface_std: float
+    offset_std: float
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,15 @@ class ScaleSums:
     ----------
     fill
         Of ones: how much of the time scale has been seen.
-    weight, deviation, scatter, surface
-        Of weights; weighted, of deviations, scatters of their cells, uncertainties of the surface.
+    weight, deviation, scatter, offset
+        Of weights; weighted, of deviations, scatters of their cells, uncertainties that stay.
     """
 
     fill: float = 0.0
     weight: float = 0.0
     deviation: float = 0.0
     scatter: float = 0.0
-    surface: float = 0.0
+    offset: float = 0.0
 
     def step(self, counted: Counted, middle: float, forgotten: float) -> "ScaleSums":
         """Take in one reading."""
@@ -42,7 +42,7 @@ class ScaleSums:
             forgetting_step(self.weight, counted.weight, forgotten),
             forgetting_step(self.deviation, counted.weight * middle, forgotten),
             forgetting_step(self.scatter, counted.weight * counted.scatter, forgotten),
-            forgetting_step(self.surface, counted.weight * counted.surface_std, forgotten),
+            forgetting_step(self.offset, counted.weight * counted.offset_std, forgotten),
         )
 
 
@@ -121,10 +121,10 @@ def _forgotten(time: TimeScatter, baseline: QuantityBaseline) -> float:
 
 
 def _finding(sums: ScaleSums, time: TimeScatter) -> Finding:
-    surface = sums.surface / sums.weight
-    # half-filled means stray further; the surface's error stays, however long one averages
+    offset = sums.offset / sums.weight
+    # half-filled means stray further
     own = time.share * (sums.scatter / sums.weight) / sums.fill
-    std = math.sqrt(own * own + surface * surface)
+    std = math.sqrt(own * own + offset * offset)
     return Finding(time.time_scale_h, sums.deviation / sums.weight, std)
 
 

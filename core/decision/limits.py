@@ -41,7 +41,7 @@ class ChangeLimits:
     alert_change: float = 0.04
     danger_change: float = 0.15
     deadband: float = 0.01
-    significance: float = 6.5
+    significance: float = 6.0
     significance_fall: float = 0.7
     min_evidence_h: float = 4.0
     on_delay_h: float = 1.0
