@@ -1,5 +1,6 @@
 """Any sequence of conditions, people and restarts, against a model that only keeps lists."""
 
+import os
 from dataclasses import replace
 
 from hypothesis import settings
@@ -21,6 +22,7 @@ from core.alarms.life_cycle import advance, interrupted, restored
 from core.alarms.operation import (
     Acknowledge,
     ActionRefusedError,
+    Comment,
     ReturnToService,
     Shelve,
     TakeOutOfService,
@@ -120,6 +122,12 @@ class LifeCycle(RuleBasedStateMachine):
         else:
             assert self.list_as_seen == newest
             self.open.clear()
+
+    @rule()
+    def somebody_comments(self) -> None:
+        before = self.alarm
+        self._operate(Comment("A. Name", "told the shift engineer"))
+        assert self.alarm == replace(before, n_events=before.n_events + 1)
 
     @rule(duration=st.integers(1, 20))
     def the_operator_shelves(self, duration: int) -> None:
@@ -233,7 +241,11 @@ class LifeCycle(RuleBasedStateMachine):
             self.open.add(self.n_occurrences)
 
 
-LifeCycle.TestCase.settings = settings(max_examples=500, stateful_step_count=40, deadline=None)
+LifeCycle.TestCase.settings = settings(
+    max_examples=int(os.environ.get("PADWATCH_SEQUENCES", "500")),
+    stateful_step_count=40,
+    deadline=None,
+)
 TestLifeCycle = LifeCycle.TestCase
 
 

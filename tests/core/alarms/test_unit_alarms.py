@@ -64,7 +64,9 @@ def assessed(**readings: Reading) -> Any:
     all_: Mapping[str, Reading] = {f"order1_{p}_um_pk": Reading(30.0) for p in places} | {
         f"order1_{name}_um_pk": reading for name, reading in readings.items()
     }
-    return SimpleNamespace(unit="U1", bearing="UJB", time_ns=5 * SECOND, readings=all_, condition=None)
+    return SimpleNamespace(
+        unit="U1", bearing="UJB", time_ns=5 * SECOND, readings=all_, condition=None
+    )
 
 
 def told(news: Sequence[Any]) -> list[tuple[str, str]]:

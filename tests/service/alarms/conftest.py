@@ -1,0 +1,127 @@
+"""What the alarms of a running service stand on in tests: a host's clock, and a failing disk."""
+
+import logging
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import structlog
+
+from core.alarms.alarm import Alarm
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+
+SECOND = 1_000_000_000
+
+
+class Host:
+    """Time that only steps forward when asked to."""
+
+    def __init__(self) -> None:
+        self.ns = 1_000 * SECOND
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def monotonic_s(self) -> float:
+        return self.ns / SECOND
+
+    async def sleep(self, duration_s: float) -> None:
+        self.ns += round(duration_s * SECOND)
+
+
+class UncertainStore:
+    """A store that may refuse, or write and not say so."""
+
+    def __init__(self, store: SqliteStore) -> None:
+        self._store = store
+        self.fate = "writes"
+
+    def append(self, *found: Any) -> None:
+        if self.fate == "refuses":
+            raise StoreError("no space left on device")
+        self._store.append(*found)
+        if self.fate == "writes_silently":
+            raise StoreError("the answer got lost")
+
+
+class Expected:
+    """What is to be known of one alarm, by rules of its own."""
+
+    def __init__(self, is_latching: bool) -> None:
+        self.is_latching = is_latching
+        self.standing = 0  # level of the condition that was known last
+        self.level = 0
+        self.occurrence = 0
+        self.is_seen = True
+        self.hidden: dict[str, int | None] = {}
+
+    def finds(self, level: int) -> None:
+        was_latched, before = self.level > self.standing, self.standing
+        held, self.standing = self.level, level
+        if level > before and (was_latched or level > held):
+            self.occurrence += 1
+            self.is_seen = False
+        self.level = max(level, held) if self.is_latching else level
+
+    def hide(self, why: str, until: int | None = None) -> None:
+        self.hidden[why] = until
+
+    def show(self, why: str) -> None:
+        if why in self.hidden:
+            del self.hidden[why]
+            self.is_seen = self.is_seen and not self.level
+
+    def restarts(self) -> None:
+        self.standing = 0 if self.level > self.standing else self.level
+
+    def copied(self) -> "Expected":
+        twin = Expected(self.is_latching)
+        twin.__dict__.update(self.__dict__ | {"hidden": dict(self.hidden)})
+        return twin
+
+    def agrees_with(self, alarm: Alarm) -> bool:
+        hidden = {
+            *(["shelf"] if alarm.shelf else []),
+            *(["outage"] if alarm.outage else []),
+            *(["design"] if alarm.suppressed_by is not None else []),
+        }
+        return (self.level, self.occurrence, self.is_seen, set(self.hidden)) == (
+            *(int(alarm.level or 0), alarm.occurrence, alarm.is_acknowledged, hidden),
+        )
+
+
+@pytest.fixture
+def host() -> Host:
+    return Host()
+
+
+@pytest.fixture
+def tools() -> SimpleNamespace:
+    """What a life is led with: a store that may fail, and what is to be known of an alarm."""
+    return SimpleNamespace(uncertain=UncertainStore, expected=Expected)
+
+
+@pytest.fixture
+def _quiet() -> Iterator[None]:
+    """Thousands of lives would fill the log."""
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.CRITICAL))
+    yield
+    structlog.reset_defaults()
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Callable[[], Path]:
+    """Makes a new, empty database in the place of the one before."""
+    empty, path = tmp_path / "empty.sqlite3", tmp_path / "life.sqlite3"
+    SqliteStore(empty).close()
+
+    def make() -> Path:
+        for left in tmp_path.glob("life.sqlite3*"):
+            left.unlink()
+        path.write_bytes(empty.read_bytes())
+        return path
+
+    return make

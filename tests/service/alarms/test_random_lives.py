@@ -1,0 +1,284 @@
+"""Random sequences of alarm events, acknowledgements, shelves, failing disks and restarts.
+
+Each sequence is checked after every step against a model that knows nothing of the life cycle's
+code, and at its end against the events in the database. ``PADWATCH_SEQUENCES=10000`` leads as many
+lives as padwatch's figures are given for.
+"""
+
+import asyncio
+import os
+import random
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.alarms.alarm import AlarmLevel, AlarmState, Condition, unknown
+from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.alarms.operation import (
+    Acknowledge,
+    Action,
+    ActionRefusedError,
+    Comment,
+    Reset,
+    ReturnToService,
+    Shelve,
+    TakeOutOfService,
+    Unshelve,
+)
+from core.alarms.rules import UnitRules, rule_of
+from core.alarms.unit_alarms import UnitAlarms
+from core.blocks import SampleBlock
+from core.machine import Bearing, Channel, Measurand, Unit
+from core.quality import GOOD, Reason, bad
+from service.alarms.engine import AlarmEngine
+from service.live import LiveView
+from service.recorder import Findings, Recorder
+from service.store.port import AlarmQuery
+from service.store.sqlite import SqliteStore
+
+N_LIVES = int(os.environ.get("PADWATCH_SEQUENCES", "150"))
+N_STEPS = 40
+
+SECOND = 1_000_000_000
+IDS = ("sx", "sy", "bx", "by")
+UNIT = Unit(
+    "U1",
+    60.0,
+    100.0,
+    tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
+    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0)),),
+)
+FILMS = ("U1:UJB:stiffness_x", "U1:UJB:stiffness_y")
+PROBE, LINK = "U1:sx:channel_not_ok", "U1:link:link_lost"
+ALARMS = (*FILMS, PROBE, LINK)
+
+
+class Life:
+    """A unit's alarms with their store, and a random sequence of what may happen to them."""
+
+    def __init__(self, path: Path, seed: int, host: Any, tools: Any) -> None:
+        self.random = random.Random(seed)  # noqa: S311  reproducible on purpose
+        self.path, self.host, self.tools = path, host, tools
+        self.is_latching = self.random.random() < 0.4
+        self.rules = UnitRules(
+            channel=rule_of(0.0, 0.0),
+            films=rule_of(0.0, 0.0, is_latching=self.is_latching),
+            clock=None,
+            link=rule_of(0.0, 0.0),
+        )
+        self.store: SqliteStore | None = None
+        self.expected = {id_: tools.expected(self.is_latching and id_ in FILMS) for id_ in ALARMS}
+        self.durable = {id_: each.copied() for id_, each in self.expected.items()}
+        self.connected = False
+        self.n_blocks = 0
+        self._start()
+
+    def _start(self) -> None:
+        if self.store is not None:
+            self.store.close()
+        self.store = SqliteStore(self.path)
+        self.uncertain = self.tools.uncertain(self.store)
+        live = LiveView(["U1"], self.host, 30.0)
+        self.recorder = Recorder(self.uncertain, live, self.host)
+        units = {"U1": UnitAlarms(UNIT, self.rules)}
+        self.engine = AlarmEngine(units, self.recorder.put, self.host)
+        self.engine.restore(self.store.alarms())
+        self.connected = False
+
+    async def lead(self, n_steps: int) -> None:
+        steps: list[tuple[Callable[[], Any], int]] = [
+            (self.samples_arrive, 8),
+            (self.link_changes, 2),
+            (self.time_passes, 3),
+            (self.operator_acts, 7),
+            (self.written, 4),
+            (self.written_while_more_arrives, 2),
+            (self.written_without_an_answer, 2),
+            (self.refused, 2),
+            (self.crashes, 2),
+            (self.stops_in_order, 1),
+        ]
+        todo = self.random.choices(*zip(*steps, strict=True), k=n_steps)
+        for step in todo:
+            done = step()
+            if done is not None:
+                await done
+            self.check(step.__name__)
+        await self.stops_in_order()
+        self.check("the end")
+        self.check_history()
+
+    def samples_arrive(self) -> None:
+        self.n_blocks += self.random.choice([1, 1, 1, 2])  # some get lost
+        is_bad = self.random.random() < 0.4
+        probe = bad(Reason.SENSOR_FAILURE) if is_bad else GOOD
+        block = SampleBlock(
+            unit="U1",
+            epoch=1,
+            first_index=self.n_blocks * 100,
+            start_ns=self.n_blocks * SECOND,
+            rate_hz=100.0,
+            samples=np.zeros((4, 100), dtype=np.float32),
+            channel_quality=(probe, GOOD, GOOD, GOOD),
+            slow={},
+        )
+        films = {id_: self._film(id_) for id_ in FILMS if self.random.random() < 0.7}
+        self._put(self.engine.take(block, [], films))
+        self.expected[PROBE].finds(1 if is_bad else 0)
+
+    def _film(self, id_: str) -> Condition:
+        expected = self.expected[id_]
+        verdict = self.random.choice(["normal", "normal", "alert", "danger", "unknown", "stands"])
+        if verdict == "stands":
+            expected.hide("design")
+            return unknown("standstill", "standstill")
+        if verdict == "unknown":
+            expected.show("design")
+            return unknown("no_baseline")
+        level = {"normal": None, "alert": AlarmLevel.ALERT, "danger": AlarmLevel.DANGER}[verdict]
+        expected.finds(int(level or 0))
+        expected.show("design")
+        return Condition(level, value=0.1 * (level or 0), limit=0.1)
+
+    def _put(self, news: Any) -> None:
+        if news:
+            self.recorder.put(Findings(alarms=news))
+
+    def link_changes(self) -> None:
+        self.connected = self.random.random() < 0.5
+        self.engine.link("U1", self.connected, None if self.connected else "no route")
+        self.expected[LINK].finds(0 if self.connected else 1)
+
+    def time_passes(self) -> None:
+        self.host.ns += self.random.randint(0, 10) * SECOND
+        self.engine.tick()
+        self.expected[LINK].finds(0 if self.connected else 1)
+        for expected in self.expected.values():
+            until = expected.hidden.get("shelf")
+            if until is not None and until <= self.host.ns:
+                expected.show("shelf")
+
+    def operator_acts(self) -> None:
+        id_ = self.random.choice(ALARMS)
+        expected = self.expected[id_]
+        until = self.host.ns + self.random.randint(1, 20) * SECOND
+        occurrence = max(0, expected.occurrence - self.random.choice([0, 0, 0, 1]))
+        is_latched = expected.level > expected.standing
+        actions: list[tuple[Action, bool, Callable[[], None]]] = [
+            (
+                Acknowledge("A. Name", occurrence),
+                occurrence == expected.occurrence,
+                lambda: setattr(expected, "is_seen", True),
+            ),
+            (Shelve("A. Name", "known", until), True, lambda: expected.hide("shelf", until)),
+            (Unshelve("A. Name"), True, lambda: expected.show("shelf")),
+            (TakeOutOfService("B. Name", "overhaul"), True, lambda: expected.hide("outage")),
+            (ReturnToService("B. Name"), True, lambda: expected.show("outage")),
+            (Comment("A. Name", "told the shift engineer"), True, lambda: None),
+            (
+                Reset("A. Name"),
+                is_latched and expected.is_seen,
+                lambda: setattr(expected, "level", expected.standing),
+            ),
+        ]
+        weights = [6, 2, 2, 1, 2, 1, 3]
+        [(action, is_allowed, outcome)] = self.random.choices(actions, weights)
+        try:
+            self.engine.operate(id_, action)
+        except ActionRefusedError:
+            assert not is_allowed, action
+        else:
+            assert is_allowed, action
+            outcome()
+
+    async def written(self) -> None:
+        await self._write("writes")
+
+    async def written_without_an_answer(self) -> None:
+        """The append is on the disk, but its acknowledgement never comes."""
+        await self._write("writes_silently")
+
+    async def written_while_more_arrives(self) -> None:
+        """What comes while the disk is busy is not taken for written."""
+        self.uncertain.fate = "writes"
+        durable = {id_: each.copied() for id_, each in self.expected.items()}
+        writing = asyncio.create_task(self.recorder.flush())
+        await asyncio.sleep(0)
+        self.samples_arrive()
+        await writing
+        self.durable = durable
+
+    async def refused(self) -> None:
+        await self._write("refuses")
+
+    async def _write(self, fate: str) -> None:
+        self.uncertain.fate = fate
+        await self.recorder.flush()
+        if fate != "refuses":
+            self.durable = {id_: each.copied() for id_, each in self.expected.items()}
+
+    def crashes(self) -> None:
+        """What was not on the disk is gone; everything that was is there."""
+        self.expected = {id_: each.copied() for id_, each in self.durable.items()}
+        for each in self.expected.values():
+            each.restarts()
+        self._start()
+
+    async def stops_in_order(self) -> None:
+        await self.written()
+        self.crashes()
+
+    def check(self, after: str) -> None:
+        for alarm in self.engine.alarms:
+            expected = self.expected.get(alarm.identity.id)
+            if expected is not None:
+                assert expected.agrees_with(alarm), (after, alarm, expected.__dict__)
+
+    def check_history(self) -> None:
+        """No event lost, none doubled: numbers and states of each alarm hang together."""
+        assert self.store is not None
+        for id_ in ALARMS:
+            query = AlarmQuery(alarm=id_, limit=10_000)
+            events = [stored.event for stored in reversed(self.store.alarm_events(query))]
+            assert [e.number for e in events] == list(range(1, len(events) + 1))
+            states = [AlarmState.NORMAL, *(e.state_after for e in events)]
+            assert [e.state_before for e in events] == states[:-1]
+            announced = [e.occurrence for e in events if e.change in ANNOUNCED]
+            assert announced == list(range(1, self.durable[id_].occurrence + 1))
+            assert not _latched_twice(events)
+        stored = {alarm.identity.id: alarm for alarm in self.store.alarms()}
+        for id_, expected in self.durable.items():
+            assert id_ in stored or expected.occurrence == 0
+            assert id_ not in stored or expected.agrees_with(stored[id_])
+
+    def close(self) -> None:
+        if self.store is not None:
+            self.store.close()
+
+
+def _latched_twice(events: Sequence[AlarmEvent]) -> bool:
+    """Whether the same latch was told twice."""
+    latches = [e.change for e in events if e.change in (*ANNOUNCED, *LATCHES)]
+    pairs = pairwise(latches)
+    return (AlarmChange.LATCHED, AlarmChange.LATCHED) in pairs
+
+
+LATCHES = (AlarmChange.LATCHED, AlarmChange.RESET)
+
+
+@pytest.mark.usefixtures("_quiet")
+async def test_no_alarm_is_lost_and_none_is_doubled(
+    database: Callable[[], Path], host: Any, tools: Any
+) -> None:
+    for seed in range(N_LIVES):
+        life = Life(database(), seed, host, tools)
+        try:
+            await life.lead(N_STEPS)
+        except AssertionError as error:
+            raise AssertionError(f"life {seed}: {error}") from error
+        finally:
+            life.close()
