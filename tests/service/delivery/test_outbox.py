@@ -143,8 +143,13 @@ async def test_the_end_of_the_service_waits_for_a_delivery_to_be_noted(room: Any
         finish(*done)
 
     store.outbox.finish = slow_finish
-    async with room.running(room.sender(server, store)):
-        await noting.wait()
-        loop.call_soon(may_note.set)  # comes to pass while the sender is being stopped
+    sending = asyncio.create_task(room.sender(server, store).run())
+    await noting.wait()
+    sending.cancel()
+    for _ in range(20):
+        await asyncio.sleep(0)
+    assert not sending.done()
+    may_note.set()
+    await asyncio.wait([sending])
 
     assert store.outbox.waiting("desk", 9) == []

@@ -5,6 +5,7 @@ import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { CURRENT_LIMIT_S, moment, secondsBetween } from "../live.js";
+import { deliveryView } from "../parts/delivery.js";
 import { mark } from "../parts/mark.js";
 import { poll } from "../poll.js";
 import { actorField } from "./alarm_actor.js";
@@ -26,7 +27,8 @@ export function alarmsPage(main) {
   const unjudged = unjudgedView();
   const history = historyTable();
   const head = element("div", { class: "alarms-head" }, element("h1", {}, "Alarms"), state.node, actor.node);
-  main.append(head, listed.node, unjudged.node, hidden.node, history.node);
+  const delivery = deliveryView();
+  main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, history.node);
   let heard = null;
   let failure = null;
 
@@ -60,13 +62,23 @@ export function alarmsPage(main) {
     }
   }
 
+  async function askDelivery(signal) {
+    try {
+      delivery.draw(await ask(["delivery"], [], signal));
+    } catch (error) {
+      if (!signal.aborted) delivery.fail(error.message);
+    }
+  }
+
   const lists = poll(askList, () => LIST_PERIOD_S);
   const histories = poll(askHistory, () => HISTORY_PERIOD_S);
+  const deliveries = poll(askDelivery, () => HISTORY_PERIOD_S);
   return {
     draw,
     close() {
       lists.stop();
       histories.stop();
+      deliveries.stop();
     },
   };
 }
