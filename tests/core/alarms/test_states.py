@@ -1,0 +1,160 @@
+"""Alarms of one unit through its operating states."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.alarms.alarm import AlarmState
+from core.alarms.limits import Limits
+from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.state_limits import AT_SPEED
+from core.alarms.unit_alarms import UnitAlarms
+from core.alarms.vector_change import OrderVector, VectorReference
+from core.blocks import SampleBlock
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
+from core.machine import Bearing, Channel, Measurand, Unit
+from core.quality import GOOD, Reading
+from core.quantities import CATALOGUE
+
+SECOND = 1_000_000_000
+IDS = ("sx", "sy", "bx", "by")
+UNIT = Unit(
+    "U1",
+    60.0,
+    100.0,
+    tuple(Channel(id_, Measurand.GAP_UM) for id_ in IDS),
+    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0), oil_temperature="oil"),),
+)
+AT_ONCE = rule_of(0.0, 0.0)
+FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
+RUN_DOWN, STANDING = OperatingState.RUN_DOWN, OperatingState.STANDSTILL
+SPAN = "U1:UJB:overall_shaft_x"
+
+
+def rule(limits: Limits, states: frozenset[OperatingState] = AT_SPEED) -> LimitRule:
+    return LimitRule(limits, AT_ONCE, states)
+
+
+RULES = UnitRules(
+    bearings={
+        "UJB": BearingRules(
+            shaft_overall=rule(Limits(200.0)),
+            eccentricity=rule(Limits(0.7, 0.9)),
+            gap=rule(Limits(2400.0, alert_below=600.0)),
+            shaft_change=rule(Limits(30.0)),
+            oil_temperature=rule(Limits(60.0), frozenset({FULL})),
+        )
+    },
+)
+
+
+class Machine:
+    """A unit with its alarms, and everything within limits unless said otherwise."""
+
+    def __init__(self) -> None:
+        reference = VectorReference("U1", "UJB", FULL, {"shaft_x": OrderVector(50.0)})
+        self.alarms = UnitAlarms(UNIT, RULES, references=[reference])
+        self.n = 0
+
+    def runs(self, state: OperatingState | None, oil_c: float = 45.0, **found: float) -> list[str]:
+        self.n += 1
+        readings = {quantity.name: Reading(1.0) for quantity in CATALOGUE}
+        readings |= {"gap_x_um": Reading(1500.0), "gap_y_um": Reading(1500.0)}
+        readings |= {"eccentricity_ratio": Reading(0.3), "order1_shaft_x_um_pk": Reading(50.0)}
+        readings |= {name: Reading(value) for name, value in found.items()}
+        condition = state if state is None else BearingCondition(state, False, None)
+        assessment: Any = SimpleNamespace(
+            unit="U1",
+            bearing="UJB",
+            time_ns=self.n * SECOND,
+            readings=readings,
+            condition=condition,
+        )
+        block = SampleBlock(
+            "U1",
+            1,
+            self.n * 100,
+            self.n * SECOND,
+            100.0,
+            np.zeros((4, 100), dtype=np.float32),
+            (GOOD,) * 4,
+            {"oil": Reading(oil_c)},
+        )
+        news = self.alarms.take(block, [assessment], 0)
+        return [f"{e.identity.kind} {e.change}" for told in news for e in told.events]
+
+    def state(self, id_: str) -> AlarmState:
+        return self.alarms.alarm(id_).state
+
+
+@pytest.fixture
+def machine() -> Machine:
+    return Machine()
+
+
+@pytest.mark.parametrize(
+    ("found", "raised"),
+    [
+        ({"overall_shaft_x_um_pp": 210.0}, "overall_shaft_x raised"),
+        ({"eccentricity_ratio": 0.95}, "eccentricity_ratio raised"),
+        ({"gap_y_um": 590.0}, "gap_y raised"),
+        ({"gap_x_um": 2410.0}, "gap_x raised"),
+        ({"order1_shaft_x_um_pk": 90.0}, "order1_change_shaft_x raised"),
+    ],
+)
+def test_each_measurement_has_its_alarm(
+    machine: Machine, found: dict[str, float], raised: str
+) -> None:
+    assert machine.runs(FULL) == []
+    assert machine.runs(FULL, **found) == [raised]
+
+
+def test_a_machine_that_runs_down_shakes_without_an_alarm(machine: Machine) -> None:
+    machine.runs(FULL)
+    shaking = machine.runs(RUN_DOWN, overall_shaft_x_um_pp=900.0)
+
+    assert not [words for words in shaking if words.endswith("raised")]
+    assert "overall_shaft_x suppressed" in shaking
+    assert machine.alarms.alarm(SPAN).suppressed_by == "run_down"
+
+
+def test_an_alarm_that_a_stop_hides_has_not_returned_and_is_told_again(machine: Machine) -> None:
+    machine.runs(FULL, overall_shaft_x_um_pp=210.0)
+    told = [w for state in (RUN_DOWN, STANDING, STANDING) for w in machine.runs(state)]
+    assert machine.state(SPAN) is AlarmState.SUPPRESSED
+    assert machine.alarms.alarm(SPAN).level is not None
+
+    back = machine.runs(FULL, overall_shaft_x_um_pp=210.0)
+
+    assert not any("returned" in words for words in [*told, *back])
+    assert "overall_shaft_x unsuppressed" in back
+    assert machine.state(SPAN) is AlarmState.UNACKNOWLEDGED
+
+
+def test_where_the_state_is_not_known_nothing_is_suppressed(machine: Machine) -> None:
+    assert machine.runs(None, overall_shaft_x_um_pp=210.0) == ["overall_shaft_x raised"]
+    assert not [a for a in machine.alarms.alarms if a.suppressed_by is not None]
+
+
+def test_slow_channels_share_the_state_that_results_have_shown(machine: Machine) -> None:
+    assert "oil_temperature raised" not in machine.runs(PART, oil_c=65.0)
+    assert "oil_temperature raised" in machine.runs(FULL, oil_c=65.0)
+
+
+def test_a_vector_has_a_reference_in_the_state_it_was_taken_in(machine: Machine) -> None:
+    machine.runs(PART, order1_shaft_x_um_pk=90.0)
+    alarm = machine.alarms.alarm("U1:UJB:order1_change_shaft_x")
+    assert (alarm.condition.is_known, alarm.condition.reason) == (False, "no_reference")
+
+    machine.alarms.refer_to(VectorReference("U1", "UJB", PART, {"shaft_x": OrderVector(50.0)}))
+    assert machine.runs(PART, order1_shaft_x_um_pk=90.0) == ["order1_change_shaft_x raised"]
+
+
+def test_an_alarm_within_limits_shows_what_was_found_last(machine: Machine) -> None:
+    machine.runs(FULL, overall_shaft_x_um_pp=120.0)
+    machine.runs(FULL, overall_shaft_x_um_pp=130.0)
+
+    assert machine.alarms.alarm(SPAN).condition.value == 130.0

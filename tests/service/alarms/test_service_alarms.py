@@ -1,0 +1,184 @@
+"""Alarms about the store and the service, from what happens to them to what is stored of them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.account import SampleAccount
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind, AlarmLevel
+from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.operation import Acknowledge
+from service.alarms.engine import AlarmEngine
+from service.alarms.health import ServiceHealth
+from service.alarms.service_alarms import ServiceAlarms
+from service.alarms.service_rules import ServiceRules
+from service.live import LiveView
+from service.recorder import Findings, Recorder
+from service.store.port import AlarmQuery
+from service.store.sqlite import SqliteStore
+
+SECOND = 1_000_000_000
+ALERT, DANGER = AlarmLevel
+NOT_STORED, LOST = "plant:store:results_not_stored", "plant:store:results_lost"
+WAITING, LATE = "plant:service:blocks_waiting", "plant:service:analysis_late"
+
+
+class Watched:
+    """The service's own alarms, and a health that tests set."""
+
+    def __init__(self, host: Any) -> None:
+        self.host, self.health = host, ServiceHealth()
+        self.alarms = ServiceAlarms(["U1"], ServiceRules(), lambda: self.health)
+
+    def after(self, seconds: float, **health: Any) -> list[str]:
+        self.health = ServiceHealth(**health)
+        self.host.ns += round(seconds * SECOND)
+        news = self.alarms.tick(self.host.ns)
+        return [f"{e.identity.id} {e.change}" for told in news for e in told.events]
+
+
+@pytest.fixture
+def watched(host: Any) -> Watched:
+    return Watched(host)
+
+
+def test_a_service_in_good_health_says_nothing(watched: Watched) -> None:
+    accounts = {"U1": SampleAccount(n_stored=10)}
+    assert [watched.after(0.5, accounts=accounts) for _ in range(100)] == [[]] * 100
+    assert {alarm.identity.unit for alarm in watched.alarms.alarms} == {PLANT}
+    assert all(alarm.condition.is_known for alarm in watched.alarms.alarms)
+
+
+def test_a_store_that_takes_nothing_is_an_alarm_that_says_why(watched: Watched) -> None:
+    assert watched.after(0.5, store_behind_s=9.0, store_error="disk full") == []
+    assert watched.after(0.5, store_behind_s=11.0, store_error="disk full") == [
+        f"{NOT_STORED} raised"
+    ]
+    assert watched.alarms.alarm(NOT_STORED).condition.reason == "disk full"
+    assert watched.after(0.5) == [f"{NOT_STORED} returned"]
+
+
+def test_a_disk_that_does_not_answer_at_all_is_one_as_well(watched: Watched) -> None:
+    watched.after(0.5, store_behind_s=60.0)
+    assert "does not answer" in watched.alarms.alarm(NOT_STORED).condition.reason
+
+
+def test_results_that_are_given_up_are_a_danger_for_ten_minutes(watched: Watched) -> None:
+    assert watched.after(0.5, n_unstored=3) == [f"{LOST} raised"]
+    alarm = watched.alarms.alarm(LOST)
+    assert (alarm.level, alarm.condition.value) == (DANGER, 3.0)
+    assert [watched.after(60.0, n_unstored=3) for _ in range(10)] == [[]] * 10
+    assert watched.after(60.0, n_unstored=3) == [f"{LOST} returned"]
+
+
+def test_a_queue_that_fills_is_an_alert_and_then_a_danger(watched: Watched) -> None:
+    watched.after(0.0, waiting_share=0.6)
+    assert watched.after(6.0, waiting_share=0.6) == [f"{WAITING} raised"]
+    watched.after(0.0, waiting_share=0.95)
+    assert watched.after(6.0, waiting_share=0.95) == [f"{WAITING} escalated"]
+
+
+def test_an_analysis_that_falls_behind_is_an_alarm(watched: Watched) -> None:
+    watched.after(0.0, analysis_delay_s=6.0)
+    assert watched.after(6.0, analysis_delay_s=6.0) == [f"{LATE} raised"]
+
+
+def test_captures_that_cannot_be_written_are_an_alarm(watched: Watched) -> None:
+    raised = watched.after(0.5, captures_error="no space left")
+    assert raised == ["plant:captures:captures_not_kept raised"]
+
+
+def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
+    def account(n_stored: int, n_gap: int) -> dict[str, Any]:
+        return {"accounts": {"U1": SampleAccount(n_stored=n_stored, n_gap=n_gap)}}
+
+    watched.after(0.5, **account(60_000, 30_000))  # lost before anybody looked
+    assert watched.after(100.0, **account(120_000, 32_000)) == []
+    assert watched.after(100.0, **account(180_000, 40_000)) == ["plant:U1:samples_lost raised"]
+    later = [watched.after(100.0, **account(180_000 + n * 60_000, 40_000)) for n in range(1, 8)]
+    assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
+
+
+@pytest.fixture
+def stored(
+    database: Callable[[], Path], host: Any, tools: Any
+) -> Callable[[], tuple[Any, Any, Any]]:
+    """An engine, its recorder and its store, begun anew on the same file each time."""
+    path = database()
+
+    def begin() -> tuple[AlarmEngine, Recorder, Any]:
+        store = SqliteStore(path)
+        uncertain = tools.uncertain(store)
+        live = LiveView([], host, 30.0)
+        recorder = Recorder(uncertain, live, host)
+
+        def look() -> ServiceHealth:
+            return ServiceHealth(live.store_error, recorder.behind_s)
+
+        service = ServiceAlarms([], ServiceRules(), look)
+        engine = AlarmEngine({}, recorder.put, host, service=service)
+        engine.restore(store.alarms())
+        return engine, recorder, (store, uncertain)
+
+    return begin
+
+
+async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_as_soon_as_it_works(
+    stored: Callable[[], tuple[Any, Any, Any]], host: Any
+) -> None:
+    engine, recorder, (store, uncertain) = stored()
+    uncertain.fate = "refuses"
+    other = Alarm(AlarmIdentity("U9", "sx", AlarmKind.CHANNEL_NOT_OK))
+    recorder.put(_findings(other))  # something that waits
+    for _ in range(15):
+        await recorder.flush()
+        host.ns += SECOND
+        engine.tick()
+    alarm = engine.alarm(NOT_STORED)
+    engine.operate(NOT_STORED, Acknowledge("A. Name", alarm.occurrence))
+    await recorder.flush()
+    assert (alarm.level, alarm.condition.reason) == (ALERT, "no space left on device")
+    assert store.alarm_events(AlarmQuery(alarm=NOT_STORED)) == []
+
+    uncertain.fate = "writes"
+    await recorder.flush()
+    host.ns += SECOND
+    engine.tick()
+    await recorder.flush()
+
+    events = [each.event.change for each in store.alarm_events(AlarmQuery(alarm=NOT_STORED))]
+    assert events[::-1] == ["raised", "acknowledged", "returned"]
+    store.close()
+
+
+def _findings(alarm: Alarm) -> Any:
+    event = AlarmEvent(
+        alarm.identity, 1, AlarmChange.COMMENTED, None, alarm.state, alarm.state, 0, 0
+    )
+    return Findings(alarms=[AlarmNews(replace(alarm, n_events=1), [event])])
+
+
+async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(
+    stored: Callable[[], tuple[Any, Any, Any]],
+) -> None:
+    engine, recorder, (store, _) = stored()
+    gone = AlarmIdentity("U9", "sx", AlarmKind.CHANNEL_NOT_OK)
+    lost = Alarm(gone, level=ALERT, occurrence=1, is_acknowledged=False, raised_ns=0, n_events=1)
+    before = Alarm(gone).state
+    raised = AlarmEvent(gone, 1, AlarmChange.RAISED, ALERT, before, lost.state, 0, 1)
+    store.append([], [], [AlarmNews(lost, [raised])])
+    store.close()
+
+    engine, recorder, (store, _) = stored()
+    assert engine.alarm(gone.id).state == "returned_unacknowledged"
+    engine.operate(gone.id, Acknowledge("A. Name", 1))
+    await recorder.flush()
+    store.close()
+
+    engine, recorder, (store, _) = stored()
+    with pytest.raises(LookupError):
+        engine.alarm(gone.id)
+    store.close()
