@@ -43,6 +43,15 @@ async def test_a_plant_in_good_health_says_that_there_are_no_alarms(running_plan
     await expect(link).to_have_attribute("aria-current", "page")
 
 
+async def test_how_often_alarms_come_is_said_in_one_line(running_plant, page) -> None:
+    await page.goto(f"{running_plant.url}{LIST}")
+
+    line = page.locator(".alarm-rates")
+    await expect(line).to_contain_text("Seven days: ", timeout=DATA_MS)
+    for words in ("a day", "in ten minutes, at most", "chattering", "standing for more than a day"):
+        await expect(line).to_contain_text(words)
+
+
 @pytest.mark.slow
 async def test_a_lost_link_is_announced_acknowledged_shelved_and_returns(
     new_plant, page, picture_of, complaints_of

@@ -7,6 +7,24 @@ const KINDS = {
   channel_not_ok: "Channel not OK",
   order1_shaft_x: "Shaft vibration 1×, x",
   order1_shaft_y: "Shaft vibration 1×, y",
+  order1_change_shaft_x: "Shaft 1× vector moved, x",
+  order1_change_shaft_y: "Shaft 1× vector moved, y",
+  order1_change_bearing_x: "Bearing 1× vector moved, x",
+  order1_change_bearing_y: "Bearing 1× vector moved, y",
+  overall_shaft_x: "Shaft vibration, broad-band, x",
+  overall_shaft_y: "Shaft vibration, broad-band, y",
+  overall_bearing_x: "Bearing velocity, x",
+  overall_bearing_y: "Bearing velocity, y",
+  zone_shaft_x: "Vibration zone of the shaft, x",
+  zone_shaft_y: "Vibration zone of the shaft, y",
+  zone_shaft: "Vibration zone of the shaft",
+  zone_bearing_x: "Vibration zone of the bearing, x",
+  zone_bearing_y: "Vibration zone of the bearing, y",
+  eccentricity_ratio: "Eccentricity",
+  gap_x: "Probe gap x",
+  gap_y: "Probe gap y",
+  opposite_gap_x: "Gap of the probe opposite x",
+  opposite_gap_y: "Gap of the probe opposite y",
   oil_temperature: "Oil temperature",
   stiffness_x: "Film stiffness changed, x",
   stiffness_y: "Film stiffness changed, y",
@@ -14,6 +32,12 @@ const KINDS = {
   clock_drift: "Device clock drifts",
   time_stamps: "Wrong time stamps",
   link_lost: "Link lost",
+  samples_lost: "Samples lost",
+  results_not_stored: "Results are not being stored",
+  results_lost: "Results given up",
+  blocks_waiting: "Queue to the analysis fills",
+  analysis_late: "Analysis falls behind",
+  captures_not_kept: "Samples around alarms not kept",
 };
 
 const STATES = {
@@ -40,12 +64,28 @@ const CHANGES = {
   unsuppressed: "no longer suppressed",
   taken_out_of_service: "taken out of service",
   returned_to_service: "returned to service",
+  commented: "commented",
   condition_unknown: "condition no longer known",
   condition_known: "condition known again",
 };
 
 const REASONS = {
   above_limit: "above its limit",
+  below_limit: "below its limit",
+  amplitude_change_only: "length only, no phase",
+  amplitude_change_above_limit: "above its limit by length alone, no phase",
+  no_reference: "no reference in this operating state",
+  no_phase: "the phase is lost",
+  given_up: "the store did not take them",
+  zone_a: "zone A",
+  zone_b: "zone B",
+  zone_c: "zone C",
+  zone_d: "zone D",
+  run_up: "unit runs up",
+  run_down: "unit runs down",
+  speed_no_load: "unit at speed, no load",
+  part_load: "unit at part load",
+  full_load: "unit at full load",
   restarted: "no data since the restart",
   no_longer_watched: "no longer watched",
   stamp_regressed: "time ran backwards",
@@ -53,7 +93,14 @@ const REASONS = {
   stamp_jumped: "time jumped",
 };
 
-const DECIMALS = { 1: 3, "µm 0-pk": 1, "°C": 1, s: 2, ppm: 0 };
+const DECIMALS = { 1: 3, "µm 0-pk": 1, "µm pk-pk": 1, "µm": 0, "mm/s rms": 2, "°C": 1, s: 2, ppm: 0, findings: 0 };
+
+/** What is within limits and yet worth a word. */
+const WITHIN = {
+  zone_a: "Within limits: zone A",
+  zone_b: "Within limits: zone B",
+  amplitude_change_only: "Within limits by length alone, no phase",
+};
 
 export const kindWords = (kind) => KINDS[kind] ?? kind.replaceAll("_", " ");
 export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
@@ -89,7 +136,7 @@ export function valueWords({ value, limit, value_unit: unit }) {
 /** What an alarm watches, now; what is not known is said to be unknown, never to be well. */
 export function conditionWords({ condition, condition_reason: reason }) {
   if (condition === "unknown") return `Unknown: ${alarmReasonWords(reason)}`;
-  if (condition === "within_limits") return "Within limits";
+  if (condition === "within_limits") return WITHIN[reason] ?? "Within limits";
   return `Active: ${alarmReasonWords(reason)}`;
 }
 

@@ -270,6 +270,7 @@ def _latched_twice(events: Sequence[AlarmEvent]) -> bool:
 LATCHES = (AlarmChange.LATCHED, AlarmChange.RESET)
 
 
+@pytest.mark.timeout(max(300, N_LIVES))
 @pytest.mark.usefixtures("_quiet")
 async def test_no_alarm_is_lost_and_none_is_doubled(
     database: Callable[[], Path], host: Any, tools: Any

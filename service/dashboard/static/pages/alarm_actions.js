@@ -39,13 +39,16 @@ export function alarmActions(actor, again) {
   const back = button("Return to service", () => act("return-to-service"));
   const form = shelfForm((body) => act("shelve", body));
   const shelve = button("Shelve…", () => form.open());
+  const words = commentForm((body) => act("comment", body));
+  const comment = button("Comment…", () => words.open());
   return {
-    node: element("span", { class: "actions" }, acknowledge, reset, shelve, unshelve, back, form.node, failure),
+    node: element("span", { class: "actions" }, acknowledge, reset, shelve, unshelve, back, comment, form.node, words.node, failure),
     draw(now) {
       alarm = now;
       acknowledge.hidden = now.is_acknowledged;
       reset.hidden = !now.is_latched || !now.is_acknowledged;
       unshelve.hidden = now.shelf === null;
+      comment.hidden = !words.node.hidden;
       shelve.hidden = now.shelf !== null || !form.node.hidden;
       back.hidden = now.outage === null;
     },
@@ -71,6 +74,27 @@ function shelfForm(submit) {
     open() {
       node.hidden = false;
       reason.focus();
+    },
+  };
+}
+
+function commentForm(submit) {
+  const text = element("input", { required: "", maxlength: "500", "aria-label": "Comment", placeholder: "what to remember" });
+  const close = button("Cancel", () => (node.hidden = true));
+  const send = element("button", { type: "submit" }, "Comment");
+  const node = element("form", { class: "shelf-form", hidden: "" }, text, send, close);
+  node.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    if (await submit({ text: text.value.trim() })) {
+      node.hidden = true;
+      text.value = "";
+    }
+  });
+  return {
+    node,
+    open() {
+      node.hidden = false;
+      text.focus();
     },
   };
 }

@@ -61,7 +61,7 @@ function alarmRow(actor, again) {
       setAttribute(node, "data-state", alarm.state);
       priority.draw(...levelMark(alarm));
       const words = [
-        stateWords(alarm.state) + (alarm.is_latched ? ", latched" : ""),
+        stateWords(alarm.state) + (alarm.is_latched ? ", latched" : "") + (alarm.is_chattering ? ", chattering" : ""),
         placeWords(alarm),
         kindWords(alarm.kind),
         valueWords(alarm),

@@ -10,10 +10,12 @@ import { mark } from "../parts/mark.js";
 import { poll } from "../poll.js";
 import { actorField } from "./alarm_actor.js";
 import { historyTable } from "./alarm_history.js";
+import { ratesLine } from "./alarm_rates.js";
 import { alarmTable } from "./alarm_table.js";
 
 const LIST_PERIOD_S = 2;
 const HISTORY_PERIOD_S = 5;
+const RATES_PERIOD_S = 60;
 const N_EVENTS = "50";
 
 /** Returns `{ draw(view), close() }`. */
@@ -25,10 +27,11 @@ export function alarmsPage(main) {
   const listed = alarmTable("On the list", "Nothing is on the list.", actor, again);
   const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);
   const unjudged = unjudgedView();
+  const rates = ratesLine();
   const history = historyTable();
   const head = element("div", { class: "alarms-head" }, element("h1", {}, "Alarms"), state.node, actor.node);
   const delivery = deliveryView();
-  main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, history.node);
+  main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, rates.node, history.node);
   let heard = null;
   let failure = null;
 
@@ -70,14 +73,24 @@ export function alarmsPage(main) {
     }
   }
 
+  async function askRates(signal) {
+    try {
+      rates.draw(await ask(["alarms", "rates"], [], signal));
+    } catch (error) {
+      if (!signal.aborted) rates.fail(error.message);
+    }
+  }
+
   const lists = poll(askList, () => LIST_PERIOD_S);
   const histories = poll(askHistory, () => HISTORY_PERIOD_S);
+  const counts = poll(askRates, () => RATES_PERIOD_S);
   const deliveries = poll(askDelivery, () => HISTORY_PERIOD_S);
   return {
     draw,
     close() {
       lists.stop();
       histories.stop();
+      counts.stop();
       deliveries.stop();
     },
   };
