@@ -43,7 +43,7 @@ def has_results(overview: Any) -> bool:
 async def test_the_demo_shows_stiffness_that_the_offline_analysis_confirms_to_the_last_bit(
     start: Start, tmp_path: Path, demo_file: Path, children: Children, gone: Gone
 ) -> None:
-    demo = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
+    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
     await demo.wait_for_url()
     [daq] = children(demo.pid)
     ready = await demo.get("/readyz")
@@ -83,7 +83,7 @@ async def test_the_demo_shows_stiffness_that_the_offline_analysis_confirms_to_th
 async def test_the_demo_ends_in_order_and_takes_its_daq_along(
     start: Start, tmp_path: Path, children: Children, gone: Gone, number: int
 ) -> None:
-    demo = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
+    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
     await demo.wait_for_url()
     [daq] = children(demo.pid)
 
@@ -97,7 +97,7 @@ async def test_the_demo_ends_in_order_and_takes_its_daq_along(
 async def test_a_service_that_is_killed_leaves_no_daq_behind(
     start: Start, tmp_path: Path, children: Children, gone: Gone
 ) -> None:
-    demo = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
+    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
     await demo.wait_for_url()
     [daq] = children(demo.pid)
 
@@ -109,7 +109,7 @@ async def test_a_service_that_is_killed_leaves_no_daq_behind(
 async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(
     start: Start, tmp_path: Path, children: Children
 ) -> None:
-    demo = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
+    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
     await demo.wait_for_url()
     await demo.until(
         "/api/v1/units", lambda units: all(u["source"]["state"] == "connected" for u in units)
