@@ -54,6 +54,7 @@ class Plant:
         self._service: subprocess.Popen[str] | None = None
         self._daq_port = free_port()
         self.url = ""
+        self.settings = QUICK_ANALYSIS
 
     def start_daq(self) -> None:
         self._daq = self._start("daq", str(self._plant_file()), "--control")
@@ -94,7 +95,7 @@ class Plant:
         head, units = DEMO.read_text().split("[[unit]]", 1)
         first_unit = units.split("[[unit]]", 1)[0].replace("port = 0", f"port = {self._daq_port}")
         path = self._folder / "plant.toml"
-        path.write_text(f"{head}{QUICK_ANALYSIS}\n[[unit]]{first_unit}")
+        path.write_text(f"{head}{self.settings}\n[[unit]]{first_unit}")
         return path
 
 
