@@ -185,7 +185,7 @@ class UnitAlarms:
         bearing, readings, now_ns = assessment.bearing, assessment.readings, assessment.time_ns
         for channel, place in zip(self._channels_of[bearing], AMPLITUDES, strict=True):
             self._note_segment(channel, readings[f"order1_{place}_um_pk"])
-        state = None if assessment.condition is None else assessment.condition.state
+        state = _state_of(assessment)
         self._state = (state, now_ns)
         for watch in self._watched.readings[bearing]:
             held = self._board.alarm(watch.id).condition.level
@@ -257,3 +257,12 @@ class UnitAlarms:
             return  # as nearly always
         condition = watch.limits.judge(reading, state, alarm.condition.level)
         self._board.find(watch, condition, now_ns)
+
+
+def _state_of(assessment: Assessment) -> OperatingState | None:
+    """The operating state of a result; where nobody has told it, a standstill at least is known."""
+    condition = assessment.condition
+    if condition is not None and condition.state is not OperatingState.UNKNOWN:
+        return condition.state
+    speed = assessment.readings.get("speed_rpm", NOT_THERE)
+    return OperatingState.STANDSTILL if speed.quality.reason is Reason.STANDSTILL else None

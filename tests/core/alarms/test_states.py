@@ -16,7 +16,7 @@ from core.blocks import SampleBlock
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine import Bearing, Channel, Measurand, Unit
-from core.quality import GOOD, Reading
+from core.quality import GOOD, Reading, Reason, missing
 from core.quantities import CATALOGUE
 
 SECOND = 1_000_000_000
@@ -59,12 +59,12 @@ class Machine:
         self.alarms = UnitAlarms(UNIT, RULES, references=[reference])
         self.n = 0
 
-    def runs(self, state: OperatingState | None, oil_c: float = 45.0, **found: float) -> list[str]:
+    def runs(self, state: OperatingState | None, oil_c: float = 45.0, **found: Any) -> list[str]:
         self.n += 1
         readings = {quantity.name: Reading(1.0) for quantity in CATALOGUE}
         readings |= {"gap_x_um": Reading(1500.0), "gap_y_um": Reading(1500.0)}
         readings |= {"eccentricity_ratio": Reading(0.3), "order1_shaft_x_um_pk": Reading(50.0)}
-        readings |= {name: Reading(value) for name, value in found.items()}
+        readings |= {n: r if isinstance(r, Reading) else Reading(r) for n, r in found.items()}
         condition = state if state is None else BearingCondition(state, False, None)
         assessment: Any = SimpleNamespace(
             unit="U1",
@@ -137,6 +137,13 @@ def test_an_alarm_that_a_stop_hides_has_not_returned_and_is_told_again(machine: 
 def test_where_the_state_is_not_known_nothing_is_suppressed(machine: Machine) -> None:
     assert machine.runs(None, overall_shaft_x_um_pp=210.0) == ["overall_shaft_x raised"]
     assert not [a for a in machine.alarms.alarms if a.suppressed_by is not None]
+
+
+def test_a_unit_whose_load_nobody_measures_is_at_least_known_to_stand(machine: Machine) -> None:
+    standing = machine.runs(None, speed_rpm=missing(Reason.STANDSTILL), eccentricity_ratio=0.99)
+
+    assert "eccentricity_ratio raised" not in standing
+    assert machine.alarms.alarm("U1:UJB:eccentricity_ratio").suppressed_by == "standstill"
 
 
 def test_slow_channels_share_the_state_that_results_have_shown(machine: Machine) -> None:
