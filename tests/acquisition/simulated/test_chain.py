@@ -106,6 +106,35 @@ def test_a_bump_is_a_smaller_gap_and_a_shaft_that_seems_nearer(
     assert displacement == pytest.approx(-gap)
 
 
+def test_runout_of_one_probe_is_motion_along_its_axis_and_nobody_else_sees_it(
+    four_probes: Unit, quiet: Scenario
+) -> None:
+    own = {name: ChannelScenario(runout_um_pk=(3.0 - 4.0j,)) for name in ("UJB_uy", "UJB_x_far")}
+
+    seen = readings(four_probes, replace(quiet, channels=own)) - readings(four_probes, quiet)
+
+    rows = {channel.id: row for row, channel in enumerate(four_probes.channels)}
+    near, far = (seen[rows.pop(name)] for name in own)
+    assert abs(line(near[: 5 * TURN])) == pytest.approx(5.0)
+    assert near == pytest.approx(-far)  # one gap shrinks as the other grows
+    assert np.abs(seen[list(rows.values())]).max() == 0.0
+
+
+def test_a_probe_that_drifts_and_a_thermometer_that_errs_tell_what_is_not_there(
+    build_unit: BuildUnit, quiet: Scenario
+) -> None:
+    wrong = with_bearing(quiet, position_error_um=(7.0, -3.0), oil_temperature_error_c=0.4)
+    right, found = (build_unit(scenario) for scenario in (quiet, wrong))
+    told, shown = right.advance(600), found.advance(600)
+
+    counts_per_um = 32768.0 / 20.0 / -250.0
+    apart_um = (shown.counts - told.counts.astype(np.float64)).mean(axis=1) / counts_per_um
+    assert apart_um[:4] == pytest.approx([-7.0, 3.0, 0.0, 0.0], abs=0.05)
+    # speed, power, nothing, then oil and slow gaps of the UJB
+    assert np.subtract(shown.slow, told.slow)[3:6] == pytest.approx([0.4, -7e-3, 3e-3])
+    assert found.truth() == right.truth()
+
+
 def test_a_gain_error_leaves_the_reference_gap_as_it_is(machine: Unit, quiet: Scenario) -> None:
     wrong = {"UJB_ux": ChannelScenario(gain=1.05), "UJB_vy": ChannelScenario(gain=0.97)}
 

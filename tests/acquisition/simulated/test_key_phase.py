@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from acquisition.simulated.key_phase import KeyPhasePulses
 from acquisition.simulated.plant import SimulatedPlant
 from acquisition.simulated.scenario import KeyPhasePulse, Scenario, TransducerNoise
 from core.arrays import FloatArray
@@ -82,3 +83,16 @@ def test_a_key_phase_leaves_the_other_channels_as_they_are(
     machine: Unit, with_key_phase: Unit, quiet: Scenario
 ) -> None:
     assert np.array_equal(readings(with_key_phase, quiet)[:-2], readings(machine, quiet))
+
+
+@pytest.mark.parametrize(("mark_turns", "is_under"), [(0.5, False), (1e-3, True)])
+def test_a_standing_shaft_gives_one_level(
+    with_key_phase: Unit, mark_turns: float, is_under: bool
+) -> None:
+    pulse = KeyPhasePulse(mark_turns=mark_turns)
+    signal = np.zeros((len(with_key_phase.channels), 100))
+    KeyPhasePulses(with_key_phase, pulse).add_to(signal, np.zeros(100))
+
+    height_v = pulse.height_v if is_under else 0.0
+    assert signal[-2] == pytest.approx(pulse.rest_v + height_v)
+    assert signal[-1] == pytest.approx(pulse.rest_v - height_v)
