@@ -145,6 +145,27 @@ def test_readings_stray_further_where_position_counts_for_more(
     assert np.median(far) > 1.8 * np.median(near)
 
 
+def test_less_is_known_of_the_far_side_of_the_outermost_cell(healthy: StiffnessHistory) -> None:
+    baseline = learned(healthy)
+    known = [cell for cell in baseline.table.cells if cell.support is Support.OWN]
+    edge = max(known, key=lambda cell: cell.cell[0])
+    e = 0.05 * edge.cell[0] + np.array([0.001, 0.025, 0.049])
+    there = FilmConditions(e, np.full(3, edge.oil_temperature_c), np.full(3, edge.attitude_deg))
+    std = baseline.compare(there, np.full(3, 20.0), np.full(3, 0.01)).surface_std
+    assert 0.0 < std[0] < std[1] < std[2]
+
+
+def test_what_position_does_lasts_and_the_rest_averages_out(film_life: FilmLife) -> None:
+    history = film_life(5, days=240)
+    e, day = history.eccentricity_ratio, history.time_ns // 86_400_000_000_000
+    steep = np.exp(9.0 * (e - 0.4))
+    drift = 0.004 * np.random.default_rng(8).standard_normal(400)[(day - day[0]) // 8]
+    moved = with_ln_k(history, history.ln_k + 1.2 * steep + 9.0 * 1.2 * steep * drift)
+    cells = [c for c in learned(moved).table.cells if c.support is Support.OWN]
+    lasting = {c.cell[0]: c.lasting / c.scatter for c in cells}
+    assert lasting[min(lasting)] < 0.6 < lasting[max(lasting)]
+
+
 @pytest.mark.parametrize("share", [0.05, 0.2])
 def test_wrong_readings_hardly_move_a_baseline(healthy: StiffnessHistory, share: float) -> None:
     random = np.random.default_rng(7)
