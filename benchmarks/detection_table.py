@@ -73,7 +73,7 @@ def _damage(case: DamageCase, found: Sequence[Found]) -> Line:
         "" if case.least_share is None else f"≥ {100 * case.least_share:.0f} %",
         f"{100 * share:.1f} %{median}",
         len(found),
-        f"{100 * np.mean([one.by_fixed for one in found]):.1f} %",
+        f"misses {100 * np.mean([not one.by_fixed for one in found]):.1f} %",
         None if case.least_share is None else share >= case.least_share,
     )
 

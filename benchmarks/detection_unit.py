@@ -100,9 +100,9 @@ class LearnedUnit:
         deviation = np.stack([self._deviation(later, *other) for other in self.places()])
         known = np.isfinite(deviation[self.places().index(place), : row + 1])
         newest = np.flatnonzero(known)[-MEAN_READINGS:]
-        readings = (column[:, newest] for column in (ln_k, ln_shaft, deviation))
+        ln_k, ln_shaft, deviation = (c[:, newest] for c in (ln_k, ln_shaft, deviation))
         brackets = np.array([BRACKETS_N_PER_M[bearing] for bearing, _ in self.places()])
-        return attribute(place, self.response, *readings, brackets)
+        return attribute(place, self.response, ln_k, ln_shaft, deviation, brackets)
 
     def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:
         history, baseline = later.histories[bearing], self.stiffness(bearing, direction)
