@@ -69,7 +69,9 @@ class Mail:
         except aiosmtplib.SMTPResponseException as error:
             return Failed(_said(error))
         except (aiosmtplib.SMTPException, OSError, ValueError, SecretError) as error:
-            return Failed(printable(words(error)))
+            # what it stands on says why, without the library's words around it
+            cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+            return Failed(printable(words(cause)))
 
     async def _send(self, mail: bytes) -> Outcome:
         target = self._target

@@ -4,16 +4,17 @@ import asyncio
 import contextlib
 import hashlib
 import hmac
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from importlib.metadata import version
+from urllib.parse import urlsplit
 
-import httpx2
+import httpcore2
 
 from acquisition.clock import Clock
 from core.units import NS_PER_S
+from service.delivery.bounded import BoundedNetwork
 from service.delivery.message import Message
 from service.delivery.names import NameLookUp
 from service.delivery.network import PATIENT, Timeouts, Trust, printable, words
@@ -23,6 +24,9 @@ from service.delivery.secret import Secret, SecretError
 EXCERPT_BYTES = 1024
 EXCERPT_S = 2.0
 """How much of a refusal is read, to be shown, and for how long; of a consent nothing is."""
+
+FAULTS = (httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.UnsupportedProtocol)
+"""What the library calls what goes wrong on the network, time-outs apart."""
 
 TRY_AGAIN = (408, 425, 429)
 """Answers of 4xx that do not say that the message is wrong."""
@@ -51,64 +55,51 @@ class Webhook:
 
     def __init__(self, target: WebhookTarget, trust: Trust, clock: Clock) -> None:
         self._target, self._trust, self._clock = target, trust, clock
-        self._url = httpx2.URL(target.url)
-        port = self._url.port or (443 if self._url.scheme == "https" else 80)
-        self._look_up = NameLookUp(self._url.host, port)
+        url = urlsplit(target.url)
+        port = url.port or (443 if url.scheme == "https" else 80)
+        self._look_up = NameLookUp(url.hostname or "", port)
 
     async def carry(self, message: Message, body: str) -> Outcome:
         """Try once."""
         try:
             async with asyncio.timeout(self._target.timeouts.total_s):
                 return await self._post(message["id"], body.encode())
-        except (httpx2.HTTPError, httpx2.InvalidURL, OSError, ValueError, SecretError) as error:
-            return Failed(printable(words(_named(error))))
+        except httpcore2.TimeoutException:
+            return Failed(words(TimeoutError()))
+        except (*FAULTS, OSError, ValueError, SecretError) as error:
+            return Failed(printable(words(error)))
 
     async def _post(self, id_: str, body: bytes) -> Outcome:
-        timeouts = self._target.timeouts
-        headers = self._headers(id_, body)
-        context = await self._trust.context()
-        async with asyncio.timeout(timeouts.connect_s):
-            addresses = await self._look_up.addresses()
-        # a bare transport: no redirects, cookies, proxies or netrc, whatever an answer says
-        async with httpx2.AsyncHTTPTransport(verify=context, trust_env=False) as transport:
-            for address in addresses[:-1]:
-                with contextlib.suppress(httpx2.ConnectError, httpx2.ConnectTimeout):
-                    return await self._answer(transport, address, headers, body)
-            return await self._answer(transport, addresses[-1], headers, body)
-
-    async def _answer(
-        self,
-        transport: httpx2.AsyncHTTPTransport,
-        address: str,
-        headers: Mapping[str, str],
-        body: bytes,
-    ) -> Outcome:
-        timeouts = self._target.timeouts
-        limits = httpx2.Timeout(timeouts.answer_s, connect=timeouts.connect_s)
-        request = httpx2.Request(
-            "POST",
-            self._url.copy_with(host=address),
-            headers=headers,
-            content=body,
-            extensions={"sni_hostname": self._url.host, "timeout": limits.as_dict()},
-        )
-        response = await transport.handle_async_request(request)
-        try:
+        headers, timeouts = self._headers(id_, body), self._target.timeouts
+        limits = dict.fromkeys(("read", "write", "pool"), timeouts.answer_s)
+        # a bare pool: no redirects, cookies, proxies or netrc, whatever an answer says
+        async with (
+            httpcore2.AsyncConnectionPool(
+                ssl_context=await self._trust.context(),
+                network_backend=BoundedNetwork(self._look_up),
+            ) as pool,
+            pool.stream(
+                "POST",
+                self._target.url,
+                headers=list(headers.items()),
+                content=body,
+                extensions={"timeout": {**limits, "connect": timeouts.connect_s}},
+            ) as response,
+        ):
             return await self._judged(response)
-        finally:
-            await response.aclose()
 
-    async def _judged(self, response: httpx2.Response) -> Outcome:
-        status = response.status_code
+    async def _judged(self, response: httpcore2.Response) -> Outcome:
+        status = response.status
+        said = {name.lower(): text.decode("latin-1") for name, text in response.headers}
         if 200 <= status < 300:
             return Delivered(f"{status}")
         if 300 <= status < 400:
-            where = response.headers.get("Location", "elsewhere")
+            where = said.get(b"location", "elsewhere")
             return Failed(printable(f"{status}: sends on to {where}, which is not followed"))
-        said = printable(f"{status} {await _excerpt(response)}")
+        answer = printable(f"{status} {await _excerpt(response)}")
         if 400 <= status < 500 and status not in TRY_AGAIN:
-            return Refused(said)
-        return Failed(said, retry_after_s(response.headers.get("Retry-After"), self._clock))
+            return Refused(answer)
+        return Failed(answer, retry_after_s(said.get(b"retry-after"), self._clock))
 
     def _headers(self, id_: str, body: bytes) -> dict[str, str]:
         """What goes with a message.
@@ -120,7 +111,7 @@ class Webhook:
         """
         time_s = str(self._clock.now_ns() // NS_PER_S)
         headers = {
-            "Host": self._url.netloc.decode("ascii"),
+            "Host": urlsplit(self._target.url).netloc,
             "Content-Type": "application/json",
             "Accept-Encoding": "identity",
             "Connection": "close",
@@ -157,20 +148,13 @@ def retry_after_s(text: str | None, clock: Clock) -> float | None:
     return max(0.0, (aware - now).total_seconds())
 
 
-async def _excerpt(response: httpx2.Response) -> str:
+async def _excerpt(response: httpcore2.Response) -> str:
     """Read the beginning of what it says; an answer that never ends, or breaks off, will do."""
     found = b""
-    with contextlib.suppress(httpx2.HTTPError, TimeoutError):
+    with contextlib.suppress(*FAULTS, httpcore2.TimeoutException, TimeoutError):
         async with asyncio.timeout(EXCERPT_S):
-            async for part in response.aiter_raw():
+            async for part in response.aiter_stream():
                 found += part[:EXCERPT_BYTES]
                 if len(found) >= EXCERPT_BYTES:
                     break
     return found[:EXCERPT_BYTES].decode("utf-8", "replace")
-
-
-def _named(error: Exception) -> Exception:
-    """The error with a word for what kind it is, where it says nothing itself."""
-    if isinstance(error, httpx2.TimeoutException):
-        return TimeoutError()
-    return error

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from service.delivery.outcome import Failed
 from service.delivery.sender import SenderState
 from service.store.sqlite import SqliteStore
 
@@ -75,3 +76,28 @@ async def test_a_receiver_that_never_answers_delays_neither_another_one_nor_the_
 
     assert len(quick.requests) == 30
     assert len(store.outbox.waiting("slow", 100)) == 30
+
+
+async def floods_with_interim_answers(_: object, writer: asyncio.StreamWriter) -> None:
+    while True:
+        writer.write(b"HTTP/1.1 100 Continue\r\n\r\n" * 1000)
+        await writer.drain()
+
+
+async def floods_with_headers(_: object, writer: asyncio.StreamWriter) -> None:
+    writer.write(b"HTTP/1.1 200 OK\r\n")
+    while True:
+        writer.write(b"X: y\r\n" * 1000)
+        await writer.drain()
+
+
+@pytest.mark.parametrize("behave", [floods_with_interim_answers, floods_with_headers])
+async def test_a_flood_is_left_after_some_bytes_and_not_after_some_time(
+    behave: Any, room: Any
+) -> None:
+    server = await room.web(behave)
+    sender = room.sender(server, room.open_store())
+
+    outcome = await sender.receiver.carrier.carry({"id": "1"}, "{}")
+
+    assert outcome == Failed("the answer is longer than 32768 bytes")
