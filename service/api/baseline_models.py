@@ -245,12 +245,19 @@ class BaselineActionModel(ApiModel):
     """Why, 1 to 500 printable characters."""
 
 
+def _only_text(value: object) -> object:
+    """Refuse numbers, which say neither since when nor in what they count."""
+    if not isinstance(value, str):
+        raise ValueError("a time is written like 2026-11-21T08:00:00Z")
+    return written_as_date(value)
+
+
 class RenewModel(BaselineActionModel):
     """That a machine event has made another machine of it."""
 
     event_time: Annotated[
         datetime,
-        BeforeValidator(written_as_date),
+        BeforeValidator(_only_text),
         Field(strict=False, examples=["2026-11-21T08:00:00Z"]),
     ]
     """When the event was over, RFC 3339 with offset: readings from then on count."""

@@ -4,11 +4,13 @@ import math
 from dataclasses import dataclass
 from typing import cast
 
+from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
+from core.condition.film_conditions import FilmConditions
 from core.decision.decision import Decision
 from core.decision.verdict import Verdict
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmValue
+from core.films.film_reading import FilmReading
 from core.films.film_rules import FilmRules
 from core.stiffness_history import DIRECTIONS
 from service.api.context import Context
@@ -35,7 +37,8 @@ CURRENT_PERIODS = 2.5
 NORMAL_95 = 1.96
 """Half-width of the interval that holds 95 % of a normal distribution, over its deviation."""
 
-NOT_LEARNED, NONE_IN_FORCE = "condition_not_learned", "none_in_force"
+NONE_IN_FORCE = "none_in_force"
+NOT_LEARNED, NOT_TURNED_SO = "condition_not_learned", "attitude_not_learned"
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class SeenFilm:
     rules: FilmRules
     current: CurrentBearing
     news: FilmNews | None
-    version: int | None
+    baseline: BearingBaseline | None
     why_not_current: str | None
 
 
@@ -80,7 +83,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         is_current=seen is not None and seen.why_not_current is None,
         next_reading=_next_reading(seen) if seen else None,
         condition=_condition(seen) if seen else None,
-        baseline_version=seen.version if seen else None,
+        baseline_version=_version(seen.baseline) if seen else None,
         limits=FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change)
         if limits
         else None,
@@ -106,10 +109,13 @@ def _seen(context: Context, unit: str, bearing: str) -> SeenFilm | None:
     if rules is None or context.films.place(unit, bearing) is None:
         return None
     baseline = context.films.baseline(unit, bearing)
-    version = baseline.origin.version if baseline else None
     news, current = context.films.newest(unit, bearing), context.live.current(unit, bearing)
-    why = _why_not_current(news, current, rules, version)
-    return SeenFilm(rules, current, news, version, why)
+    why = _why_not_current(news, current, rules, _version(baseline))
+    return SeenFilm(rules, current, news, baseline, why)
+
+
+def _version(baseline: BearingBaseline | None) -> int | None:
+    return baseline.origin.version if baseline else None
 
 
 def _why_not_current(
@@ -162,15 +168,15 @@ def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
 
 
 def _direction(seen: SeenFilm, news: FilmNews, row: int) -> FilmDirectionModel:
-    finding, value = news.findings[row], news.reading.values[row]
+    finding, ln_k = news.findings[row], news.reading.values[row].ln_k
     attribution = finding.attribution
     return FilmDirectionModel(
         verdict=verdict_name(finding.verdict),
-        reason=_reason(finding, value),
+        reason=_reason(seen, news.reading, finding, row),
         level=level_name(finding.level),
         change=_change(finding, news.decisions[row], seen.rules),
         deviation=_deviation(finding),
-        stiffness_n_per_m=None if math.isnan(value.ln_k) else math.exp(value.ln_k),
+        stiffness_n_per_m=None if math.isnan(ln_k) else math.exp(ln_k),
         cause=FilmCauseModel(
             cause=attribution.cause.value,
             reason=attribution.reason,
@@ -182,14 +188,26 @@ def _direction(seen: SeenFilm, news: FilmNews, row: int) -> FilmDirectionModel:
     )
 
 
-def _reason(finding: FilmFinding, value: FilmValue) -> str:
+def _reason(seen: SeenFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
     match finding.verdict:
         case Verdict.NO_BASELINE:
-            return NONE_IN_FORCE if finding.baseline_version is None else NOT_LEARNED
+            learned = (
+                seen.baseline.of(Watched.STIFFNESS, DIRECTIONS[row]) if seen.baseline else None
+            )
+            return NONE_IN_FORCE if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
         case _:
-            return value.reason.value
+            return reading.values[row].reason.value
+
+
+def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
+    """What about a condition has not been learned: its cell, or only where the shaft lies in it."""
+    here = FilmConditions.one(
+        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
+    )
+    is_seen = learned.table.find(learned.grid.cells(here))[0] >= 0
+    return NOT_TURNED_SO if is_seen else NOT_LEARNED
 
 
 def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmChangeModel | None:

@@ -10,6 +10,7 @@ import { ALARMS_ADDRESS, routeOf } from "./route.js";
 import { mark } from "./parts/mark.js";
 import { alarmsPage } from "./pages/alarms.js";
 import { bearingPage } from "./pages/bearing.js";
+import { filmPage } from "./pages/film.js";
 import { overviewPage } from "./pages/overview.js";
 
 const OVERVIEW_PERIOD_S = 2;
@@ -71,7 +72,7 @@ function openPage() {
   page?.close();
   main.replaceChildren();
   if (onAlarms) page = alarmsPage(main);
-  else page = route ? bearingPage(main, route.unit, route.bearing) : overviewPage(main);
+  else page = route ? (route.isFilm ? filmPage : bearingPage)(main, route.unit, route.bearing) : overviewPage(main);
   setAttribute(alarmLink, "aria-current", onAlarms ? "page" : null);
   window.scrollTo(0, 0);
   draw();

@@ -57,12 +57,19 @@ function agedUnit(unit, silenceS, current) {
     ...unit,
     source: current ? source : { ...source, state: "unknown", reason: null, since: null },
     bearings: unit.bearings.map((latest) => agedLatest(latest, silenceS, current)),
+    films: current ? unit.films : unit.films.map(withheldFilm),
   };
 }
 
 function agedLatest(latest, silenceS, current) {
   const shown = { ...latest, age_s: aged(latest.age_s, silenceS) };
   return current ? shown : { ...shown, ...NOTHING_KNOWN, readings: withheld(latest.readings) };
+}
+
+const UNREAD = { verdict: "no_reading", change_percent: null };
+
+function withheldFilm(film) {
+  return film.why_not === null ? { ...film, x: { ...film.x, ...UNREAD }, y: { ...film.y, ...UNREAD } } : film;
 }
 
 function withheld(readings) {

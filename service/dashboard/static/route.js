@@ -1,4 +1,4 @@
-/** Addresses within the page: `#/`, `#/alarms` and `#/units/U1/bearings/UJB`. */
+/** Addresses within the page: `#/`, `#/alarms`, `#/units/U1/bearings/UJB` and `…/UJB/film`. */
 
 export const ALARMS_ADDRESS = "#/alarms";
 
@@ -7,10 +7,15 @@ export function bearingAddress(unit, bearing) {
   return `#/units/${encodeURIComponent(unit)}/bearings/${encodeURIComponent(bearing)}`;
 }
 
-/** The unit and bearing an address names, or null for the overview. */
+/** Address of the page of a bearing's film. */
+export function filmAddress(unit, bearing) {
+  return `${bearingAddress(unit, bearing)}/film`;
+}
+
+/** The unit and bearing an address names, and whether it is about the film; null for the overview. */
 export function routeOf(hash) {
-  const [, unit, bearing] = /^#\/units\/([^/]+)\/bearings\/([^/]+)$/.exec(hash) ?? [];
-  return bearing ? { unit: decoded(unit), bearing: decoded(bearing) } : null;
+  const [, unit, bearing, film] = /^#\/units\/([^/]+)\/bearings\/([^/]+)(\/film)?$/.exec(hash) ?? [];
+  return bearing ? { unit: decoded(unit), bearing: decoded(bearing), isFilm: film !== undefined } : null;
 }
 
 function decoded(segment) {

@@ -4,9 +4,9 @@ import { element } from "../dom.js";
 
 const KEY = "padwatch-actor";
 
-/** Returns `{ node, name() }`; the name is asked for where it is missing, and then null. */
-export function actorField() {
-  const input = element("input", { id: "actor", maxlength: "80", autocomplete: "name", placeholder: "before you acknowledge" });
+/** Returns `{ node, name() }`; the name is asked for where it is missing, and then null. `hint`: when it is needed. */
+export function actorField(hint = "before you acknowledge") {
+  const input = element("input", { id: "actor", maxlength: "80", autocomplete: "name", placeholder: hint });
   input.value = remembered();
   input.addEventListener("change", () => remember(input.value.trim()));
   return {

@@ -10,6 +10,7 @@ import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
 import { estimatorTable } from "./estimator_table.js";
 import { filmMatrices } from "./film_matrices.js";
+import { filmSummary } from "./film_summary.js";
 import { windowFacts } from "./window_facts.js";
 
 /** Returns `{ draw(view), close() }`. */
@@ -19,7 +20,8 @@ export function bearingPage(main, unitId, bearingId) {
   const content = element("div", { class: "bearing", hidden: "" });
   main.append(missing, content);
   const path = ["units", unitId, "bearings", bearingId];
-  const numbers = [bearingNumbers(path), estimatorTable(path), filmMatrices(path)];
+  const summary = filmSummary(path, unitId, bearingId);
+  const numbers = [bearingNumbers(path), summary, estimatorTable(path), filmMatrices(path)];
   const parts = [headPart(unitId, bearingId), ...numbers, bearingCharts(path), windowFacts()];
   content.append(...parts.map((part) => part.node));
   return {

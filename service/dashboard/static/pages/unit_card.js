@@ -2,6 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
+import { filmBrief } from "../parts/film_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { sourceView } from "../parts/source.js";
@@ -22,6 +23,8 @@ const COLUMNS = [
   SINGLE("Oil", "°C", "oil_temperature_c"),
 ];
 
+const [FILM, FILM_UNIT] = ["Film", "against its baseline"];
+
 const NOBODY = { readings: {}, speed_source: null };
 
 /** Returns `{ node, draw(unit) }`. */
@@ -35,7 +38,7 @@ export function unitCard(unit) {
     draw(now) {
       running.draw(now);
       source.draw(now.source);
-      rows.forEach((row, index) => row.draw(now.bearings[index]));
+      rows.forEach((row, index) => row.draw(now.bearings[index], now.films[index]));
     },
   };
 }
@@ -46,7 +49,8 @@ function table(unit, rows) {
   );
   const first = element("th", { scope: "col", role: "columnheader" }, "Bearing");
   const last = element("th", { scope: "col", role: "columnheader" }, "Quality", element("small", {}, "and data age"));
-  const headRow = element("tr", { role: "row" }, first, ...heads, last);
+  const film = element("th", { scope: "col", role: "columnheader" }, FILM, element("small", {}, FILM_UNIT));
+  const headRow = element("tr", { role: "row" }, first, ...heads, film, last);
   return element(
     "table",
     { role: "table", "aria-label": `Bearings of ${unit.name}` },
@@ -58,6 +62,7 @@ function table(unit, rows) {
 function bearingRow(unit, bearing) {
   const cells = COLUMNS.map((column) => column.view());
   const quality = mark();
+  const film = filmBrief();
   const age = element("span", { class: "data-age" });
   const link = element("a", { href: bearingAddress(unit, bearing) }, bearing);
   const boxes = cells.map((cell, index) =>
@@ -68,12 +73,14 @@ function bearingRow(unit, bearing) {
     { role: "row", "data-bearing": bearing },
     element("th", { scope: "row", role: "rowheader" }, link),
     ...boxes,
+    element("td", { role: "cell", class: "film-cell", "data-head": `${FILM}, ${FILM_UNIT}` }, film.node),
     element("td", { role: "cell", class: "quality" }, quality.node, age),
   );
   return {
     node,
-    draw(latest) {
+    draw(latest, itsFilm) {
       const whole = qualityOf(latest);
+      film.draw(itsFilm);
       for (const cell of cells) cell.draw(latest, whole.reason);
       drawQuality(quality, whole);
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);

@@ -1,0 +1,128 @@
+/** The baseline as a map: eccentricity × oil temperature, colour = stiffness, support visible. */
+
+import { formatFixed } from "../format.js";
+import { FAINT, INK, axis, baseLayout } from "./style.js";
+
+const SCALE = "Cividis"; // even to the eye, also without red or green
+const GN = 1e9;
+
+/** Cells as objects; of several attitudes in one place the one with most readings. */
+export function cellsOf(columns) {
+  const places = new Map();
+  columns.support.forEach((_, index) => {
+    const cell = Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values?.[index] ?? null]));
+    const place = `${cell.eccentricity_low} ${cell.oil_temperature_low_c}`;
+    if ((places.get(place)?.n_readings ?? -1) < cell.n_readings) places.set(place, cell);
+  });
+  return [...places.values()];
+}
+
+const middle = (cell) => [
+  (cell.eccentricity_low + cell.eccentricity_high) / 2,
+  (cell.oil_temperature_low_c + cell.oil_temperature_high_c) / 2,
+];
+
+/** What there is to say of one cell. */
+function words(cell) {
+  const support = { own: "learned here", borrowed: "borrowed from around", none: "seen too seldom to judge" }[cell.support];
+  return [
+    `<b>${formatFixed(cell.stiffness_n_per_m / GN, 3)} GN/m</b>, ${support}`,
+    `eccentricity ${formatFixed(cell.eccentricity_low, 3)} to ${formatFixed(cell.eccentricity_high, 3)}`,
+    `oil ${formatFixed(cell.oil_temperature_low_c, 1)} to ${formatFixed(cell.oil_temperature_high_c, 1)} °C`,
+    `${cell.n_readings} readings on ${cell.n_days} days`,
+    `scatter ${formatFixed(cell.scatter_percent, 1)} %, surface ± ${formatFixed(1.96 * cell.surface_std_percent, 1)} %`,
+  ].join("<br>");
+}
+
+/** Bins from the lowest to the highest of some cells, as middles. */
+function middles(cells, low, width) {
+  const lows = cells.map((cell) => cell[low]);
+  const first = Math.min(...lows);
+  const n = Math.round((Math.max(...lows) - first) / width) + 1;
+  return Array.from({ length: n }, (_, index) => first + (index + 0.5) * width);
+}
+
+export function mapTraces(cells, widths) {
+  const own = cells.filter((cell) => cell.support === "own");
+  const borrowed = cells.filter((cell) => cell.support === "borrowed");
+  const seldom = cells.filter((cell) => cell.support === "none");
+  const grid = [middles(cells, "eccentricity_low", widths[0]), middles(cells, "oil_temperature_low_c", widths[1])];
+  return [
+    surface(own, grid, widths, "learned here", 1),
+    surface(borrowed, grid, widths, "borrowed from around", 0.5),
+    marks(borrowed, "borrowed from around", { symbol: "line-ne", size: 13, line: { color: INK, width: 1 } }),
+    marks(seldom, "seen too seldom to judge", { symbol: "x-thin", size: 7, line: { color: FAINT, width: 1.2 } }),
+  ].filter((trace) => trace.x.length > 0);
+}
+
+function surface(cells, [x, y], widths, name, opacity) {
+  const blank = () => y.map(() => x.map(() => null));
+  const [z, text] = [blank(), blank()];
+  for (const cell of cells) {
+    const [e, c] = middle(cell);
+    const [column, row] = [Math.round((e - x[0]) / widths[0]), Math.round((c - y[0]) / widths[1])];
+    z[row][column] = cell.stiffness_n_per_m / GN;
+    text[row][column] = words(cell);
+  }
+  return {
+    type: "heatmap",
+    name,
+    x,
+    y,
+    z,
+    text,
+    opacity,
+    coloraxis: "coloraxis",
+    xgap: 1,
+    ygap: 1,
+    hoverongaps: false,
+    hovertemplate: "%{text}<extra></extra>",
+  };
+}
+
+function marks(cells, name, marker) {
+  return {
+    type: "scatter",
+    mode: "markers",
+    name,
+    x: cells.map((cell) => middle(cell)[0]),
+    y: cells.map((cell) => middle(cell)[1]),
+    text: cells.map(words),
+    marker,
+    hovertemplate: "%{text}<extra></extra>",
+  };
+}
+
+/** Layout with the current cell outlined; `revision` keeps a zoom. */
+export function mapLayout(cells, current, revision) {
+  const all = current ? [...cells, current] : cells;
+  const ends = (low, high) => [Math.min(...all.map((c) => c[low])), Math.max(...all.map((c) => c[high]))];
+  return baseLayout(`map ${revision}`, {
+    xaxis: axis("Eccentricity ratio", { range: ends("eccentricity_low", "eccentricity_high"), zeroline: false }),
+    yaxis: axis("Oil temperature, °C", { range: ends("oil_temperature_low_c", "oil_temperature_high_c"), zeroline: false }),
+    coloraxis: { colorscale: SCALE, colorbar: { title: { text: "GN/m" }, thickness: 12, outlinewidth: 0 } },
+    shapes: current ? [outline(current, "#ffffff", 5), outline(current, INK, 2.5)] : [],
+    hovermode: "closest",
+    margin: { l: 56, r: 8, t: 8, b: 40 },
+  });
+}
+
+function outline(cell, color, width) {
+  return {
+    type: "rect",
+    x0: cell.eccentricity_low,
+    x1: cell.eccentricity_high,
+    y0: cell.oil_temperature_low_c,
+    y1: cell.oil_temperature_high_c,
+    line: { color, width },
+  };
+}
+
+export function mapCaption(cells, current) {
+  const n = (support) => cells.filter((cell) => cell.support === support).length;
+  const counted = `${n("own")} cells learned (solid), ${n("borrowed")} borrowed from around (pale, struck through), ${n("none")} seen too seldom (cross).`;
+  if (!current) return `${counted} The rest has never been seen. No current cell.`;
+  const here = cells.find((cell) => cell.eccentricity_low === current.eccentricity_low && cell.oil_temperature_low_c === current.oil_temperature_low_c);
+  const where = here && here.support !== "none" ? "Outlined: where the bearing runs now." : "Outlined: where the bearing runs now, which has not been learned.";
+  return `${counted} The rest has never been seen. ${where}`;
+}

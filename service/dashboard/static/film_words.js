@@ -1,0 +1,125 @@
+/** Films compared with their baselines, in words for people, and how each verdict looks. */
+
+import { formatFixed } from "./format.js";
+import { reasonSentence } from "./words.js";
+
+const VERDICTS = {
+  normal: ["good", "Normal"],
+  alert: ["uncertain", "Alert"],
+  danger: ["bad", "Danger"],
+  gathering_evidence: ["absent", "Gathering evidence"],
+  no_baseline: ["absent", "No baseline"],
+  insufficient_excitation: ["absent", "Not enough excitation"],
+  bad_quality: ["absent", "Reading doubted"],
+  transient: ["absent", "Not settled"],
+  no_reading: ["absent", "No current reading"],
+};
+
+const JUDGED = ["normal", "alert", "danger"];
+
+const LEVELS = { alert: ["uncertain", "alert"], danger: ["bad", "danger"] };
+
+const WHY = {
+  gathering_evidence: () => "Too few readings have been compared with the baseline yet.",
+  insufficient_excitation: () => reasonSentence("insufficient_excitation"),
+  bad_quality: reasonSentence,
+  transient: () => "Films are compared once the unit has settled in one state, and has warmed up.",
+};
+
+const REASONS = {
+  none_in_force: "No baseline is in force for this bearing.",
+  condition_not_learned: "What the film is like under this condition has not been learned.",
+  attitude_not_learned: "The cell has been learned, but not with the shaft in this direction from the centre.",
+  baseline_changed: "The next reading is the first to be compared with the baseline in force.",
+  waiting_for_data: "No reading has been taken since the service started.",
+  stale: "The newest reading is too old to tell of now.",
+};
+
+const CAUSES = {
+  film: "film",
+  bracket_or_transducer: "bracket or transducer",
+  both: "film, and bracket or transducer",
+  unknown: "not known",
+};
+
+const STATES = {
+  unknown: "state unknown",
+  standstill: "standstill",
+  run_up: "run-up",
+  speed_no_load: "speed, no load",
+  part_load: "part load",
+  full_load: "full load",
+  run_down: "run-down",
+};
+
+export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
+
+/** Look and word of a verdict; a level that is held shows, whether or not it can be judged now. */
+export function verdictMark({ verdict, level }) {
+  const [look, word] = VERDICTS[verdict] ?? ["absent", verdict.replaceAll("_", " ")];
+  if (level === null || verdict === "alert" || verdict === "danger") return [look, word];
+  const [held, name] = LEVELS[level];
+  return [held, `${word}, ${name} held`];
+}
+
+/** Why a film is not judged, as a sentence; nothing if it is. */
+export function whyUnjudged({ verdict, reason }) {
+  if (JUDGED.includes(verdict)) return "";
+  return REASONS[reason] ?? WHY[verdict]?.(reason) ?? reasonSentence(reason);
+}
+
+/** `−19.2 %`, with its sign. */
+export function signedPercent(percent, decimals = 1) {
+  const digits = formatFixed(percent, decimals);
+  return `${/^[−]/.test(digits) || Number(digits) === 0 ? "" : "+"}${digits} %`;
+}
+
+/** `−19.2 % ± 2.8 % over 4 running hours; limit 4 %`. */
+export function changeSentence({ change, verdict }, limits) {
+  if (change === null) return "";
+  const since = JUDGED.includes(verdict) ? "" : "When it was judged last: ";
+  const spread = Math.max(change.high_95 - change.percent, change.percent - change.low_95);
+  const hours = `${formatFixed(change.time_scale_h, 0)} running hours`;
+  return `${since}${signedPercent(change.percent)} ± ${formatFixed(spread, 1)} % over ${hours}; limit ${limitWords(limits)}`;
+}
+
+const limitWords = ({ alert, danger }) => `${trimmed(100 * alert)} %, danger ${trimmed(100 * danger)} %`;
+const trimmed = (number) => String(Number(number.toFixed(2)));
+
+/** `Cause: film, since the shaft moves as …`. */
+export function causeSentence(cause) {
+  return cause === null ? "" : `Cause: ${CAUSES[cause.cause] ?? cause.cause}; ${cause.reason}.`;
+}
+
+/** `Full load, settled; cell: eccentricity 0.35 to 0.40, oil 45.0 to 47.5 °C`. */
+export function conditionWords(condition) {
+  if (condition === null) return "Condition not known now.";
+  const state = stateWords(condition.operating_state);
+  const settled = condition.is_settled ? "settled" : "not settled yet";
+  const cell = condition.cell ? `cell: ${cellWords(condition.cell)}` : "eccentricity or oil temperature not known";
+  return `${state.charAt(0).toUpperCase()}${state.slice(1)}, ${settled}; ${cell}.`;
+}
+
+export function cellWords(cell) {
+  const eccentricity = `eccentricity ${formatFixed(cell.eccentricity_low, 3)} to ${formatFixed(cell.eccentricity_high, 3)}`;
+  return `${eccentricity}, oil ${formatFixed(cell.oil_temperature_low_c, 1)} to ${formatFixed(cell.oil_temperature_high_c, 1)} °C`;
+}
+
+/** How far learning has come: `Learning: 12 of 20 days with readings.` */
+export function learningSentence({ learning, in_force: inForce, is_frozen: isFrozen, versions, acceptance }) {
+  if (learning === null) return "";
+  if (isFrozen) return "Frozen: nothing more is learned until it is thawed.";
+  if (learning.since === null) return "Learning has not begun: there is no reading yet.";
+  if (learning.n_days !== null) {
+    return `Learning: ${learning.n_days} of ${learning.n_days_wanted} days with settled readings.`;
+  }
+  if (inForce === null) return waitingWords(versions, acceptance);
+  return learning.is_over ? "The learning period is over; the baseline stands still until it is renewed." : "Learned again from time to time until the learning period ends.";
+}
+
+function waitingWords(versions, acceptance) {
+  const waiting = versions.find(({ status }) => status === "learned");
+  if (!waiting) return "No baseline is in force; nothing more can be said of the film.";
+  const why = acceptance === "by_engineer" ? "" : " It was not put in force by itself.";
+  return `Version ${waiting.version} waits for an engineer to accept it.${why}`;
+}

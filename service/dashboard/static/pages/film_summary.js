@@ -1,0 +1,31 @@
+/** The film of a bearing on its page: the verdict, and the way to its baseline. */
+
+import { NotReachable, ask } from "../api.js";
+import { element } from "../dom.js";
+import { poll } from "../poll.js";
+import { filmAddress } from "../route.js";
+import { verdictPanel } from "./film_verdict.js";
+
+const PERIOD_S = 5;
+
+/** Returns `{ node, draw(), close() }`. */
+export function filmSummary(path, unit, bearing) {
+  const link = element("a", { class: "more", href: filmAddress(unit, bearing) }, "Baseline, map and history");
+  const panel = verdictPanel(link);
+  const questions = askFilm(path, panel);
+  return { node: panel.node, draw() {}, close: questions.stop };
+}
+
+/** Asks for the film again and again; `heard` is told of every answer. */
+export function askFilm(path, panel, heard = () => {}) {
+  return poll(async (signal) => {
+    try {
+      const film = await ask([...path, "film"], [], signal);
+      panel.draw(film);
+      heard(film);
+    } catch (failure) {
+      if (signal.aborted) return;
+      panel.fail(failure instanceof NotReachable ? `service not reachable. ${failure.message}` : failure.message);
+    }
+  }, () => PERIOD_S);
+}

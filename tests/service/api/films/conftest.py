@@ -1,0 +1,158 @@
+"""A service that has watched a made-up machine for sixty days and learned its upper bearing."""
+
+import asyncio
+import math
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.assessment import Assessment
+from core.baseline.baseline import Watched
+from core.condition.bearing_condition import BearingCondition
+from core.condition.film_conditions import FilmConditions
+from core.condition.operating_state import OperatingState
+from core.condition.operation_history import operation_history
+from core.decision.decision import UNDECIDED
+from core.decision.verdict import Verdict
+from core.estimators import Estimator
+from core.films.film_finding import FilmFinding
+from core.films.film_judge import FilmNews
+from core.films.film_reading import FilmReading, FilmValue
+from core.quality import GOOD, Quality, Reading, Reason
+from core.stiffness_history import DIRECTIONS, Evidence, StiffnessHistory
+from service.films.learning import FilmPlace, Learner
+from service.live import LinkState
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.store.sqlite import SqliteStore
+
+DEMO = Path(__file__).parents[4] / "deploy" / "demo.toml"
+UJB = FilmPlace("U1", "UJB", Estimator.DYNAMIC)
+N_DAYS = 60
+PERIOD_NS = 600 * 10**9
+NOTHING_SAID = FilmFinding(Verdict.NO_BASELINE)
+CONDITION_COLUMNS = (
+    *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
+    *("attitude_deg", "oil_temperature_c"),
+)
+
+
+@pytest.fixture(scope="session")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> PlantFile:
+    """The demonstration plant, the films of unit U1 watched; U2 has no rated power."""
+    path = tmp_path_factory.mktemp("films") / "plant.toml"
+    power = 'power_channel = "active_power"\n'
+    head = "[films.operating]\nwarm_up_s = 3600.0\n\n[[unit]]"
+    text = DEMO.read_text(encoding="utf-8").replace(power, power + "rated_power_mw = 330.0\n", 1)
+    path.write_text(text.replace("[[unit]]", head, 1), encoding="utf-8")
+    return load_plant_file(path)
+
+
+@pytest.fixture(scope="session")
+def lived(film_life: Callable[..., StiffnessHistory]) -> StiffnessHistory:
+    return film_life(3, days=N_DAYS)
+
+
+@pytest.fixture(scope="session")
+def learned_file(
+    tmp_path_factory: pytest.TempPathFactory, plant: PlantFile, lived: StiffnessHistory
+) -> Path:
+    """A database with these days and the baseline that was learned of them."""
+    path = tmp_path_factory.mktemp("learned") / "padwatch.sqlite3"
+    store = SqliteStore(path)
+    limits = plant.films.operating.limits(92.3, 330.0)
+    found = operation_history(lived.time_ns, lived.speed_rpm, lived.power_mw, limits)
+    store.films.add_simulated(
+        FilmNews(
+            stored_reading(lived, i, OperatingState(found.state[i]), bool(found.is_settled[i])),
+            (NOTHING_SAID, NOTHING_SAID),
+            (UNDECIDED, UNDECIDED),
+        )
+        for i in range(len(lived))
+    )
+    assert Learner(store.films, plant.films).learn(UJB, int(lived.time_ns[-1])) is not None
+    store.close()
+    return path
+
+
+@pytest.fixture
+def store(learned_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
+    """A copy of it for each test to change."""
+    opened = SqliteStore(Path(shutil.copy(learned_file, tmp_path)))
+    yield opened
+    opened.close()
+
+
+def stored_reading(
+    lived: StiffnessHistory, i: int, state: OperatingState, is_settled: bool
+) -> FilmReading:
+    x, y = (
+        FilmValue(
+            float(lived.ln_k[row, i]),
+            float(lived.u_random[row, i]),
+            float(lived.shaft_um_pk[row, i]),
+            float(lived.bearing_um_pk[row, i]),
+            Evidence.MEASURED,
+            Reason.OK,
+        )
+        for row in range(2)
+    )
+    condition = BearingCondition(state, is_settled, None)
+    numbers = {name: float(getattr(lived, name)[i]) for name in CONDITION_COLUMNS}
+    time_ns = int(lived.time_ns[i])
+    return FilmReading("U1", "UJB", Estimator.DYNAMIC, time_ns, condition, **numbers, values=(x, y))
+
+
+class Machine:
+    """Unit U1 after these days, run on by a test: one result of each bearing every ten minutes."""
+
+    def __init__(
+        self, service: Any, lived: StiffnessHistory, assessment: Callable[..., Assessment]
+    ) -> None:
+        self._service, self._lived, self._assessment = service, lived, assessment
+        self.time_ns = int(lived.time_ns[-1])
+        service.live.set_link("U1", LinkState.CONNECTED)
+        self.run(1)  # in the first interval nothing is read
+
+    def run(self, n: int, ln_change: float = 0.0, quality: Quality = GOOD, **other: Any) -> None:
+        """Go on for some intervals, under the condition of the newest reading that was learned."""
+        for _ in range(n):
+            self.time_ns += PERIOD_NS
+            self._service.clock.ns = self.time_ns
+            found = [self._result(b, ln_change, quality, other) for b in ("UJB", "LJB", "TJB")]
+            seen, news = self._service.films.take("U1", found)
+            for one in seen:
+                self._service.live.set_assessment(one)
+            self._service.store.append([], [], [], news)
+
+    def _result(
+        self, bearing: str, ln_change: float, quality: Quality, other: dict[str, float]
+    ) -> Assessment:
+        numbers = {name: float(getattr(self._lived, name)[-1]) for name in CONDITION_COLUMNS}
+        k = {}
+        for direction in DIRECTIONS:
+            value = None if quality.level else math.exp(self._learned(direction) + ln_change)
+            name = f"dynamic_k_{direction * 2}_n_per_m"
+            k[name] = Reading(value, quality, None if value is None else 5e6)
+        numbers["attitude_angle_deg"] = numbers.pop("attitude_deg")
+        numbers.pop("u_eccentricity")
+        return self._assessment(self.time_ns, bearing=bearing, **k, **{**numbers, **other})
+
+    def _learned(self, direction: str) -> float:
+        """What was learned of the upper bearing under that condition, in ln."""
+        learned = self._service.films.baseline("U1", "UJB").of(Watched.STIFFNESS, direction)
+        newest = FilmConditions.of(self._lived).rows(np.array([len(self._lived) - 1]))
+        return float(learned.surface.at(newest)[0])
+
+
+@pytest.fixture
+async def machine(
+    service: Any, lived: StiffnessHistory, assessment: Callable[..., Assessment]
+) -> Machine:
+    """That machine, running on."""
+    await asyncio.sleep(0)
+    return Machine(service, lived, assessment)

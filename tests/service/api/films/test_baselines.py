@@ -1,0 +1,195 @@
+"""Baselines over HTTP: what was learned, and what engineers do to it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+
+from core.baseline.baseline import Watched
+from core.baseline.exchange import from_json
+from core.stiffness_history import StiffnessHistory
+from service.api.times import rfc3339
+
+AsProblem = Callable[[httpx2.Response], dict[str, Any]]
+
+BASELINES = "/api/v1/units/U1/bearings/UJB/baselines"
+FILM = "/api/v1/units/U1/bearings/UJB/film"
+ANNA = {"actor": "A. Name", "reason": "checked against the overhaul report"}
+
+
+async def post(service: Any, path: str, body: Any, **headers: str) -> httpx2.Response:
+    response: httpx2.Response = await service.client.post(path, json=body, headers=headers)
+    return response
+
+
+async def test_versions_say_where_they_come_from_and_which_is_in_force(
+    service: Any, lived: StiffnessHistory
+) -> None:
+    found = await service.json(BASELINES)
+
+    [version] = found["versions"]
+    assert (found["in_force"], found["is_frozen"], found["estimator"]) == (1, False, "dynamic")
+    assert (version["version"], version["status"], version["author"]) == (1, "in_force", "padwatch")
+    assert version["learned_from"] == rfc3339(int(lived.time_ns[0]))
+    assert version["learned_until"] == rfc3339(int(lived.time_ns[-1]))
+    assert [(step["step"], step["actor"]) for step in found["steps"]] == [
+        ("accepted", "padwatch"),
+        ("learned", "padwatch"),
+    ]
+    assert found["learning"]["n_days"] is None  # it has been learned
+    assert found["learning"]["since"] == rfc3339(int(lived.time_ns[0]))
+
+
+async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
+    service: Any, machine: Any
+) -> None:
+    path = "/api/v1/units/U1/bearings/LJB/baselines"
+    machine.run(3)
+
+    found = await service.json(path)
+
+    assert (found["in_force"], found["versions"], found["steps"]) == (None, [], [])
+    assert (found["learning"]["n_days"], found["learning"]["n_readings"]) == (1, 3)
+    assert found["learning"]["n_days_wanted"] == 20
+    assert found["learning"]["is_over"] is False
+
+
+async def test_cells_are_the_learned_ones_in_plant_units(service: Any) -> None:
+    found = await service.json(f"{BASELINES}/1")
+
+    learned = service.store.films.baseline("U1", "UJB", 1).of(Watched.STIFFNESS, "x")
+    cells, stored = found["x"]["cells"], learned.table.cells
+    assert {len(column) for column in cells.values() if column} == {len(stored)}
+    assert cells["stiffness_n_per_m"] == pytest.approx([np.exp(c.location) for c in stored])
+    assert cells["n_days"] == [cell.n_days for cell in stored]
+    assert cells["support"] == [cell.support.value for cell in stored]
+    assert {"own", "borrowed"} <= set(cells["support"])
+    assert cells["scatter_percent"] == pytest.approx([100.0 * c.scatter for c in stored])
+    for low, high, e in zip(
+        cells["eccentricity_low"],
+        cells["eccentricity_high"],
+        cells["eccentricity_ratio"],
+        strict=True,
+    ):
+        assert high - low == pytest.approx(found["eccentricity_width"])
+        assert low <= e <= high
+    assert found["about"]["status"] == "in_force"
+
+
+async def test_an_exported_baseline_reads_back_as_it_was_learned(service: Any) -> None:
+    response = await service.get(f"{BASELINES}/1/export")
+
+    assert (
+        response.headers["content-disposition"] == 'attachment; filename="U1-UJB-baseline-1.json"'
+    )
+    assert response.headers["content-type"] == "application/json"
+    assert from_json(response.text) == service.store.films.baseline("U1", "UJB", 1)
+
+
+async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_again(
+    service: Any, machine: Any
+) -> None:
+    machine.run(2)
+    rejected = await post(service, f"{BASELINES}/1/reject", ANNA)
+    then = await service.json(FILM)
+    accepted = await post(service, f"{BASELINES}/1/accept", {**ANNA, "reason": "it was right"})
+
+    assert rejected.status_code == accepted.status_code == 200
+    assert rejected.json()["in_force"] is None
+    assert rejected.json()["versions"][0]["status"] == "rejected"
+    newest = rejected.json()["steps"][0]
+    assert (newest["step"], newest["actor"], newest["reason"]) == (
+        "withdrawn",
+        ANNA["actor"],
+        ANNA["reason"],
+    )
+    assert then["baseline_version"] is None
+    assert (then["x"]["verdict"], then["x"]["reason"]) == ("no_reading", "baseline_changed")
+    assert accepted.json()["in_force"] == 1
+    assert service.films.baseline("U1", "UJB").origin.version == 1
+    assert [s.actor for s in service.store.films.steps("U1", "UJB")][-2:] == ["A. Name"] * 2
+
+
+async def test_a_frozen_baseline_is_thawed_again(service: Any) -> None:
+    frozen = (await post(service, f"{BASELINES}/freeze", ANNA)).json()
+    thawed = (await post(service, f"{BASELINES}/thaw", ANNA)).json()
+
+    assert (frozen["is_frozen"], frozen["versions"][0]["is_frozen"]) == (True, True)
+    assert frozen["in_force"] == thawed["in_force"] == 1
+    assert thawed["is_frozen"] is False
+
+
+async def test_after_an_overhaul_nothing_is_in_force_until_it_has_been_learned(
+    service: Any, machine: Any, lived: StiffnessHistory
+) -> None:
+    machine.run(1)
+    event = rfc3339(int(lived.time_ns[-1]))
+
+    answer = await post(service, f"{BASELINES}/renew", {**ANNA, "event_time": event})
+
+    found = answer.json()
+    assert (answer.status_code, found["in_force"], found["renewed"]) == (200, None, event)
+    assert found["versions"][0]["status"] == "superseded"
+    assert (found["steps"][0]["step"], found["steps"][0]["event_time"]) == ("renewed", event)
+    assert (found["learning"]["since"], found["learning"]["n_days"]) == (event, 1)
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "words"),
+    [
+        ("1/accept", ANNA, "in force already"),
+        ("thaw", ANNA, "not frozen"),
+        ("renew", {**ANNA, "event_time": "2999-01-01T00:00:00Z"}, "future"),
+    ],
+)
+async def test_what_does_not_fit_is_refused_and_changes_nothing(
+    service: Any, as_problem: AsProblem, path: str, body: Any, words: str
+) -> None:
+    before = await service.json(BASELINES)
+
+    answer = await post(service, f"{BASELINES}/{path}", body)
+
+    assert answer.status_code == 409
+    assert words in as_problem(answer)["detail"]
+    assert await service.json(BASELINES) == before
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "parameter"),
+    [
+        ("freeze", {"actor": "A. Name"}, "reason"),
+        ("freeze", {"actor": "A. Name", "reason": " "}, "reason"),
+        ("freeze", {"actor": "A. Name", "reason": "x" * 501}, "reason"),
+        ("freeze", {"actor": "", "reason": "x"}, "actor"),
+        ("freeze", {**ANNA, "event_time": "2024-01-01T00:00:00Z"}, "event_time"),
+        ("renew", ANNA, "event_time"),
+        ("renew", {**ANNA, "event_time": "2024-01-01T00:00:00"}, "event_time"),
+        ("renew", {**ANNA, "event_time": 1704067200}, "event_time"),
+        ("renew", {**ANNA, "event_time": "1969-01-01T00:00:00Z"}, "event_time"),
+        ("0/accept", ANNA, "version"),
+    ],
+)
+async def test_a_wrong_request_is_refused_by_name(
+    service: Any, as_problem: AsProblem, path: str, body: Any, parameter: str
+) -> None:
+    answer = await post(service, f"{BASELINES}/{path}", body)
+
+    assert answer.status_code == 422
+    assert as_problem(answer)["errors"][0]["parameter"] == parameter
+
+
+async def test_nobody_acts_from_another_site_or_on_what_is_not_there(
+    service: Any, as_problem: AsProblem
+) -> None:
+    foreign = await post(service, f"{BASELINES}/freeze", ANNA, origin="https://elsewhere.example")
+    unknown = await post(service, f"{BASELINES}/9/accept", ANNA)
+    unwatched = await post(service, "/api/v1/units/U2/bearings/UJB/baselines/freeze", ANNA)
+
+    assert foreign.status_code == 403
+    assert as_problem(unknown)["detail"] == "unit 'U1' bearing 'UJB' has no baseline 9"
+    assert unknown.status_code == 404
+    assert unwatched.status_code == 409
+    assert "rated_power_mw" in as_problem(unwatched)["detail"]
+    assert (await service.json(BASELINES))["is_frozen"] is False

@@ -1,0 +1,106 @@
+"""Readings of films over HTTP: what was stored, with the conditions, thinned or page by page."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.stiffness_history import StiffnessHistory
+from service.api.times import rfc3339
+
+READINGS = "/api/v1/units/U1/bearings/UJB/film/readings"
+DAY_NS = 86_400_000_000_000
+ALL = {"start": "2023-01-01T00:00:00Z", "end": "2024-06-01T00:00:00Z"}
+
+
+async def test_readings_are_the_stored_ones_with_their_conditions(
+    service: Any, lived: StiffnessHistory
+) -> None:
+    end = rfc3339(int(lived.time_ns[0]) + DAY_NS)
+    found = await service.json(READINGS, start=ALL["start"], end=end)
+
+    n = found["n_found"]
+    assert n == int(np.sum(lived.time_ns < lived.time_ns[0] + DAY_NS)) == len(found["time"])
+    assert found["time"] == pytest.approx(lived.time_ns[:n] / 1e9)
+    assert found["x"]["stiffness_n_per_m"] == pytest.approx(np.exp(lived.ln_k[0, :n]))
+    assert found["y"]["u_random_n_per_m"] == pytest.approx(
+        np.exp(lived.ln_k[1, :n]) * lived.u_random[1, :n]
+    )
+    assert found["eccentricity_ratio"] == lived.eccentricity_ratio[:n].tolist()
+    assert found["oil_temperature_c"] == lived.oil_temperature_c[:n].tolist()
+    assert set(found["provenance"]) == {"simulated"}
+    assert set(found["x"]["verdict"]) == {"no_baseline"}
+    assert set(found["baseline_version"]) == {None}
+    assert set(found["operating_state"]) <= {"part_load", "full_load"}
+    assert not found["is_settled"][0]
+    assert found["next_end"] is None
+    for series in (found["x"], found["y"]):
+        assert {len(column) for column in series.values()} == {n}
+
+
+async def test_more_readings_than_wanted_are_thinned_evenly_up_to_the_newest(
+    service: Any, lived: StiffnessHistory
+) -> None:
+    found = await service.json(READINGS, **ALL, max_points=50)
+
+    assert found["n_found"] == len(lived)
+    assert len(found["time"]) == 50
+    assert (found["time"][0], found["time"][-1]) == (
+        lived.time_ns[0] / 1e9,
+        lived.time_ns[-1] / 1e9,
+    )
+    assert found["next_end"] is None
+
+
+async def test_all_readings_come_page_by_page_without_a_gap_or_a_double(
+    service: Any, lived: StiffnessHistory
+) -> None:
+    times: list[float] = []
+    end = ALL["end"]
+    while end:
+        page = await service.json(READINGS, start=ALL["start"], end=end, thin=False, max_points=999)
+        times = page["time"] + times
+        end = page["next_end"]
+
+    assert times == (lived.time_ns / 1e9).tolist()
+
+
+async def test_readings_are_filtered_by_state_eccentricity_and_oil(
+    service: Any, lived: StiffnessHistory
+) -> None:
+    found = await service.json(
+        READINGS,
+        **ALL,
+        state="full_load",
+        eccentricity_min=0.4,
+        eccentricity_max=0.45,
+        oil_temperature_min=45,
+        max_points=20_000,
+    )
+
+    e, oil_c = np.array(found["eccentricity_ratio"]), np.array(found["oil_temperature_c"])
+    assert 0 < e.size < len(lived)
+    assert np.all((e >= 0.4) & (e <= 0.45) & (oil_c >= 45.0))
+    assert set(found["operating_state"]) == {"full_load"}
+
+
+async def test_what_is_measured_is_told_from_what_was_simulated(service: Any, machine: Any) -> None:
+    machine.run(30)
+
+    found = await service.json(READINGS, **ALL, thin=False, max_points=31)
+
+    assert found["provenance"] == ["simulated"] + ["measured"] * 30
+    assert found["x"]["verdict"][-1] == "normal"
+    assert found["baseline_version"][-1] == 1
+    assert found["x"]["deviation_percent"][-1] == pytest.approx(0.0, abs=1e-6)
+    assert found["x"]["deviation_percent"][0] is None
+
+
+async def test_readings_of_a_film_that_is_not_watched_are_refused_with_the_reason(
+    service: Any,
+) -> None:
+    found = await service.problem("/api/v1/units/U2/bearings/UJB/film/readings", 409, **ALL)
+    unknown = await service.problem("/api/v1/units/U1/bearings/XJB/film/readings", 404, **ALL)
+
+    assert "rated_power_mw" in found["detail"]
+    assert "XJB" in unknown["detail"]
