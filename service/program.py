@@ -30,6 +30,7 @@ from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of, router_of
+from service.wiring.evidence import evidence_desk, evidence_of, watch
 from service.wiring.sources import vector_rows
 from service.wiring.stores import open_store
 
@@ -143,6 +144,8 @@ async def _run(
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
     around.watch_films(films.newest)
+    evidence = evidence_of(plant, performance.origin, live, films, store, captures, clock)
+    watch(evidence, alarms, captures, performance.origin)
     runner = Runner(units, live, recorder, clock, alarms, films, bus)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
@@ -159,6 +162,7 @@ async def _run(
         recorder=recorder,
         captures=captures,
         deliveries=deliveries,
+        evidence=evidence_desk(plant, store, evidence, clock),
         origin=performance.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
     )
@@ -177,6 +181,7 @@ async def _run(
             looking = tasks.create_task(references.run(), name="references")
             watching = tasks.create_task(alarms.run(), name="alarms")
             capturing = tasks.create_task(captures.run(), name="captures")
+            witnessing = tasks.create_task(evidence.run(), name="evidence")
             learning = tasks.create_task(_learn(films, performance.origin), name="learn")
             delivering = tasks.create_task(deliveries.run(), name="deliver")
             serving = tasks.create_task(server.serve([listener]), name="serve")
@@ -185,11 +190,13 @@ async def _run(
                 running.add_done_callback(lambda _: stopped.set())
             await stopped.wait()
             server.should_exit = True
-            for task in (running, looking, watching, capturing, learning, delivering, announcing):
+            helping = (capturing, witnessing, learning, delivering, announcing)
+            for task in (running, looking, watching, *helping):
                 task.cancel()
             await asyncio.wait([serving])
     finally:
         await captures.close()
+        await evidence.close()
         await recorder.flush()  # also when a bug ends the program
 
 

@@ -10,6 +10,7 @@ from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.context import Context
 from service.api.delivery_routes import delivery_router
+from service.api.evidence_routes import evidence_router
 from service.api.film_routes import film_router
 from service.api.health_routes import health_router
 from service.api.order1_reference_routes import order1_reference_router
@@ -59,6 +60,7 @@ def create_app(context: Context) -> FastAPI:
         alarm_rate_router(context),
         order1_reference_router(context),
         operation_router(context),
+        evidence_router(context),
         delivery_router(context),
         alarm_by_id_router(context),
     ):

@@ -11,6 +11,7 @@ from service.alarms.engine import AlarmEngine
 from service.api.problems import ProblemError
 from service.capture.captures import Captures
 from service.delivery.deliveries import Deliveries
+from service.evidence.desk import EvidenceDesk
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
 from service.origin import Origin
@@ -35,6 +36,8 @@ class Context:
     ----------
     refresh_s
         Time from one result to the next.
+    evidence
+        Of alarms; None where none is kept.
     """
 
     plant_name: str
@@ -51,6 +54,7 @@ class Context:
     deliveries: Deliveries
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
+    evidence: EvidenceDesk | None = None
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -19,6 +19,7 @@ from service.evidence.configuration import canonical
 from service.evidence.document import Evidence
 from service.evidence.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed
 from service.evidence.keeper import EvidenceFolders
+from service.store.film_port import FilmStore
 from service.store.port import AlarmQuery, Store
 
 PAGE = 1000
@@ -72,6 +73,11 @@ class EvidenceArchive:
 
     def __init__(self, folders: EvidenceFolders, store: Store) -> None:
         self.folders, self._store = folders, store
+
+    @property
+    def films(self) -> FilmStore:
+        """Readings of films, as they are stored now."""
+        return self._store.films
 
     def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
         """The newest occurrences of an alarm, newest first.

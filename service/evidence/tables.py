@@ -27,7 +27,7 @@ WORDS = np.array([verdict.name.lower() for verdict in Verdict])
 
 AnyArray = npt.NDArray[Any]
 
-Columns = dict[str, list[float | int | str | None]]
+Columns = dict[str, list[Any]]
 """A table by column, as Python has it."""
 
 
@@ -61,6 +61,10 @@ def orbits_table(found: Iterable[Assessment]) -> bytes | None:
 
 def trend_table(found: FilmHistory) -> bytes:
     """Readings of a film, oldest first."""
+    return _written(_trend(found))
+
+
+def _trend(found: FilmHistory) -> "pa.Table":
     history = found.history
     shared: dict[str, AnyArray] = {
         "time_ns": history.time_ns,
@@ -90,7 +94,13 @@ def trend_table(found: FilmHistory) -> bytes:
             ("deviation_std", found.deviation_std),
         )
     }
-    return _written(pa.table({name: _column(each) for name, each in (shared | pairs).items()}))
+    return pa.table({name: _column(each) for name, each in (shared | pairs).items()})
+
+
+def trend_columns(found: FilmHistory) -> Columns:
+    """The same readings as Python has them."""
+    columns: Columns = _trend(found).to_pydict()
+    return columns
 
 
 def read_table(path: Path) -> Columns:

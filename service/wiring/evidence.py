@@ -9,6 +9,7 @@ from service.capture.captures import Captures
 from service.cli.made_by import made_by
 from service.evidence.archive import EvidenceArchive
 from service.evidence.configuration import built_from, configuration_of
+from service.evidence.desk import EvidenceDesk
 from service.evidence.folders import EvidenceLimits
 from service.evidence.keeper import EvidenceFolders, EvidenceKeeper
 from service.evidence.maker import Maker
@@ -30,9 +31,12 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
     return EvidenceFolders(root / EVIDENCE, root / CAPTURES, root / CONFIGURATIONS)
 
 
-def evidence_archive(plant: PlantFile, store: Store) -> EvidenceArchive:
-    """What there is of it."""
-    return EvidenceArchive(evidence_folders(plant), store)
+def evidence_desk(
+    plant: PlantFile, store: Store, keeper: EvidenceKeeper, clock: Clock
+) -> EvidenceDesk:
+    """Where evidence is asked for."""
+    archive = EvidenceArchive(evidence_folders(plant), store)
+    return EvidenceDesk(archive, keeper, plant.evidence.trend_days, clock)
 
 
 def evidence_of(

@@ -18,6 +18,7 @@ from service.api.app import create_app
 from service.api.context import Context
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.delivery.deliveries import Deliveries
+from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
 from service.live import LinkState, LiveView
@@ -28,6 +29,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
 from service.wiring.captures import captures_of
+from service.wiring.evidence import evidence_desk, evidence_of, watch
 from service.wiring.simulations import simulated_feed
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
@@ -82,6 +84,7 @@ class Service:
     document: dict[str, Any]
     alarms: AlarmEngine
     recorder: Recorder
+    evidence: EvidenceKeeper
     films: FilmKeeper
 
     async def get(self, path: str, **parameters: object) -> httpx2.Response:
@@ -116,6 +119,12 @@ def as_problem() -> Callable[[httpx2.Response], dict[str, Any]]:
     return problem_of
 
 
+def with_folder(plant: PlantFile, folder: Path) -> PlantFile:
+    """The same plant with its data in a folder."""
+    service = plant.service.model_copy(update={"data_folder": str(folder)})
+    return plant.model_copy(update={"service": service})
+
+
 @pytest.fixture
 def store(tmp_path: Path) -> Iterator[SqliteStore]:
     opened = SqliteStore(tmp_path / "padwatch.sqlite3")
@@ -124,7 +133,7 @@ def store(tmp_path: Path) -> Iterator[SqliteStore]:
 
 
 @pytest.fixture
-async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service]:
+async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> AsyncIterator[Service]:
     """A service that has just started: nothing is connected, nothing stored."""
     clock = SetClock()
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
@@ -137,6 +146,9 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
     captures = captures_of(plant, Origin.REPLAY, clock)
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
+    own = with_folder(plant, tmp_path)
+    evidence = evidence_of(own, origin, live, films, store, captures, clock)
+    watch(evidence, alarms, captures, origin)
     recording = asyncio.create_task(recorder.run())
     context = Context(
         plant_name=plant.plant.name,
@@ -152,12 +164,14 @@ async def service(plant: PlantFile, store: SqliteStore) -> AsyncIterator[Service
         captures=captures,
         deliveries=Deliveries([], store.outbox, clock),
         max_shelf_s=7200.0,
+        evidence=evidence_desk(own, store, evidence, clock),
     )
     app = create_app(context)
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
+        document = app.openapi()
         yield Service(
-            live, store, clock, references, client, app.openapi(), alarms, recorder, films
+            live, store, clock, references, client, document, alarms, recorder, evidence, films
         )
     recording.cancel()
     await asyncio.wait([recording])

@@ -1,0 +1,1 @@
+"""One page that tells of an occurrence of an alarm, to read or to print."""

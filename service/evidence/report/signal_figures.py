@@ -1,0 +1,65 @@
+"""Spectra and orbit of the alarm's bearing."""
+
+import math
+
+from service.evidence.plots.plot import Plot
+from service.evidence.plots.scales import Scale
+from service.evidence.report.case import Case
+from service.evidence.report.figure import Figure
+from service.evidence.tables import Columns
+
+
+def spectra_figure(case: Case) -> Figure | None:
+    """Spectra of shaft and bearing."""
+    bearing, axis = case.bearing, case.direction
+    rows = _rows(case.spectra, case.evidence.bearing)
+    if bearing is None or len(rows) < 3:
+        return None
+    f, shaft, frame = (
+        [case.spectra[name][i] for i in rows]
+        for name in ("frequency_hz", f"shaft_{axis}_um_pk", f"bearing_{axis}_um_pk")
+    )
+    seen = [value for value in (*shaft, *frame) if value and value > 0.0]
+    if not seen:
+        return None
+    top = max(seen)
+    floor = max(min(seen), top * 1e-5)
+    plot = Plot(
+        *(450.0, 170.0),
+        Scale(0.0, f[-1]),
+        Scale(10.0 ** math.floor(math.log10(floor)), 10.0 ** math.ceil(math.log10(top)), True),
+        *("Frequency, Hz", f"Amplitude {axis}, µm 0-pk", "Spectra", "spectra"),
+    )
+    for name, words in (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex")):
+        reading = bearing.readings.get(name)
+        if reading is not None and reading.value is not None:
+            plot.upright(reading.value, "marked", words)
+    plot.line(f, shaft, "shaft")
+    plot.line(f, frame, "bearing")
+    return Figure(
+        plot.svg(),
+        f"Averaged spectra in {axis} as displacement, {bearing.window.n_segments} segments in"
+        f" {bearing.window.duration_s:.0f} s before the alarm. Blue: shaft relative to bearing."
+        " Orange: bearing.",
+    )
+
+
+def orbit_figure(case: Case) -> Figure | None:
+    """The newest turns of the shaft."""
+    rows = _rows(case.orbits, case.evidence.bearing)
+    if len(rows) < 2:
+        return None
+    x, y = ([case.orbits[name][i] for i in rows] for name in ("shaft_x_um", "shaft_y_um"))
+    most = 1.1 * max(abs(value) for value in (*x, *y)) or 1.0
+    plot = Plot(
+        *(188.0, 170.0),
+        Scale(-most, most),
+        Scale(-most, most),
+        *("Shaft x, µm", "Shaft y, µm", "Orbit", "orbit"),
+    )
+    plot.line(x, y, "shaft", math.inf)
+    return Figure(plot.svg(), "The newest turns of the shaft in its bearing, means removed.")
+
+
+def _rows(table: Columns, bearing: str | None) -> list[int]:
+    return [i for i, each in enumerate(table.get("bearing", ())) if each == bearing]
