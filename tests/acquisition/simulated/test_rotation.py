@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from acquisition.simulated.rotation import Rotation
+from acquisition.simulated.rotation import FollowedRotation, Rotation
 
 RATE_HZ = 600.0
 TURN_HZ = 92.3 / 60.0
@@ -34,3 +34,14 @@ def test_without_wander_the_turns_are_even() -> None:
 
     assert np.array_equal(even.turns(index), TURN_HZ / RATE_HZ * index)
     assert np.array_equal(even.relative_speed(index), np.ones(10_000))
+
+
+def test_a_shaft_that_is_followed_turns_by_its_mean_speed_without_a_jump() -> None:
+    rotation, passed = FollowedRotation(60.0, RATE_HZ), []
+    for number, (start_rpm, stop_rpm) in enumerate(((60.0, 60.0), (60.0, 30.0), (30.0, 0.0))):
+        rotation.follow(600 * number, 600, start_rpm, stop_rpm)
+        index = np.arange(600.0 * number, 600.0 * number + 601.0)
+        turns, relative = rotation.turns(index), rotation.relative_speed(index)
+        assert np.diff(turns) * RATE_HZ == pytest.approx((relative[1:] + relative[:-1]) / 2.0)
+        passed += [turns[0], turns[-1]]
+    assert passed == pytest.approx([0.0, 1.0, 1.0, 1.75, 1.75, 2.0])
