@@ -72,7 +72,8 @@ def _change(value: float, limit: float | None, std: float | None) -> str:
     """A change of a stiffness in ln, in percent of the baseline."""
     percent = 100.0 * math.expm1(value)
     spread = "" if std is None else f" ± {2 * 100.0 * std * math.exp(value):.1f} (95 %)"
-    passed = "" if limit is None else f"; limit {100.0 * -math.expm1(-abs(limit)):.1f} % less"
+    edge = None if limit is None else 100.0 * math.expm1(math.copysign(limit, value))
+    passed = "" if edge is None else f"; limit {edge:+.1f} %"
     return f"{percent:+.1f}{spread} % against the baseline at the same condition{passed}"
 
 

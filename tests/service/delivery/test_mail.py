@@ -119,7 +119,7 @@ async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_con
     assert "Itaipu, U1 UJB (Unit 1)" in text
     assert "Since:     2026-01-01T00:00:04.000Z" in text
     assert "-18.1 ± 1.6 (95 %) % against the baseline at the same condition" in text
-    assert "limit 9.5 % less" in text
+    assert "limit -9.5 %" in text
     assert "Operation: full load" in text
     assert "Oil temperature:     48.25 °C" in text
     assert "https://padwatch.example/#/alarms" in text
