@@ -110,6 +110,7 @@ class EvidenceKeeper:
     async def run(self) -> None:
         """Write what is to be written, for ever; afterwards `close`."""
         await self._trying(self._begin)
+        await self._trying(self._make_room)
         while True:
             await self._news.wait()
             self._news.clear()

@@ -1,0 +1,118 @@
+"""A plant with results, alarms that are raised on it, and the keeper of their evidence."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.event import AlarmNews
+from core.alarms.life_cycle import advance
+from core.assessment import Assessment
+from core.quality import Reading
+from service.conversion import machine_of
+from service.evidence.archive import EvidenceArchive
+from service.films.keeper import FilmKeeper
+from service.films.start import film_keeper
+from service.live import LinkState, LiveView
+from service.origin import Origin
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.store.sqlite import SqliteStore
+from service.wiring.captures import captures_of
+from service.wiring.evidence import evidence_folders, evidence_of
+
+T0 = 1_767_225_600_000_000_000
+SECOND = 1_000_000_000
+
+
+def news_of(
+    at_s: float = 0.0,
+    kind: AlarmKind = AlarmKind.SHAFT_X,
+    subject: str = "UJB",
+    unit: str = "U1",
+    occurrence: int = 1,
+) -> AlarmNews:
+    """An alarm that has just been raised for the so-many-th time."""
+    before = occurrence - 1
+    identity = AlarmIdentity(unit, subject, kind)
+    alarm = Alarm(identity, occurrence=before, n_events=before)
+    found = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
+    return AlarmNews(*advance(alarm, found, T0 + round(at_s * SECOND), AlarmRule()))
+
+
+class Rig:
+    """A plant's evidence on a real disk beside a real store."""
+
+    def __init__(
+        self, plant: PlantFile, clock: Any, films: FilmKeeper, store: SqliteStore, live: LiveView
+    ) -> None:
+        self.plant, self.clock, self.store, self.live, self.films = plant, clock, store, live, films
+        self.folders = evidence_folders(plant)
+        captures = captures_of(plant, Origin.REPLAY, clock)
+        self.keeper = evidence_of(plant, Origin.LIVE, live, films, store, captures, clock)
+        self.archive = EvidenceArchive(self.folders, store)
+
+    def raise_(self, news: AlarmNews) -> None:
+        """Let it happen: seen, and stored."""
+        self.keeper.see([news])
+        self.store.append([], [], [news])
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        async with asyncio.timeout(60):
+            while not condition():
+                await asyncio.sleep(0.001)
+
+    async def written(self, n: int) -> None:
+        await self.until(lambda: self.keeper.n_written == n and self.keeper.n_pending == 0)
+
+    @property
+    def bundles(self) -> list[Path]:
+        return sorted(path for path in self.folders.evidence.glob("*/*") if path.is_dir())
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        task = asyncio.create_task(self.keeper.run())
+        yield
+        task.cancel()
+        await asyncio.wait([task])
+        await self.keeper.close()
+
+
+@pytest.fixture
+def news() -> Callable[..., AlarmNews]:
+    return news_of
+
+
+@pytest.fixture
+def plant(tmp_path: Path, deploy: Path) -> PlantFile:
+    """The demonstration plant, its data in a folder of the test."""
+    found = load_plant_file(deploy / "demo.toml")
+    service = found.service.model_copy(update={"data_folder": str(tmp_path / "data")})
+    return found.model_copy(update={"service": service})
+
+
+@pytest.fixture
+async def rig_of(
+    plant: PlantFile, tmp_path: Path, stepped_clock: Any, assessment: Callable[..., Assessment]
+) -> AsyncIterator[Callable[..., Any]]:
+    """Builds a rig; another one over the same plant is the service after a restart."""
+    opened: list[SqliteStore] = []
+
+    async def build(of: PlantFile = plant) -> Rig:
+        store = SqliteStore(tmp_path / "padwatch.sqlite3")
+        opened.append(store)
+        live = LiveView([unit.id for unit in of.unit], stepped_clock, 30.0)
+        live.set_link("U1", LinkState.CONNECTED)
+        for bearing in ("UJB", "LJB"):
+            live.set_assessment(assessment(bearing=bearing, order1_shaft_x_um_pk=Reading(160.0)))
+        machines = {unit.id: machine_of(unit) for unit in of.unit}
+        films = await film_keeper(of, machines, store.films, stepped_clock)
+        return Rig(of, stepped_clock, films, store, live)
+
+    yield build
+    for store in opened:
+        store.close()

@@ -1,0 +1,230 @@
+"""Every occurrence of an alarm leaves its evidence, or it is said that it did not."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.alarms.alarm import AlarmKind
+from core.quality import Reading
+from service.evidence import keeper as module
+from service.evidence.archive import DamagedEvidenceError, EvidenceState
+from service.evidence.document import Evidence
+from service.evidence.folders import INCOMPLETE, place_of
+
+NOBODY: frozenset[tuple[str, int]] = frozenset()
+SHAFT = "U1:UJB:order1_shaft_x"
+
+
+def document(folder: Path) -> Evidence:
+    return Evidence.model_validate_json((folder / "evidence.json").read_bytes())
+
+
+def states(rig: Any, alarm: str = SHAFT) -> list[tuple[int, str]]:
+    found = rig.archive.occurrences(alarm, rig.keeper.pending, 100)
+    return [(each.event.occurrence, each.state.value) for each in found]
+
+
+async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    async with rig.running():
+        rig.raise_(news(12.5))
+        await rig.written(1)
+
+    [folder] = rig.bundles
+    assert folder.parent.name == "U1"
+    assert folder.name == "20260101T000012.500Z-UJB-order1_shaft_x-1"
+    found = document(folder)
+    assert (found.alarm.value, found.alarm.limit, found.alarm.change) == (160.0, 150.0, "raised")
+    assert (found.bearing, found.direction, found.unit.link) == ("UJB", "x", "connected")  # type: ignore[union-attr]
+    assert [each.bearing for each in found.bearings] == ["UJB", "LJB"]
+    assert found.bearings[0].readings["order1_shaft_x_um_pk"].value == 160.0
+    assert {each.estimator for each in found.bearings[0].estimators} == {
+        *("dynamic", "transfer_order1", "transfer_vortex", "ratio_order1", "ratio_vortex")
+    }
+    assert found.missing == ["bearing TJB had no result yet"]
+    assert set(found.files) == {"spectra.parquet"}
+    assert states(rig) == [(1, "complete")]
+
+
+async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
+    rig_of: Callable[..., Any], news: Callable[..., Any], assessment: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    rig.raise_(news())
+    rig.live.set_assessment(assessment(order1_shaft_x_um_pk=Reading(20.0)))
+    async with rig.running():
+        await rig.written(1)
+
+    reading = document(rig.bundles[0]).bearings[0].readings["order1_shaft_x_um_pk"]
+    assert reading.value == 160.0
+
+
+async def test_the_service_itself_and_lost_links_have_evidence_too(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    async with rig.running():
+        rig.raise_(news(kind=AlarmKind.LINK_LOST, subject="link", unit="U2"))
+        rig.raise_(news(kind=AlarmKind.RESULTS_LOST, subject="store", unit="plant"))
+        await rig.written(2)
+
+    link, own = (document(folder) for folder in rig.bundles)
+    assert link.unit is not None
+    assert (link.unit.link, link.bearing, link.bearings) == ("connecting", None, [])
+    assert own.unit is None
+
+
+async def test_a_bundle_that_somebody_has_changed_is_no_evidence(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    async with rig.running():
+        rig.raise_(news())
+        await rig.written(1)
+    [found] = rig.archive.occurrences(SHAFT, NOBODY, 9)
+    path = rig.bundles[0] / "evidence.json"
+    assert rig.archive.document(found.place).alarm.value == 160.0
+
+    path.write_text(path.read_text().replace('"value": 160.0', '"value": 140.0'))
+    with pytest.raises(DamagedEvidenceError, match="changed since it was written"):
+        rig.archive.document(found.place)
+
+
+async def test_a_full_disk_delays_evidence_and_loses_none(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig, raised = await rig_of(), news()
+    folder = place_of(rig.folders.evidence, raised.events[0]).folder
+    aside = folder.with_name(folder.name + INCOMPLETE)
+    aside.mkdir(parents=True)
+    (aside / "spectra.parquet").symlink_to("/dev/full")  # every write to it finds no space
+
+    assert rig.keeper.error is None
+    rig.raise_(raised)
+    await rig.keeper._write_one()
+    assert "No space left on device" in rig.keeper.error
+    assert (rig.keeper.n_failed, rig.keeper.n_pending, rig.bundles) == (1, 1, [])
+    assert states(rig) == [(1, "waiting")]
+
+    async with rig.running():
+        await rig.written(1)
+    assert (rig.keeper.error, states(rig)) == (None, [(1, "complete")])
+
+
+async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    rig.folders.evidence.parent.mkdir(parents=True)
+    rig.folders.evidence.write_text("in the way")
+    async with rig.running():
+        rig.raise_(news())
+        await rig.until(lambda: rig.keeper.n_failed > 5)
+        assert states(rig) == [(1, "waiting")]
+        rig.folders.evidence.unlink()
+        await rig.written(1)
+
+    assert states(rig) == [(1, "complete")]
+
+
+async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    first = await rig_of()
+    async with first.running():
+        first.raise_(news(1.0))
+        await first.written(1)
+    cut = news(2.0, occurrence=2)
+    first.store.append([], [], [cut])  # the service is killed while it writes
+    left = place_of(first.folders.evidence, cut.events[0]).folder
+    left = left.with_name(left.name + INCOMPLETE)
+    left.mkdir()
+    (left / "evidence.json").write_text("{")
+
+    again = await rig_of()
+    async with again.running():
+        await again.until(lambda: not left.exists())
+
+    assert states(again) == [(2, "lost"), (1, "complete")]
+
+
+async def test_an_alarm_from_before_evidence_was_kept_has_not_lost_any(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    rig.store.append([], [], [news(-3600.0)])
+    async with rig.running():
+        rig.raise_(news(0.0, occurrence=2))
+        await rig.written(1)
+
+    assert states(rig) == [(2, "complete"), (1, "not_kept")]
+
+
+async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(
+    rig_of: Callable[..., Any], news: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "MAX_PENDING", 3)
+    rig = await rig_of()
+    for number in range(1, 6):
+        rig.raise_(news(float(number), occurrence=number))
+
+    assert (rig.keeper.n_pending, rig.keeper.n_lost) == (3, 2)
+    await rig.keeper.close()
+    assert [number for number, state in states(rig) if state == "complete"] == [5, 4, 3]
+
+
+async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
+    rig_of: Callable[..., Any], news: Callable[..., Any], plant: Any
+) -> None:
+    evidence = plant.evidence.model_copy(update={"max_per_alarm": 3})
+    rig = await rig_of(plant.model_copy(update={"evidence": evidence}))
+    async with rig.running():
+        rig.raise_(news(0.0, AlarmKind.SHAFT_Y))
+        for number in range(1, 6):
+            rig.raise_(news(float(number), occurrence=number))
+        await rig.until(lambda: len(rig.bundles) == 4 and rig.keeper.n_written == 6)
+
+    assert states(rig) == [
+        *((5, "complete"), (4, "complete"), (3, "complete")),
+        *((2, "removed"), (1, "removed")),
+    ]
+    assert states(rig, "U1:UJB:order1_shaft_y") == [(1, "complete")]
+
+
+async def test_young_evidence_stays_until_the_hard_limit(
+    rig_of: Callable[..., Any], news: Callable[..., Any], plant: Any
+) -> None:
+    tight = {"max_gb": 1e-9, "hard_max_gb": 1.0}
+    soft = plant.evidence.model_copy(update=tight)
+    rig = await rig_of(plant.model_copy(update={"evidence": soft}))
+    async with rig.running():
+        rig.raise_(news(-40 * 86_400.0))
+        rig.raise_(news(-2 * 86_400.0, occurrence=2))
+        rig.raise_(news(0.0, occurrence=3))
+        await rig.until(lambda: rig.keeper.n_written == 3 and len(rig.bundles) == 2)
+    assert states(rig)[:2] == [(3, "complete"), (2, "complete")]
+
+    hard = plant.evidence.model_copy(update={"max_gb": 1e-9, "hard_max_gb": 1e-9})
+    again = await rig_of(plant.model_copy(update={"evidence": hard}))
+    async with again.running():
+        await again.until(lambda: len(again.bundles) == 1)
+    assert states(again)[0] == (3, "complete")
+
+
+async def test_the_configuration_can_be_looked_up_by_its_version(
+    rig_of: Callable[..., Any], news: Callable[..., Any]
+) -> None:
+    rig = await rig_of()
+    async with rig.running():
+        rig.raise_(news())
+        await rig.written(1)
+
+    version = document(rig.bundles[0]).configuration
+    stored = json.loads((rig.folders.configurations / f"{version}.json").read_bytes())
+    assert stored["settings"]["unit"][0]["id"] == "U1"
+    assert EvidenceState.COMPLETE in {s.state for s in rig.archive.occurrences(SHAFT, NOBODY, 1)}
