@@ -8,11 +8,12 @@ from fastapi import APIRouter, Query
 from core.alarms.alarm import PLANT
 from core.alarms.figures import DAY_NS
 from service.api.alarm_rate_models import AlarmRatesModel
-from service.api.alarm_rate_views import alarm_rates_model, rated_events
+from service.api.alarm_rate_views import alarm_rates_model, counted
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
 from service.api.times import ns_from_datetime, rfc3339
+from service.store.port import AlarmQuery
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400
 
@@ -55,9 +56,10 @@ def alarm_rate_router(context: Context) -> APIRouter:
         if unit not in (None, PLANT):
             context.unit(unit)
         units = list(context.units) if unit is None else [unit]
-        found = await asyncio.to_thread(rated_events, context.store, unit, start_ns, end_ns)
-        span = (start_ns, end_ns)
-        return alarm_rates_model(context.alarms, context.films, found, span, units, now_ns)
+        wanted = AlarmQuery(unit=unit, start_ns=start_ns, end_ns=end_ns)
+        rule = context.alarms.chatter_rule
+        found = await asyncio.to_thread(counted, context.store, wanted, units, rule)
+        return alarm_rates_model(context.alarms, context.films, found, units, now_ns)
 
     return router
 

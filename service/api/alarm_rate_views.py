@@ -1,9 +1,10 @@
 """Alarm rates in the words of the API."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from core.alarms.alarm import PLANT, AlarmLevel
-from core.alarms.event import AlarmEvent
+from core.alarms.chatter import ChatterRule
 from core.alarms.figures import AlarmFigures, figures_of, stale_alarms
 from service.alarms.engine import AlarmEngine
 from service.api.alarm_rate_models import AlarmFiguresModel, AlarmRatesModel, FrequentModel
@@ -16,57 +17,70 @@ MAX_RATED = 100_000
 """Most events that are counted at once."""
 
 
-def rated_events(store: Store, unit: str | None, start_ns: int, end_ns: int) -> list[AlarmEvent]:
-    """The newest events of some time, oldest first; one more than are counted if there are more.
+@dataclass(frozen=True)
+class Counted:
+    """Figures of some time.
+
+    Parameters
+    ----------
+    start_ns, end_ns
+        What was counted; later than asked for if there was too much to read.
+    """
+
+    start_ns: int
+    end_ns: int
+    is_complete: bool
+    all: AlarmFigures
+    units: Mapping[str, AlarmFigures]
+
+
+def counted(store: Store, wanted: AlarmQuery, units: Sequence[str], rule: ChatterRule) -> Counted:
+    """Count stored events; with a hundred thousand of them that takes seconds: for a thread.
+
+    Parameters
+    ----------
+    wanted
+        Unit, start and end.
+    units
+        That figures are wanted of, whether anything has happened there or not.
 
     Raises
     ------
     StoreError
-        If they cannot be read.
+        If the events cannot be read.
     """
-    query = AlarmQuery(limit=MAX_RATED + 1, unit=unit, start_ns=start_ns, end_ns=end_ns)
-    return [stored.event for stored in reversed(store.alarm_events(query))]
+    newest_first = store.alarm_events(replace(wanted, limit=MAX_RATED + 1))
+    events = [stored.event for stored in reversed(newest_first)]
+    is_complete = len(events) <= MAX_RATED
+    start_ns, end_ns = wanted.start_ns, wanted.end_ns
+    if not is_complete:
+        start_ns = min(events[0].time_ns + 1, end_ns - 1)
+    found = {event.identity.unit for event in events}
+    names = [*units, *([PLANT] if PLANT in found and PLANT not in units else [])]
+    return Counted(
+        start_ns,
+        end_ns,
+        is_complete,
+        figures_of(events, start_ns, end_ns, rule),
+        {
+            unit: figures_of((e for e in events if e.identity.unit == unit), start_ns, end_ns, rule)
+            for unit in names
+        },
+    )
 
 
 def alarm_rates_model(
-    engine: AlarmEngine,
-    films: FilmKeeper,
-    events: Sequence[AlarmEvent],
-    span: tuple[int, int],
-    units: Sequence[str],
-    now_ns: int,
+    engine: AlarmEngine, films: FilmKeeper, found: Counted, units: Sequence[str], now_ns: int
 ) -> AlarmRatesModel:
-    """Figures of some events.
-
-    Parameters
-    ----------
-    events
-        From `rated_events`.
-    span
-        Time that was asked for.
-    units
-        That figures are wanted of.
-    """
-    start_ns, end_ns = span
-    is_complete = len(events) <= MAX_RATED
-    if not is_complete:
-        start_ns = min(events[0].time_ns + 1, end_ns - 1)
-    rule = engine.chatter_rule
-    by_unit = {
-        unit: [event for event in events if event.identity.unit == unit]
-        for unit in dict.fromkeys((*units, PLANT))
-    }
-    stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in by_unit]
+    """Figures with what is stale now."""
+    shown = {*units, PLANT}
+    stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]
     return AlarmRatesModel(
-        start=rfc3339(start_ns),
-        end=rfc3339(end_ns),
-        is_complete=is_complete,
-        all=_figures_model(figures_of(events, start_ns, end_ns, rule)),
-        units={
-            unit: _figures_model(figures_of(own, start_ns, end_ns, rule))
-            for unit, own in by_unit.items()
-            if unit in units or own
-        },
+        start=rfc3339(found.start_ns),
+        end=rfc3339(found.end_ns),
+        is_complete=found.is_complete,
+        all=_figures_model(found.all),
+        units={unit: _figures_model(figures) for unit, figures in found.units.items()},
         stale=[alarm_model(engine, films, alarm) for alarm in stale],
     )
 
