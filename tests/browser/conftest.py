@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -14,7 +15,14 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, ConsoleMessage, Page, async_playwright
 
-DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
+from service.demo.past import fill
+from service.settings.loading import load_plant_file
+from service.wiring.simulated_lives import simulated_history
+from service.wiring.stores import open_store
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+DEMO, DEMO_LIFE = DEPLOY / "demo.toml", DEPLOY / "demo-life.toml"
+PAST_YEARS = 0.2
 PADWATCH = [sys.executable, "-m", "service.cli.main"]
 STOP_S = 10.0
 
@@ -45,10 +53,10 @@ QUIET = [
 
 
 class Plant:
-    """Unit U1 of the demo plant: its DAQ and the service that watches it."""
+    """Unit U1 of a demo plant: its DAQ and the service that watches it."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, example: Path = DEMO) -> None:
+        self._folder, self._example = folder, example
         self._processes = ExitStack()
         self._daq: subprocess.Popen[str] | None = None
         self._service: subprocess.Popen[str] | None = None
@@ -72,6 +80,17 @@ class Plant:
     def stop_service(self) -> None:
         stop(self._service)
 
+    def live_first(self) -> None:
+        """Give the unit a past with a learned baseline before anything is started."""
+        plant = load_plant_file(self._plant_file())
+        folder = self._folder / plant.service.data_folder
+        service = plant.service.model_copy(update={"data_folder": str(folder)})
+        plant, now_ns = plant.model_copy(update={"service": service}), time.time_ns()
+        store = open_store(plant)
+        lives = {"U1": simulated_history(plant.unit[0], now_ns, PAST_YEARS)}
+        assert fill(store.films, plant, lives, now_ns)
+        store.close()
+
     def __enter__(self) -> "Plant":
         return self
 
@@ -92,7 +111,7 @@ class Plant:
         return process
 
     def _plant_file(self) -> Path:
-        head, units = DEMO.read_text().split("[[unit]]", 1)
+        head, units = self._example.read_text().split("[[unit]]", 1)
         first_unit = units.split("[[unit]]", 1)[0].replace("port = 0", f"port = {self._daq_port}")
         path = self._folder / "plant.toml"
         path.write_text(f"{head}{self.settings}\n[[unit]]{first_unit}")
@@ -145,6 +164,16 @@ def new_plant(chromium: str, tmp_path: Path) -> Iterator[Plant]:  # noqa: ARG001
 def running_plant(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:  # noqa: ARG001
     """A plant in good health, shared by tests that leave it so."""
     with Plant(tmp_path_factory.mktemp("plant")) as plant:
+        plant.start_daq()
+        plant.start_service()
+        yield plant
+
+
+@pytest.fixture(scope="session")
+def living_plant(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:  # noqa: ARG001
+    """A plant whose films have been watched for two months and a half."""
+    with Plant(tmp_path_factory.mktemp("life"), DEMO_LIFE) as plant:
+        plant.live_first()
         plant.start_daq()
         plant.start_service()
         yield plant

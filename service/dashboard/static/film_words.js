@@ -76,11 +76,18 @@ export function signedPercent(percent, decimals = 1) {
 
 /** `−19.2 % ± 2.8 % over 4 running hours; limit 4 %`. */
 export function changeSentence({ change, verdict }, limits) {
-  if (change === null) return "";
-  const since = JUDGED.includes(verdict) ? "" : "When it was judged last: ";
+  return change === null || !JUDGED.includes(verdict) ? "" : changeWords(change, limits);
+}
+
+/** What was found when a film that cannot be judged now was judged last. */
+export function lastSentence({ change, verdict }, limits) {
+  return change === null || JUDGED.includes(verdict) ? "" : `When it was judged last: ${changeWords(change, limits)}.`;
+}
+
+function changeWords(change, limits) {
   const spread = Math.max(change.high_95 - change.percent, change.percent - change.low_95);
   const hours = `${formatFixed(change.time_scale_h, 0)} running hours`;
-  return `${since}${signedPercent(change.percent)} ± ${formatFixed(spread, 1)} % over ${hours}; limit ${limitWords(limits)}`;
+  return `${signedPercent(change.percent)} ± ${formatFixed(spread, 1)} % over ${hours}; limit ${limitWords(limits)}`;
 }
 
 const limitWords = ({ alert, danger }) => `${trimmed(100 * alert)} %, danger ${trimmed(100 * danger)} %`;
