@@ -59,7 +59,8 @@ def alarm_rate_router(context: Context) -> APIRouter:
         wanted = AlarmQuery(unit=unit, start_ns=start_ns, end_ns=end_ns)
         rule = context.alarms.chatter_rule
         found = await asyncio.to_thread(counted, context.store, wanted, units, rule)
-        return alarm_rates_model(context.alarms, context.films, found, units, now_ns)
+        shown = {*units, PLANT} if unit is None else {unit}
+        return alarm_rates_model(context.alarms, context.films, found, shown, now_ns)
 
     return router
 

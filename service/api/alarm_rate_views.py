@@ -1,6 +1,6 @@
 """Alarm rates in the words of the API."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from core.alarms.alarm import PLANT, AlarmLevel
@@ -70,10 +70,9 @@ def counted(store: Store, wanted: AlarmQuery, units: Sequence[str], rule: Chatte
 
 
 def alarm_rates_model(
-    engine: AlarmEngine, films: FilmKeeper, found: Counted, units: Sequence[str], now_ns: int
+    engine: AlarmEngine, films: FilmKeeper, found: Counted, shown: Collection[str], now_ns: int
 ) -> AlarmRatesModel:
-    """Figures with what is stale now."""
-    shown = {*units, PLANT}
+    """Figures with what is stale now of the units that are shown."""
     stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]
     return AlarmRatesModel(
         start=rfc3339(found.start_ns),

@@ -85,6 +85,7 @@ async def test_what_stands_for_more_than_a_day_is_stale(service: Any) -> None:
     after = (await service.json(RATES))["stale"]
 
     assert (before, [alarm["id"] for alarm in after]) == ([], [LINK])
+    assert (await service.json(RATES, unit="U2"))["stale"] == []
 
 
 async def test_rates_of_a_span_count_what_happened_in_it(service: Any) -> None:
