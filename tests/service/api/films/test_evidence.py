@@ -1,0 +1,187 @@
+"""Evidence of a film that has changed: document, page, bundle, whatever people write."""
+
+import asyncio
+import io
+import json
+import zipfile
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from html.parser import HTMLParser
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
+from core.alarms.event import AlarmNews
+from core.alarms.life_cycle import advance
+from core.alarms.operation import Acknowledge, operate
+from core.films.film_finding import alarm_condition
+
+ALARM = "U1:UJB:stiffness_x"
+PATH = f"/api/v1/alarms/{ALARM}/evidence"
+HOSTILE = '<script>alert("1")</script><img src=x onerror=alert(2)>'
+
+
+@asynccontextmanager
+async def keeping(service: Any) -> AsyncIterator[None]:
+    task = asyncio.create_task(service.evidence.run())
+    yield
+    task.cancel()
+    await asyncio.wait([task])
+    await service.evidence.close()
+
+
+async def alarmed(service: Any, machine: Any) -> AlarmNews:
+    """A film that has lost a third, and its alarm."""
+    machine.run(30, ln_change=-0.4)
+    rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
+    condition = alarm_condition(told.findings[0], rules.change)
+    assert condition.level is not None
+    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.STIFFNESS_X))
+    news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
+    service.evidence.see([news])
+    service.store.append([], [], [news])
+    async with keeping(service), asyncio.timeout(60):
+        while service.evidence.n_written < 1:
+            await asyncio.sleep(0.001)
+    return news
+
+
+class Tags(HTMLParser):
+    """Collects what a browser would do."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: set[str] = set()
+        self.attributes: set[str] = set()
+        self.words = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.attributes |= {name for name, _ in attrs}
+
+    def handle_data(self, data: str) -> None:
+        self.words += data
+
+
+async def test_the_document_says_with_what_the_film_was_compared(
+    service: Any, machine: Any
+) -> None:
+    await alarmed(service, machine)
+
+    [listed] = (await service.json(PATH))["occurrences"]
+    assert (listed["state"], listed["samples"], listed["change"]) == ("complete", "none", "raised")
+    found = await service.json(listed["evidence"])
+    assert found["alarm"]["id"] == ALARM
+    compared = found["comparisons"][0]
+    assert compared["direction"] == "x"
+    assert compared["baseline"]["version"] == 1
+    assert compared["cell"]["support"] in ("own", "borrowed")
+    (low, high), (cold, warm) = compared["bounds"][:2]
+    assert low <= compared["eccentricity_ratio"] < high
+    assert cold <= compared["oil_temperature_c"] < warm
+    assert compared["stiffness_n_per_m"] / compared["expected_n_per_m"] == pytest.approx(
+        0.67, abs=0.01
+    )
+    members = compared["members"]
+    assert members["n_in_all"] == len(members["time"]) == len(members["stiffness_n_per_m"]) > 0
+    assert all(low <= e < high for e in members["eccentricity_ratio"])
+    assert [scale["time_scale_h"] for scale in compared["time_scales"]]
+    finding = found["bearings"][0]["film"]["findings"][0]
+    assert finding["level"] in ("alert", "danger")
+    assert finding["change"] < -0.1
+    assert found["limits"]["films"]["change"]["alert_change"] == 0.04
+
+
+async def test_the_report_tells_everything_without_a_script(service: Any, machine: Any) -> None:
+    await alarmed(service, machine)
+
+    answer = await service.get(f"{PATH}/1/report")
+
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "text/html; charset=utf-8"
+    assert "default-src 'none'" in answer.headers["content-security-policy"]
+    page = Tags(answer.text)
+    assert not page.tags & {"script", "img", "iframe", "link", "object", "form"}
+    assert not {name for name in page.attributes if name.startswith("on")}
+    for words in (
+        "film stiffness changed, x",
+        "95 %:",
+        "GN/m",
+        "configuration ",
+        "baseline version 1",
+    ):
+        assert words in page.words, words
+    assert answer.text.count("<svg") >= 3
+
+
+async def test_what_people_write_stays_writing(service: Any, machine: Any) -> None:
+    news = await alarmed(service, machine)
+    action = Acknowledge(actor=HOSTILE, comment=HOSTILE, occurrence=1)
+    told = AlarmNews(*operate(news.alarm, action, machine.time_ns + 1))
+    service.store.append([], [], [told])
+
+    page = Tags((await service.get(f"{PATH}/1/report")).text)
+
+    assert "script" not in page.tags
+    assert "img" not in page.tags
+    assert "<script>" in page.words
+
+
+async def test_a_bundle_holds_everything(service: Any, machine: Any) -> None:
+    await alarmed(service, machine)
+
+    answer = await service.get(f"{PATH}/1/bundle.zip")
+
+    assert answer.headers["content-type"] == "application/zip"
+    assert "attachment" in answer.headers["content-disposition"]
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.testzip() is None
+        names = set(archive.namelist())
+        assert names >= {
+            *("README.txt", "report.html", "evidence.json", "spectra.parquet", "trend.parquet"),
+            "configuration.json",
+        }
+        document = json.loads(archive.read("evidence.json"))
+        trend = pq.read_table(io.BytesIO(archive.read("trend.parquet")))
+    assert document["alarm"]["id"] == ALARM
+    assert trend.num_rows > 30
+    assert trend["level_x"].to_pylist()[-1] > 0
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        (f"{PATH}/1", 404),
+        ("/api/v1/alarms/U1:UJB:nonsense/evidence", 404),
+        ("/api/v1/alarms/..:..:stiffness_x/evidence", 404),
+        ("/api/v1/alarms/..%2f..:x:stiffness_x/evidence/1", 404),
+        (f"{PATH}/0", 422),
+        (f"{PATH}?limit=0", 422),
+    ],
+)
+async def test_what_is_not_there_is_a_problem(
+    service: Any, path: str, status: int, as_problem: Callable[..., Any]
+) -> None:
+    answer = await service.client.get(path)
+
+    assert answer.status_code == status, answer.text
+    as_problem(answer)
+
+
+async def test_evidence_that_waits_for_the_disk_is_not_called_lost(
+    service: Any, machine: Any
+) -> None:
+    machine.run(30, ln_change=-0.4)
+    rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
+    condition = alarm_condition(told.findings[0], rules.change)
+    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.STIFFNESS_X))
+    news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
+    service.evidence.see([news])
+    service.store.append([], [], [news])
+
+    [listed] = (await service.json(PATH))["occurrences"]
+    assert (listed["state"], listed["evidence"]) == ("waiting", None)
+    await service.problem(f"{PATH}/1/report", 409)
