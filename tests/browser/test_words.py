@@ -5,21 +5,25 @@ from pathlib import Path
 
 import pytest
 
+from core.condition.operating_state import OperatingState
+from core.decision.attribution import Cause
+from core.decision.verdict import Verdict
 from core.estimators import Estimator
 from core.quality import Reason
 from core.runout import RunoutVerdict
 from core.speed import SpeedSource
 
-SOURCE = Path(__file__).parents[2] / "service" / "dashboard" / "static" / "words.js"
+STATIC = Path(__file__).parents[2] / "service" / "dashboard" / "static"
+SOURCE, FILM_WORDS = STATIC / "words.js", STATIC / "film_words.js"
 ONLY_THE_PAGE_KNOWS = {"service_not_reachable"}
 ENTRY = re.compile(r"^  (\w+): (.+),$", re.MULTILINE)
 WORDS_AND_SENTENCE = re.compile(r"\[\"[^\"]{2,25}\", \"[A-Z][^\"]+[.]\"\]")
 """A few words that fit a table's cell, and a sentence for the bearing page."""
 
 
-def entries(table: str) -> dict[str, str]:
-    body = re.search(rf"^const {table} = {{$(.*?)^}};$", SOURCE.read_text(), re.M | re.S)
-    assert body is not None, f"words.js has no table {table}"
+def entries(table: str, source: Path = SOURCE) -> dict[str, str]:
+    body = re.search(rf"^const {table} = {{$(.*?)^}};$", source.read_text(), re.M | re.S)
+    assert body is not None, f"{source.name} has no table {table}"
     return dict(ENTRY.findall(body[1]))
 
 
@@ -39,3 +43,17 @@ def test_every_estimator_has_words() -> None:
 def test_every_verdict_on_runout_and_every_speed_source_has_words() -> None:
     assert entries("RUNOUT").keys() == {verdict.value for verdict in RunoutVerdict}
     assert entries("SPEED_SOURCES").keys() == {source.value for source in SpeedSource}
+
+
+def test_every_verdict_on_a_film_every_cause_and_every_operating_state_has_words() -> None:
+    verdicts = {verdict.name.lower() for verdict in Verdict} | {"no_reading"}
+    assert entries("VERDICTS", FILM_WORDS).keys() == verdicts
+    assert entries("CAUSES", FILM_WORDS).keys() == {cause.value for cause in Cause}
+    states = {state.name.lower() for state in OperatingState}
+    assert entries("STATES", FILM_WORDS).keys() == states
+
+
+def test_only_a_film_that_is_normal_looks_and_is_called_so() -> None:
+    good = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if "good" in look}
+    normal = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if "Normal" in look}
+    assert good == normal == {"normal"}
