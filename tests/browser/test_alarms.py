@@ -82,6 +82,11 @@ async def test_a_lost_link_is_announced_acknowledged_shelved_and_returns(
     await expect(row.get_by_role("button", name="Acknowledge")).to_be_hidden()
     await expect(head).to_contain_text("1 alarm, 15 not judged")
 
+    await row.get_by_role("button", name="Comment…").click()
+    await row.get_by_label("Comment").fill("the cable is pulled for a test")
+    await row.get_by_role("button", name="Comment", exact=True).click()
+    await expect(row.get_by_label("Comment")).to_be_hidden()
+
     await row.get_by_role("button", name="Shelve…").click()
     await row.get_by_label("Why it is shelved").fill("the DAQ is being changed")
     await row.get_by_role("button", name="Shelve", exact=True).click()
@@ -99,7 +104,15 @@ async def test_a_lost_link_is_announced_acknowledged_shelved_and_returns(
     await row.get_by_role("button", name="Acknowledge").click()
     await expect(page.get_by_text("Nothing is on the list.")).to_be_visible()
     history = page.get_by_role("table", name="History")
-    for words in ("raised", "acknowledged", "shelved", "back from the shelf", "returned"):
+    await expect(history).to_contain_text("the cable is pulled for a test")
+    for words in (
+        "raised",
+        "commented",
+        "acknowledged",
+        "shelved",
+        "back from the shelf",
+        "returned",
+    ):
         await expect(history.get_by_role("cell", name=words, exact=True).first).to_be_visible()
     assert complaints == []
 
