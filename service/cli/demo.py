@@ -12,7 +12,7 @@ from service.cli.examples import DEMO, DEMO_LIFE, example_path
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import run_plant
 from service.cli.terminal import terminal_to_itself
-from service.demo.past import fill
+from service.demo.past import fill, without_past
 from service.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
@@ -49,9 +49,11 @@ def _give_past(plant: PlantFile) -> None:
     try:
         store = open_store(plant, Origin.LIVE)
         try:
-            lives = {unit.id: simulated_history(unit, now_ns) for unit in plant.unit}
-            if fill(store.films, plant, lives, now_ns):
-                typer.echo("padwatch: the year before this start is simulated, and marked so")
+            new = without_past(store.films, plant)
+            if new:
+                typer.echo("padwatch: simulating the year before this start …")
+                lives = {unit.id: simulated_history(unit, now_ns) for unit in new}
+                fill(store.films, plant, lives, now_ns)
         finally:
             store.close()
     except (StoreError, AcquisitionError) as error:

@@ -25,26 +25,33 @@ AUTHOR = "padwatch demo"
 EVENT = "learned from a simulated year"
 
 
+def without_past(store: FilmStore, plant: PlantFile) -> list[UnitSettings]:
+    """Units whose films are watched, and of which the store knows nothing."""
+    rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
+    return [
+        unit
+        for unit in plant.unit
+        if isinstance(its := rules[unit.id], FilmRules) and not _is_known(store, unit, its)
+    ]
+
+
 def fill(
     store: FilmStore,
     plant: PlantFile,
     pasts: Mapping[str, Mapping[str, StiffnessHistory]],
     now_ns: int,
-) -> bool:
-    """Give units a past, unless they have one; return whether any was given one.
+) -> None:
+    """Give units without a past the one that is simulated.
 
     Parameters
     ----------
     pasts
-        Simulated readings until now, by unit and bearing; a unit without any is left as it is.
+        Readings until now, by unit and bearing; a unit without any is left as it is.
     """
-    is_given = False
-    for unit in plant.unit:
-        rules, past = film_rules_of(unit, plant.films), pasts.get(unit.id, {})
-        if isinstance(rules, FilmRules) and past and not _is_known(store, unit, rules):
+    for unit in without_past(store, plant):
+        rules, past = film_rules_of(unit, plant.films), pasts.get(unit.id)
+        if past and isinstance(rules, FilmRules):
             _fill_unit(store, unit, rules, plant.films, past, now_ns)
-            is_given = True
-    return is_given
 
 
 def _is_known(store: FilmStore, unit: UnitSettings, rules: FilmRules) -> bool:

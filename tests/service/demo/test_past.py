@@ -10,7 +10,7 @@ from core.decision.verdict import JUDGED, Verdict
 from core.estimators import Estimator
 from core.stiffness_history import StiffnessHistory
 from core.units import NS_PER_S
-from service.demo.past import fill
+from service.demo.past import fill, without_past
 from service.films.versions import versions_after
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
@@ -41,7 +41,8 @@ def store(
     pasts: Mapping[str, Mapping[str, StiffnessHistory]],
 ) -> Iterator[SqliteStore]:
     opened = SqliteStore(tmp_path_factory.mktemp("demo") / "padwatch.sqlite3")
-    assert fill(opened.films, plant, pasts, NOW_NS)
+    assert [unit.id for unit in without_past(opened.films, plant)] == ["U1", "U2"]
+    fill(opened.films, plant, pasts, NOW_NS)
     yield opened
     opened.close()
 
@@ -83,5 +84,6 @@ def test_trends_show_the_past(
 def test_a_past_is_given_once(
     store: SqliteStore, plant: PlantFile, pasts: Mapping[str, Mapping[str, StiffnessHistory]]
 ) -> None:
-    assert not fill(store.films, plant, pasts, NOW_NS + 10**15)
+    fill(store.films, plant, pasts, NOW_NS + 10**15)
+    assert [unit.id for unit in without_past(store.films, plant)] == ["U2"]
     assert len(store.films.baselines("U1", "UJB")) == 1
