@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from core.alarms.alarm import AlarmIdentity, AlarmKind
+from core.alarms.bearing_watches import READINGS
 from core.assessment import Assessment
 from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
@@ -12,10 +13,8 @@ from service.live import LiveView
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
 """What a film's stiffness depends on, as far as it is measured."""
 
-MEASURED = {
-    AlarmKind.SHAFT_X: "order1_shaft_x_um_pk",
-    AlarmKind.SHAFT_Y: "order1_shaft_y_um_pk",
-    AlarmKind.OIL_TEMPERATURE: "oil_temperature_c",
+MEASURED = {kind: name for sources in READINGS.values() for kind, name in sources.items()} | {
+    AlarmKind.OIL_TEMPERATURE: "oil_temperature_c"
 }
 """The quantity that an alarm's value is a reading of."""
 
