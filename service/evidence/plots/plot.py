@@ -9,6 +9,9 @@ from service.evidence.plots.scales import Scale, TimeScale
 
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 6.0, 30.0
 
+TIME_ROOM, NUMBER_ROOM = 62.0, 40.0
+"""That a tick takes along x."""
+
 Values = Sequence[float | None]
 """None where there is no number."""
 
@@ -98,11 +101,13 @@ class Plot:
             f' d="M{left} {top}H{right}V{bottom}H{left}Z"/>'
         )
 
-    def upright(self, x: float, look: str, words: str = "") -> None:
-        """A line from top to bottom, with words at its top."""
-        place = self._x(x)
+    def upright(self, x: float, look: str, words: str = "", row: int = 0) -> None:
+        """A line from top to bottom, with words beside it, in rows from its top."""
+        place, y = self._x(x), TOP + 8 + 9 * row
         self._marks.append(f'<path class="{look}" d="M{place} {TOP:g}V{self.height - BOTTOM:g}"/>')
-        self._marks.append(f'<text class="note" x="{place}" y="{TOP + 8:g}">{escape(words)}</text>')
+        self._marks.append(
+            f'<text class="note" x="{place}" y="{y:g}" dx="2">{escape(words)}</text>'
+        )
 
     def level(self, y: float, look: str) -> None:
         """A line from left to right."""
@@ -129,7 +134,8 @@ class Plot:
     def _axes(self) -> str:
         bottom = self.height - BOTTOM
         parts = [f'<path class="frame" d="M{LEFT:g} {TOP:g}V{bottom:g}H{self._right:g}"/>']
-        most = max(2, int((self._right - LEFT) / 62))
+        room = TIME_ROOM if isinstance(self.x, TimeScale) else NUMBER_ROOM
+        most = max(2, int((self._right - LEFT) / room))
         for value, words in self.x.ticks(most):
             x = self._x(value)
             parts.append(f'<path class="grid" d="M{x} {TOP:g}V{bottom:g}"/>')

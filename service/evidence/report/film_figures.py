@@ -24,7 +24,7 @@ def condition_figure(case: Case) -> Figure | None:
     if x is None or y is None:
         return None
     plot = Plot(
-        *(350.0, 190.0),
+        *(350.0, 148.0),
         Scale(*x),
         Scale(*y, divisor=GN_PER_M),
         *("Eccentricity ratio, 1", f"Stiffness {case.direction}, GN/m"),
@@ -40,7 +40,7 @@ def condition_figure(case: Case) -> Figure | None:
     _own_point(plot, found)
     n = members.n_in_all if members else 0
     return Figure(
-        plot.svg(),
+        plot,
         f"Grey: the {n} readings of the cell (pink) that the baseline stands on. Dashed: expected"
         " at this oil temperature. Blue: the last 24 hours. Red: the reading of the alarm; its bar"
         " holds 95 % of what chance does.",
@@ -57,7 +57,7 @@ def map_figure(case: Case) -> Figure | None:
     columns = {each.cell[0] for each in found.map} | {round(e0 / width_e)}
     rows = {each.cell[1] for each in found.map} | {round(t0 / width_t)}
     plot = Plot(
-        *(350.0, 190.0),
+        *(350.0, 148.0),
         Scale(min(columns) * width_e, (max(columns) + 1) * width_e),
         Scale(min(rows) * width_t, (max(rows) + 1) * width_t),
         *("Eccentricity ratio, 1", "Oil temperature, °C", "Map of the baseline", "map"),
@@ -73,7 +73,7 @@ def map_figure(case: Case) -> Figure | None:
     plot.cell((e0, e1), (t0, t1), "own", 0.0)
     plot.points([found.eccentricity_ratio], [found.oil_temperature_c], "alarm", 2.2)
     return Figure(
-        plot.svg(),
+        plot,
         f"What the baseline knows: the darker, the stiffer, {math.exp(low) / GN_PER_M:.3g} to"
         f" {math.exp(high) / GN_PER_M:.3g} GN/m. Dashed: known from neighbours. White: too few"
         " readings to compare. Red: the cell and reading of the alarm.",

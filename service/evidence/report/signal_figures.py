@@ -25,19 +25,20 @@ def spectra_figure(case: Case) -> Figure | None:
     top = max(seen)
     floor = max(min(seen), top * 1e-5)
     plot = Plot(
-        *(450.0, 170.0),
+        *(525.0, 146.0),
         Scale(0.0, f[-1]),
         Scale(10.0 ** math.floor(math.log10(floor)), 10.0 ** math.ceil(math.log10(top)), True),
         *("Frequency, Hz", f"Amplitude {axis}, µm 0-pk", "Spectra", "spectra"),
     )
-    for name, words in (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex")):
+    lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
+    for row, (name, words) in enumerate(lines):
         reading = bearing.readings.get(name)
         if reading is not None and reading.value is not None:
-            plot.upright(reading.value, "marked", words)
+            plot.upright(reading.value, "marked", words, row)
     plot.line(f, shaft, "shaft")
     plot.line(f, frame, "bearing")
     return Figure(
-        plot.svg(),
+        plot,
         f"Averaged spectra in {axis} as displacement, {bearing.window.n_segments} segments in"
         f" {bearing.window.duration_s:.0f} s before the alarm. Blue: shaft relative to bearing."
         " Orange: bearing.",
@@ -52,13 +53,13 @@ def orbit_figure(case: Case) -> Figure | None:
     x, y = ([case.orbits[name][i] for i in rows] for name in ("shaft_x_um", "shaft_y_um"))
     most = 1.1 * max(abs(value) for value in (*x, *y)) or 1.0
     plot = Plot(
-        *(188.0, 170.0),
+        *(170.0, 146.0),
         Scale(-most, most),
         Scale(-most, most),
         *("Shaft x, µm", "Shaft y, µm", "Orbit", "orbit"),
     )
     plot.line(x, y, "shaft", math.inf)
-    return Figure(plot.svg(), "The newest turns of the shaft in its bearing, means removed.")
+    return Figure(plot, "The newest turns of the shaft in its bearing, means removed.")
 
 
 def _rows(table: Columns, bearing: str | None) -> list[int]:

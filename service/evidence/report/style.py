@@ -28,7 +28,7 @@ svg path { fill: none; }
 .grid { stroke: #e3e3e3; stroke-width: .6; }
 .mid { text-anchor: middle; }
 .end { text-anchor: end; }
-.note { font-size: 8px; fill: #555; text-anchor: middle; }
+.note { font-size: 8px; fill: #555; }
 svg .band { fill: #dcdcdc; stroke: none; }
 .expected { stroke: #777; stroke-width: 1; stroke-dasharray: 4 2; }
 .dots { stroke-linecap: round; stroke-width: 2; }

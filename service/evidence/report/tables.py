@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from core.alarms.event import AlarmEvent
-from service.evidence.bearing_part import AXES, BearingPart, EstimatorPart, ReadingPart
+from service.evidence.bearing_part import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
 from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence
 from service.evidence.report.case import Case
@@ -12,8 +12,8 @@ from service.evidence.report.words import CAUSES, change_words, plain, shortened
 
 GN_PER_M = 1e9
 
-MAX_EVENTS = 6
-"""That a page has room for."""
+MAX_EVENTS, MAX_ACTOR, MAX_NOTE = 6, 32, 84
+"""That a page has room for: lines, and characters in one."""
 
 ESTIMATORS = {
     "dynamic": "dynamic",
@@ -52,27 +52,12 @@ def estimators_table(bearing: BearingPart) -> str:
 
 def films_table(evidence: Evidence) -> str:
     """What was said of the films of all bearings at that moment."""
-    rows = []
-    for bearing in evidence.bearings:
-        if bearing.film is None:
-            continue
-        for found in bearing.film.findings:
-            cause = found.attribution
-            words = "" if cause is None else CAUSES.get(cause.cause, plain(cause.cause))
-            version = "none" if found.baseline_version is None else str(found.baseline_version)
-            rows.append(
-                [
-                    f"{bearing.bearing} {found.direction}",
-                    plain(found.verdict),
-                    change_words(found),
-                    version,
-                    words,
-                ]
-            )
-    if not rows:
+    found = [each for each in evidence.bearings if each.film is not None]
+    if not found:
         return ""
-    heads = ("Film", "Verdict", "Change", "Baseline", "Put down to")
-    return "<h2>All films of the unit at that moment</h2>" + table(heads, rows)
+    heads = ("Film", "x", "y", "Baseline", "Put down to")
+    title = "All films of the unit at that moment"
+    return f"<h2>{title}</h2>" + table(heads, (_films(each) for each in found))
 
 
 def events_table(case: Case) -> str:
@@ -103,6 +88,23 @@ def footer(case: Case) -> str:
     return f"<footer>{safe} · {note}</footer>"
 
 
+def _films(bearing: BearingPart) -> list[str]:
+    findings = bearing.film.findings if bearing.film else []
+    versions = {each.baseline_version for each in findings}
+    causes = {
+        CAUSES.get(each.attribution.cause, plain(each.attribution.cause))
+        for each in findings
+        if each.attribution is not None
+    }
+    version = ", ".join("none" if each is None else str(each) for each in versions)
+    return [bearing.bearing, *map(_said, findings), version, "; ".join(sorted(causes))]
+
+
+def _said(found: FindingPart) -> str:
+    verdict = plain(found.verdict)
+    return verdict if found.change is None else f"{verdict}, {change_words(found)}"
+
+
 def _estimate(found: EstimatorPart) -> tuple[str, str]:
     coherence = "–" if found.coherence is None else f"{found.coherence:.3f}"
     return _stiffness(found.stiffness), coherence
@@ -123,6 +125,6 @@ def _event(event: AlarmEvent) -> tuple[str, str, str, str]:
     return (
         day_and_time(event.time_ns),
         plain(event.change.value),
-        shortened(event.actor),
-        shortened(reason),
+        shortened(event.actor, MAX_ACTOR),
+        shortened(reason, MAX_NOTE),
     )

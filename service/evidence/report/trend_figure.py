@@ -30,7 +30,7 @@ def trend_figure(case: Case) -> Figure | None:
     alarm_s = case.evidence.alarm.time_ns / NS_PER_S
     last = max(time[-1], alarm_s + 0.04 * (alarm_s - time[0]))
     plot = Plot(
-        *(720.0, 150.0),
+        *(720.0, 126.0),
         TimeScale(time[0], last if last > time[0] else time[0] + 3600.0),
         Scale(*room, divisor=GN_PER_M),
         *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
@@ -46,7 +46,7 @@ def trend_figure(case: Case) -> Figure | None:
     plot.upright(alarm_s, "at")
     n_after = sum(after)
     return Figure(
-        plot.svg(),
+        plot,
         f"Stiffness of the film in {axis} over {(last - time[0]) / DAY_S:.0f} days, {len(time)}"
         f" readings; red line: the alarm, red dots: {n_after} readings since. Dashed: expected"
         f" under the condition of each reading; band: within {100.0 * limit:g} % of it, the limit"

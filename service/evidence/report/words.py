@@ -3,8 +3,10 @@
 import math
 from collections.abc import Iterator
 
+from core.alarms.event import AlarmChange
 from service.delivery.mail_text import KINDS
 from service.evidence.bearing_part import BearingPart, FindingPart, ReadingPart
+from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence
 from service.evidence.report.case import Case
 
@@ -43,9 +45,9 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, longest: int = LONGEST) -> str:
     """At most so long that the page stays one page."""
-    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
+    return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def headline(evidence: Evidence) -> str:
@@ -63,12 +65,13 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
     yield "Level", f"{(alarm.level or '').upper()}, {alarm.change}, occurrence {alarm.occurrence}"
     yield "Since", alarm.time.replace("T", " ").replace("Z", " UTC")
     yield "Value", value_words(case)
-    if alarm.reason and alarm.reason != "ok":
+    if alarm.reason and alarm.reason != "ok" and not story(case):
         yield "Reason", plain(alarm.reason)
     if case.bearing is not None:
         yield "Condition", condition_words(case.bearing)
     yield "Samples", SAMPLES[case.samples.value]
     yield "State now", f"{state_words(case)}; as of {now}"
+    yield "Seen by", seen_words(case)
 
 
 def value_words(case: Case) -> str:
@@ -101,7 +104,7 @@ def change_words(found: FindingPart) -> str:
 
 def percent(change: float) -> str:
     """A change in ln as percent."""
-    return f"{100.0 * math.expm1(change):+.1f} %"
+    return f"{100.0 * math.expm1(change):+.1f} %".replace("-", "−")
 
 
 def condition_words(bearing: BearingPart) -> str:
@@ -131,6 +134,14 @@ def state_words(case: Case) -> str:
     return plain(case.events[-1].state_after.value)
 
 
+def seen_words(case: Case) -> str:
+    """Who has acknowledged the occurrence, and when."""
+    seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
+    if not seen:
+        return "nobody has acknowledged it"
+    return f"{seen[-1].actor}, {day_and_time(seen[-1].time_ns)}"
+
+
 def finding(case: Case) -> FindingPart | None:
     """What was said of the alarm's film."""
     film = None if case.bearing is None else case.bearing.film
@@ -150,10 +161,12 @@ def story(case: Case) -> str:
         else f", averaged over {found.time_scale_h:g} running hours"
     )
     sentence = (
-        f"The film in {case.direction} is {change_words(found)} from what it was under this"
-        f" condition{hours}."
+        f"The stiffness of the film in {case.direction} has changed by {change_words(found)}"
+        f" against what it was under this condition{hours}."
     )
     cause = found.attribution
     if cause is None:
         return sentence
+    if cause.cause == "unknown":
+        return f"{sentence} What changed is not told apart: {cause.reason}."
     return f"{sentence} Put down to {CAUSES.get(cause.cause, plain(cause.cause))}: {cause.reason}."
