@@ -3,6 +3,7 @@
 import { alarmReasonWords, changeWords, kindWords, placeWords, valueWords } from "../alarm_words.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
+import { evidenceLinks } from "../parts/evidence.js";
 
 const HEADS = ["Time", "Where", "What", "Change", "Value", "By", "Reason"];
 
@@ -45,9 +46,11 @@ function eventRow(event) {
     event.actor,
     event.actor ? event.reason : alarmReasonWords(event.reason),
   ];
-  return element(
-    "tr",
-    { role: "row", "data-event": String(event.id) },
-    ...cells.map((words, index) => element("td", { role: "cell", "data-head": HEADS[index] }, words)),
-  );
+  const row = cells.map((words, index) => element("td", { role: "cell", "data-head": HEADS[index] }, words));
+  if (["raised", "escalated"].includes(event.change)) {
+    const evidence = evidenceLinks();
+    evidence.draw(event.alarm, event.occurrence);
+    row[HEADS.indexOf("Change")].append(evidence.node);
+  }
+  return element("tr", { role: "row", "data-event": String(event.id) }, ...row);
 }

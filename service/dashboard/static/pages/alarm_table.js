@@ -3,6 +3,7 @@
 import { conditionWords, holdWords, kindWords, levelMark, placeWords, stateWords, valueWords } from "../alarm_words.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
+import { evidenceLinks } from "../parts/evidence.js";
 import { mark } from "../parts/mark.js";
 import { alarmActions } from "./alarm_actions.js";
 
@@ -52,7 +53,9 @@ function alarmRow(actor, again) {
   const cells = [priority.node, ...texts, actions.node].map((node, index) =>
     element("td", { role: "cell", "data-head": HEADS[index] }, node),
   );
+  const evidence = evidenceLinks();
   cells[1].append(hold);
+  cells[6].append(evidence.node);
   const node = element("tr", { role: "row" }, ...cells);
   return {
     node,
@@ -70,6 +73,7 @@ function alarmRow(actor, again) {
       ];
       texts.forEach((text, index) => setText(text, words[index]));
       setText(hold, holdWords(alarm));
+      evidence.draw(alarm.id, alarm.occurrence);
       actions.draw(alarm);
     },
   };
