@@ -50,7 +50,7 @@ function eventRow(event) {
   if (["raised", "escalated"].includes(event.change)) {
     const evidence = evidenceLinks();
     evidence.draw(event.alarm, event.occurrence);
-    row[HEADS.indexOf("Change")].append(evidence.node);
+    row[HEADS.indexOf("Time")].append(evidence.node);
   }
   return element("tr", { role: "row", "data-event": String(event.id) }, ...row);
 }
