@@ -1,0 +1,68 @@
+"""An alarm's evidence, from the running plant to the printed page."""
+
+import io
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.async_api import expect
+
+DATA_MS = 90_000
+ALARM = "U1:UJB:order1_shaft_x"
+ROW = f"[data-alarm='{ALARM}']"
+HOSTILE = "<script>alert(1)</script>"
+CAPTURE = "\n[capture]\npre_s = 5.0\npost_s = 2.0\nmax_s = 60.0\n"
+LIMIT = "alarms.shaft_order1_um_pk = { alert = 1.0, deadband = 0.1 }\n"
+OIL = 'oil_temperature = "ujb_oil_temperature"\n'
+
+
+@pytest.fixture
+def alarmed_plant(new_plant, tmp_path: Path) -> Iterator[object]:
+    """A plant with a hostile name whose shaft moves further than it may."""
+    text = Path(new_plant._example).read_text(encoding="utf-8")
+    text = text.replace('name = "Demo plant"', f"name = '{HOSTILE}'").replace(OIL, OIL + LIMIT, 1)
+    example = tmp_path / "example.toml"
+    example.write_text(text, encoding="utf-8")
+    new_plant._example = example
+    new_plant.settings += CAPTURE
+    new_plant.start_daq()
+    new_plant.start_service()
+    return new_plant
+
+
+@pytest.mark.slow
+async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
+    alarmed_plant, page, complaints_of, picture_of
+) -> None:
+    complaints = complaints_of(page)
+    await page.goto(f"{alarmed_plant.url}#/alarms")
+    row = page.locator(ROW)
+    await expect(row).to_be_visible(timeout=DATA_MS)
+    links = f"{alarmed_plant.url}api/v1/alarms/{ALARM}/evidence"
+    for _ in range(600):
+        [listed] = (await (await page.request.get(links)).json())["occurrences"]
+        if (listed["state"], listed["samples"]) == ("complete", "complete"):
+            break
+        await page.wait_for_timeout(200)
+    assert (listed["state"], listed["samples"]) == ("complete", "complete")
+
+    async with page.context.expect_page() as opened:
+        await row.get_by_role("link", name="report").click()
+    report = await opened.value
+    await report.wait_for_load_state()
+
+    await expect(report.locator("h1")).to_have_text("U1 UJB: shaft vibration 1×, x")
+    await expect(report.locator("dl")).to_contain_text(HOSTILE)
+    assert await report.locator("script").count() == 0
+    assert await report.locator("figure").count() == 2
+    await picture_of(report, "report")
+    printed = await report.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b(?!s)", printed)) == 1
+
+    answer = await page.request.get(f"{links}/1/bundle.zip")
+    with zipfile.ZipFile(io.BytesIO(await answer.body())) as bundle:
+        assert bundle.testzip() is None
+        assert {"evidence.json", "report.html", "samples/samples.parquet"} <= set(bundle.namelist())
+    assert complaints == []
