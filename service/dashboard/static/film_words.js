@@ -84,6 +84,12 @@ export function lastSentence({ change, verdict }, limits) {
   return change === null || JUDGED.includes(verdict) ? "" : `When it was judged last: ${changeWords(change, limits)}.`;
 }
 
+/** A change that is large but no alarm yet: it must be sure, and last. */
+export function pendingSentence({ change, verdict }, { alert }) {
+  const isPending = verdict === "normal" && change !== null && Math.abs(change.ln) >= alert;
+  return isPending ? "Beyond its limit; an alarm once it is sure and has lasted." : "";
+}
+
 function changeWords(change, limits) {
   const spread = Math.max(change.high_95 - change.percent, change.percent - change.low_95);
   const hours = `${formatFixed(change.time_scale_h, 0)} running hours`;

@@ -1,7 +1,7 @@
 /** What is said of a film now, in words: verdict, change with its uncertainty, cause, condition. */
 
 import { element, setText } from "../dom.js";
-import { changeSentence, causeSentence, conditionWords, lastSentence, verdictMark, whyUnjudged } from "../film_words.js";
+import { changeSentence, causeSentence, conditionWords, lastSentence, pendingSentence, verdictMark, whyUnjudged } from "../film_words.js";
 import { formatTime } from "../format.js";
 import { mark } from "../parts/mark.js";
 import { estimatorWords } from "../words.js";
@@ -48,7 +48,7 @@ function directionRow(direction) {
     draw(found, limits) {
       verdict.draw(...verdictMark(found));
       setText(change, changeSentence(found, limits));
-      setText(said, [whyUnjudged(found), causeSentence(found.cause), lastSentence(found, limits)].filter(Boolean).join(" "));
+      setText(said, [whyUnjudged(found), pendingSentence(found, limits), causeSentence(found.cause), lastSentence(found, limits)].filter(Boolean).join(" "));
     },
   };
 }
