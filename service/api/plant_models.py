@@ -145,6 +145,22 @@ class CapturesModel(ApiModel):
     """Recordings finished since the service started."""
 
 
+class EvidenceStatusModel(ApiModel):
+    """Whether evidence of alarms reaches the disk."""
+
+    error: str | None
+    """Why the newest attempt to write it failed."""
+
+    n_waiting: int
+    """Occurrences of alarms whose evidence is still to be written."""
+
+    n_written: int
+    """Written since the service started."""
+
+    n_lost: int
+    """Given up since then, because too many waited."""
+
+
 class OverviewModel(ApiModel):
     """Everything that a control room wants to see at a glance."""
 
@@ -165,6 +181,9 @@ class OverviewModel(ApiModel):
 
     captures: CapturesModel
     """Whether the samples around them reach the disk."""
+
+    evidence: EvidenceStatusModel | None
+    """Whether their evidence does; null where none is kept."""
 
     units: list[UnitOverviewModel]
     """All units."""

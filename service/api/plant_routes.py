@@ -8,6 +8,7 @@ from service.api.context import Context, UnitId
 from service.api.film_views import film_brief
 from service.api.plant_models import (
     CapturesModel,
+    EvidenceStatusModel,
     OverviewModel,
     PlantModel,
     QuantityModel,
@@ -38,6 +39,7 @@ def plant_router(context: Context) -> APIRouter:
                 n_running=context.captures.n_running,
                 n_written=context.captures.n_written,
             ),
+            evidence=_evidence(context),
             units=[_unit_overview(context, unit) for unit in context.units],
         )
 
@@ -57,6 +59,18 @@ def plant_router(context: Context) -> APIRouter:
         return [QuantityModel(name=q.name, unit=q.unit, label=q.label) for q in CATALOGUE]
 
     return router
+
+
+def _evidence(context: Context) -> EvidenceStatusModel | None:
+    if context.evidence is None:
+        return None
+    keeper = context.evidence.keeper
+    return EvidenceStatusModel(
+        error=keeper.error,
+        n_waiting=keeper.n_pending,
+        n_written=keeper.n_written,
+        n_lost=keeper.n_lost,
+    )
 
 
 def _unit(context: Context, unit: str) -> UnitModel:

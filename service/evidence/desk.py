@@ -44,14 +44,14 @@ class EvidenceDesk:
     def __init__(
         self, archive: EvidenceArchive, keeper: EvidenceKeeper, trend_days: float, clock: Clock
     ) -> None:
-        self.archive, self._keeper, self._clock = archive, keeper, clock
+        self.archive, self.keeper, self._clock = archive, keeper, clock
         self._trend_days = trend_days
         self._slots = asyncio.Semaphore(SLOTS)
         self._n_downloads = 0
 
     async def occurrences(self, alarm: str, most: int) -> list[Found]:
         """The newest occurrences of an alarm, newest first."""
-        pending, capturing = self._keeper.pending, self._keeper.capturing
+        pending, capturing = self.keeper.pending, self.keeper.capturing
 
         def look() -> list[Found]:
             found = self.archive.occurrences(alarm, pending, most)
@@ -61,7 +61,7 @@ class EvidenceDesk:
 
     async def occurrence(self, alarm: str, number: int) -> Occurrence | None:
         """One of them; None if there never was such a one."""
-        pending = self._keeper.pending
+        pending = self.keeper.pending
         return await self._worked(lambda: self.archive.occurrence(alarm, number, pending))
 
     async def report(self, found: Occurrence) -> str:
@@ -72,7 +72,7 @@ class EvidenceDesk:
         DamagedEvidenceError, LookupError
             If the bundle cannot be read, or is not there.
         """
-        capturing = self._keeper.capturing
+        capturing = self.keeper.capturing
         return await self._worked(lambda: self._report(found, capturing))
 
     async def bundle(self, found: Occurrence) -> AsyncIterator[bytes]:

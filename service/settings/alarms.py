@@ -120,7 +120,8 @@ class CaptureSettings(Settings):
 
     pre_s: Annotated[float, Field(ge=0.0, le=600.0)] = 60.0
     """From how long before the alarm, s; as many samples of every unit are held in memory: 12
-    channels at 600 Hz take 1.7 MB a minute."""
+    channels at 600 Hz take 1.7 MB a minute. Where films are watched, it is at least an averaging
+    window, as far as max_s allows: their alarms stand on all of it."""
 
     post_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 120.0
     """Until how long after it, s."""
