@@ -69,7 +69,7 @@ def changed(old: str, new: str) -> str:
         (changed("address = 20", "address = 11"), "map.toml:9: value[2].address: lies on a"),
         (changed('"float32"', '"float16"'), "map.toml:6: value[1].type = 'float16'"),
         (changed("address = 10", "address = 0"), "value[1].address: must be 1 to 65535"),
-        (changed("base = 1", "base = 2"), "map.toml:2: base: must be 0, 1, 10001"),
+        (changed("base = 1", "base = 2"), "map.toml:2: base = 2: must be 0, 1, 10001"),
         (changed("base = 1", "bass = 1"), "map.toml:2: bass = 1: Extra inputs"),
         (changed("address = 20", "address = 20\nscale = 0.0"), "value[2].scale: must not be 0"),
         (changed("address = 20", 'address = 20\ndetector = "pp"'), "value[2].detector"),
