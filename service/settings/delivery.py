@@ -116,7 +116,7 @@ class WebhookSettings(_ReceiverSettings):
     """A web server that takes each event as a POST of JSON."""
 
     kind: Literal["webhook"]
-    """"webhook"."""
+    """"webhook": an HTTP address that takes JSON."""
 
     url: Annotated[str, StringConstraints(min_length=1, max_length=2000)]
     """Where to; redirects are not followed. Example: "https://alarms.example/padwatch"."""
@@ -141,7 +141,7 @@ class SmtpSettings(_ReceiverSettings):
     """A mail server that takes each event as a mail to every recipient."""
 
     kind: Literal["smtp"]
-    """"smtp"."""
+    """"smtp": a mail server."""
 
     host: HostName
     """Mail server; example: "mail.plant.example"."""

@@ -164,7 +164,7 @@ class PlantFile(Settings):
     """Delays and limits of the alarms of all units."""
 
     films: FilmAlarmSettings = FilmAlarmSettings()
-    """Baselines of stiffness by operating condition, and alarms of its change."""
+    """How films are compared with what they were like, and which changes are alarms."""
 
     capture: CaptureSettings = CaptureSettings()
     """Samples that are kept around an alarm."""
