@@ -1,7 +1,9 @@
 """Spectra and orbit of the alarm's bearing."""
 
 import math
+from collections.abc import Sequence
 
+from service.evidence.bearing_part import BearingPart
 from service.evidence.plots.plot import Plot
 from service.evidence.plots.scales import Scale
 from service.evidence.report.case import Case
@@ -19,22 +21,15 @@ def spectra_figure(case: Case) -> Figure | None:
         [case.spectra[name][i] for i in rows]
         for name in ("frequency_hz", f"shaft_{axis}_um_pk", f"bearing_{axis}_um_pk")
     )
-    seen = [value for value in (*shaft, *frame) if value and value > 0.0]
-    if not seen:
+    heights = _decades([*shaft, *frame])
+    if heights is None:
         return None
-    top = max(seen)
-    floor = max(min(seen), top * 1e-5)
     plot = Plot(
         *(525.0, 146.0),
-        Scale(0.0, f[-1]),
-        Scale(10.0 ** math.floor(math.log10(floor)), 10.0 ** math.ceil(math.log10(top)), True),
+        *(Scale(0.0, f[-1]), heights),
         *("Frequency, Hz", f"Amplitude {axis}, µm 0-pk", "Spectra", "spectra"),
     )
-    lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
-    for row, (name, words) in enumerate(lines):
-        reading = bearing.readings.get(name)
-        if reading is not None and reading.value is not None:
-            plot.upright(reading.value, "marked", words, row)
+    _mark_orders(plot, bearing)
     plot.line(f, shaft, "shaft")
     plot.line(f, frame, "bearing")
     return Figure(
@@ -43,6 +38,25 @@ def spectra_figure(case: Case) -> Figure | None:
         f" {bearing.window.duration_s:.0f} s before the alarm. Blue: shaft relative to bearing."
         " Orange: bearing.",
     )
+
+
+def _decades(amplitudes: Sequence[float]) -> Scale | None:
+    """Whole decades that hold all amplitudes, five at most; None if there is no motion."""
+    seen = [value for value in amplitudes if value and value > 0.0]
+    if not seen:
+        return None
+    top = max(seen)
+    floor = max(min(seen), top * 1e-5)
+    low, high = math.floor(math.log10(floor)), math.ceil(math.log10(top))
+    return Scale(10.0**low, 10.0 ** max(high, low + 1), True)
+
+
+def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
+    lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
+    for row, (name, words) in enumerate(lines):
+        reading = bearing.readings.get(name)
+        if reading is not None and reading.value is not None:
+            plot.upright(reading.value, "marked", words, row)
 
 
 def orbit_figure(case: Case) -> Figure | None:

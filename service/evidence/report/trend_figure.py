@@ -1,6 +1,7 @@
 """Stiffness over time, before and after the alarm."""
 
 import math
+from dataclasses import dataclass
 
 from core.units import NS_PER_S
 from service.evidence.plots.plot import Plot, Values
@@ -13,45 +14,92 @@ from service.evidence.tables import Columns
 HOLE_S = 6 * 3600.0
 """Expected stiffness is not drawn across longer holes."""
 
+SHORTEST_S, MARGIN = 3600.0, 0.04
+"""Before the alarm at least, and after it as a share of what is before."""
+
 
 def trend_figure(case: Case) -> Figure | None:
     """Stiffness before and after, with what is expected and the limit."""
-    table, axis = _joined(case.before, case.after), case.direction
-    if not table.get("time_ns"):
+    found = _trend(case)
+    room = None if found is None else around([*found.stiffness, *found.lows, *found.highs])
+    if found is None or room is None:
         return None
-    time = [t / NS_PER_S for t in table["time_ns"]]
-    k = finite_of(table[f"stiffness_n_per_m_{axis}"])
-    expected = _expected(k, table[f"deviation_{axis}"])
-    limit = case.evidence.limits["films"]["change"]["alert_change"]
-    lows, highs = (_times(expected, math.exp(sign * limit)) for sign in (-1.0, 1.0))
-    room = around([*k, *lows, *highs])
-    if room is None:
-        return None
-    alarm_s = case.evidence.alarm.time_ns / NS_PER_S
-    last = max(time[-1], alarm_s + 0.04 * (alarm_s - time[0]))
+    axis = case.direction
     plot = Plot(
         *(720.0, 126.0),
-        TimeScale(time[0], last if last > time[0] else time[0] + 3600.0),
+        TimeScale(found.first_s, found.last_s),
         Scale(*room, divisor=GN_PER_M),
         *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
     )
-    plot.band(time, lows, highs, "band", HOLE_S)
-    plot.line(time, expected, "expected", HOLE_S)
-    settled = table["is_settled"]
-    plot.dots(time, _where(k, [not each for each in settled]), "unsettled")
-    before = [bool(s) and t <= alarm_s for s, t in zip(settled, time, strict=True)]
-    after = [bool(s) and t > alarm_s for s, t in zip(settled, time, strict=True)]
-    plot.dots(time, _where(k, before), "today")
-    plot.dots(time, _where(k, after), "alarm")
-    plot.upright(alarm_s, "at")
-    n_after = sum(after)
+    _draw(plot, found)
+    days = (found.last_s - found.first_s) / DAY_S
     return Figure(
         plot,
-        f"Stiffness of the film in {axis} over {(last - time[0]) / DAY_S:.0f} days, {len(time)}"
-        f" readings; red line: the alarm, red dots: {n_after} readings since. Dashed: expected"
-        f" under the condition of each reading; band: within {100.0 * limit:g} % of it, the limit"
-        " of an alert. Light grey: not settled.",
+        f"Stiffness of the film in {axis} over {days:.0f} days, {len(found.time)} readings; red"
+        f" line: the alarm, red dots: {sum(found.after)} readings since. Dashed: expected under the"
+        f" condition of each reading; band: within {100.0 * found.limit:g} % of it, the limit of an"
+        " alert. Light grey: not settled.",
     )
+
+
+@dataclass(frozen=True)
+class _Trend:
+    """Readings of a film around an alarm, by column; times in seconds since 1970."""
+
+    alarm_s: float
+    time: list[float]
+    stiffness: list[float | None]
+    expected: list[float | None]
+    is_settled: list[bool]
+    limit: float
+
+    @property
+    def lows(self) -> list[float | None]:
+        return _times(self.expected, math.exp(-self.limit))
+
+    @property
+    def highs(self) -> list[float | None]:
+        return _times(self.expected, math.exp(self.limit))
+
+    @property
+    def first_s(self) -> float:
+        return min(self.time[0], self.alarm_s - SHORTEST_S)
+
+    @property
+    def last_s(self) -> float:
+        return max(self.time[-1], self.alarm_s + MARGIN * (self.alarm_s - self.first_s))
+
+    @property
+    def after(self) -> list[bool]:
+        """Whether each reading is settled, and later than the alarm."""
+        rows = zip(self.is_settled, self.time, strict=True)
+        return [settled and time > self.alarm_s for settled, time in rows]
+
+
+def _trend(case: Case) -> _Trend | None:
+    table, axis = _joined(case.before, case.after), case.direction
+    if not table.get("time_ns"):
+        return None
+    stiffness = finite_of(table[f"stiffness_n_per_m_{axis}"])
+    return _Trend(
+        alarm_s=case.evidence.alarm.time_ns / NS_PER_S,
+        time=[time / NS_PER_S for time in table["time_ns"]],
+        stiffness=stiffness,
+        expected=_expected(stiffness, table[f"deviation_{axis}"]),
+        is_settled=[bool(each) for each in table["is_settled"]],
+        limit=case.evidence.limits["films"]["change"]["alert_change"],
+    )
+
+
+def _draw(plot: Plot, found: _Trend) -> None:
+    time, k, after = found.time, found.stiffness, found.after
+    before = [s and not a for s, a in zip(found.is_settled, after, strict=True)]
+    plot.band(time, found.lows, found.highs, "band", HOLE_S)
+    plot.line(time, found.expected, "expected", HOLE_S)
+    plot.dots(time, _where(k, [not settled for settled in found.is_settled]), "unsettled")
+    plot.dots(time, _where(k, before), "today")
+    plot.dots(time, _where(k, after), "alarm")
+    plot.upright(found.alarm_s, "at")
 
 
 def _joined(before: Columns, after: Columns) -> Columns:
