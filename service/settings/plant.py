@@ -173,7 +173,7 @@ class PlantFile(Settings):
     """What is kept of alarms beside their samples."""
 
     delivery: DeliverySettings = DeliverySettings()
-    """Who is told of alarms, beside the dashboard."""
+    """Receivers of messages about alarms, besides the dashboard."""
 
     unit: Annotated[tuple[UnitSettings, ...], Field(min_length=1, max_length=200)]
     """Generating units."""

@@ -85,7 +85,7 @@ async def test_trends_and_gaps_of_nobody_are_not_found(running: Any) -> None:
         ("quantity", "", "not in the catalogue"),
         ("quantity", ["speed_rpm", "speed"], "not in the catalogue"),
         ("quantity", ["speed_rpm"] * 41, "at most 40"),
-        ("max_point", 10, "there is no parameter 'max_point' here; known: quantity, max_points"),
+        ("max_point", 10, "there is no parameter 'max_point' here; known: quantity, state"),
         ("eccentricity_mn", 0.2, "there is no parameter"),
     ],
 )
