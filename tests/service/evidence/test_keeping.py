@@ -196,26 +196,6 @@ async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
     assert states(rig, "U1:UJB:order1_shaft_y") == [(1, "complete")]
 
 
-async def test_young_evidence_stays_until_the_hard_limit(
-    rig_of: Callable[..., Any], news: Callable[..., Any], plant: Any
-) -> None:
-    tight = {"max_gb": 1e-9, "hard_max_gb": 1.0}
-    soft = plant.evidence.model_copy(update=tight)
-    rig = await rig_of(plant.model_copy(update={"evidence": soft}))
-    async with rig.running():
-        rig.raise_(news(-40 * 86_400.0))
-        rig.raise_(news(-2 * 86_400.0, occurrence=2))
-        rig.raise_(news(0.0, occurrence=3))
-        await rig.until(lambda: rig.keeper.n_written == 3 and len(rig.bundles) == 2)
-    assert states(rig)[:2] == [(3, "complete"), (2, "complete")]
-
-    hard = plant.evidence.model_copy(update={"max_gb": 1e-9, "hard_max_gb": 1e-9})
-    again = await rig_of(plant.model_copy(update={"evidence": hard}))
-    async with again.running():
-        await again.until(lambda: len(again.bundles) == 1)
-    assert states(again)[0] == (3, "complete")
-
-
 async def test_the_configuration_can_be_looked_up_by_its_version(
     rig_of: Callable[..., Any], news: Callable[..., Any]
 ) -> None:
