@@ -21,7 +21,7 @@ SHORTEST_S, MARGIN = 3600.0, 0.04
 def trend_figure(case: Case) -> Figure | None:
     """Stiffness before and after, with what is expected and the limit."""
     found = _trend(case)
-    room = None if found is None else around([*found.stiffness, *found.lows, *found.highs])
+    room = None if found is None else around(_heights(case, found))
     if found is None or room is None:
         return None
     axis = case.direction
@@ -32,13 +32,15 @@ def trend_figure(case: Case) -> Figure | None:
         *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
     )
     _draw(plot, found)
+    if case.comparison is not None:
+        plot.points([found.alarm_s], [case.comparison.stiffness_n_per_m], "alarm", 2.2)
     days = (found.last_s - found.first_s) / DAY_S
     return Figure(
         plot,
         f"Stiffness of the film in {axis} over {days:.0f} days, {len(found.time)} readings; red"
-        f" line: the alarm, red dots: {sum(found.after)} readings since. Dashed: expected under the"
-        f" condition of each reading; band: within {100.0 * found.limit:g} % of it, the limit of an"
-        " alert. Light grey: not settled.",
+        f" line: the alarm with its reading, red dots: {sum(found.after)} readings since. Dashed:"
+        f" expected under the condition of each reading; band: within {100.0 * found.limit:g} % of"
+        " it, the limit of an alert. Light grey: not settled.",
     )
 
 
@@ -100,6 +102,11 @@ def _draw(plot: Plot, found: _Trend) -> None:
     plot.dots(time, _where(k, before), "today")
     plot.dots(time, _where(k, after), "alarm")
     plot.upright(found.alarm_s, "at")
+
+
+def _heights(case: Case, found: _Trend) -> list[float | None]:
+    own = None if case.comparison is None else case.comparison.stiffness_n_per_m
+    return [own, *found.stiffness, *found.lows, *found.highs]
 
 
 def _joined(before: Columns, after: Columns) -> Columns:
