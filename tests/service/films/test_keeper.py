@@ -19,7 +19,7 @@ from service.films.actions import Accept, BaselineRefusedError, Freeze, Reject, 
 from service.films.keeper import FilmKeeper
 from service.films.learning import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
-from service.store.film_port import BaselineStep, FilmQuery
+from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore
 
 DAY_NS = 86_400_000_000_000
@@ -43,20 +43,43 @@ class HandClock:
         raise AssertionError(f"nobody waits {seconds} s here")
 
 
-@pytest.fixture
-def clock() -> HandClock:
-    return HandClock()
+class Plant:
+    """A unit with one bearing whose days pass when told."""
 
+    def __init__(self, store: SqliteStore, told: Tell) -> None:
+        self.store, self.told, self.clock = store, told, HandClock()
 
-@pytest.fixture
-def keeper_of(store: SqliteStore, clock: HandClock) -> Callable[..., FilmKeeper]:
-    """A keeper as after a start, of one unit with one bearing."""
-
-    def build(**settings: Any) -> FilmKeeper:
+    async def start(self, **settings: Any) -> FilmKeeper:
+        """A keeper as after a start."""
         given = FilmAlarmSettings(**settings)
-        return FilmKeeper({"U1": unit()}, {"U1": rules_of(given)}, given, store.films, clock)
+        rules = {"U1": rules_of(given)}
+        keeper = FilmKeeper({"U1": unit()}, rules, given, self.store.films, self.clock)
+        await keeper.start()
+        return keeper
 
-    return build
+    async def live(
+        self, keeper: FilmKeeper, history: StiffnessHistory, days: tuple[int, int], every: int = 1
+    ) -> None:
+        """Let days pass: their readings are judged as by the keeper's judge, stored, learned."""
+        judge: FilmJudge = keeper._films["U1"].watch.judge
+        for day in range(*days, every):
+            today = self.told(days_of(history, day, min(day + every, days[1])))
+            self.store.append([], [], [], [n for t in today for n in judge.judge([t.reading])])
+            self.clock.now = int(history.time_ns[0]) + (day + every) * DAY_NS
+            await keeper.learn_due()
+
+    def history(self, **query: Any) -> FilmHistory:
+        return self.store.films.history(FilmQuery("U1", "UJB", Estimator.DYNAMIC, **query))
+
+    @property
+    def versions(self) -> list[int]:
+        """Newest first."""
+        return [entry.version for entry in self.store.films.baselines("U1", "UJB")]
+
+
+@pytest.fixture
+def plant(store: SqliteStore, told: Tell) -> Plant:
+    return Plant(store, told)
 
 
 def unit() -> Unit:
@@ -81,79 +104,44 @@ def days_of(history: StiffnessHistory, first: float, end: float) -> StiffnessHis
     return history.where((day >= first) & (day < end))
 
 
-async def live_through(
-    keeper: FilmKeeper,
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    history: StiffnessHistory,
-    days: tuple[int, int],
-    every: int = 1,
-) -> None:
-    """Let days pass: their readings are judged as by the keeper's judge, stored, and learned."""
-    judge: FilmJudge = keeper._films["U1"].watch.judge
-    for day in range(*days, every):
-        today = told(days_of(history, day, min(day + every, days[1])))
-        store.append([], [], [], [n for t in today for n in judge.judge([t.reading])])
-        clock.now = int(history.time_ns[0]) + (day + every) * DAY_NS
-        await keeper.learn_due()
-
-
 async def test_a_baseline_is_learned_after_its_days_and_put_in_force(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
+    plant: Plant, film_life: FilmLife
 ) -> None:
-    keeper, history = keeper_of(learn_every_days=7), film_life(2, days=45)
-    await keeper.start()
+    keeper, history = await plant.start(learn_every_days=7), film_life(2, days=45)
 
-    await live_through(keeper, store, clock, told, history, (0, 19))
+    await plant.live(keeper, history, (0, 19))
     assert in_force(keeper) is None
-    await live_through(keeper, store, clock, told, history, (19, 42))
+    await plant.live(keeper, history, (19, 42))
 
-    versions = [entry.version for entry in store.films.baselines("U1", "UJB")]
+    versions = plant.versions
     assert versions == sorted(versions, reverse=True)
     assert in_force(keeper) == versions[0] >= 3
-    newest = store.films.history(FilmQuery("U1", "UJB", Estimator.DYNAMIC, newest=50))
+    newest = plant.history(newest=50)
     assert np.isin(newest.verdict, [int(v) for v in JUDGED]).any()
     assert set(newest.baseline_version.tolist()) <= {versions[0], versions[0] - 1}
 
 
-async def test_learning_ends_with_its_period(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
-) -> None:
-    keeper, history = keeper_of(learning_days=30, learn_every_days=5), film_life(2, days=60)
-    await keeper.start()
-    await live_through(keeper, store, clock, told, history, (0, 60))
-    last = store.films.baselines("U1", "UJB")[0]
+async def test_learning_ends_with_its_period(plant: Plant, film_life: FilmLife) -> None:
+    keeper, history = await plant.start(learning_days=30, learn_every_days=5), film_life(2, days=60)
+    await plant.live(keeper, history, (0, 60))
+    last = plant.store.films.baselines("U1", "UJB")[0]
     assert last.learned_until_ns <= history.time_ns[0] + 30 * DAY_NS
     assert last.learned_until_ns > history.time_ns[0] + 29 * DAY_NS
 
 
 async def test_a_film_that_creeps_away_is_not_learned_little_by_little(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
+    plant: Plant, film_life: FilmLife
 ) -> None:
     """Too slow to differ much from one fortnight's baseline to the next."""
     creep = film_life(
         2, days=90, change=lambda h: np.log(1.0 - 0.2 * np.clip((h / 24 - 20) / 70, 0.0, 1.0))
     )
-    keeper = keeper_of(learn_every_days=20)
-    await keeper.start()
-    await live_through(keeper, store, clock, told, creep, (0, 90), every=5)
+    keeper = await plant.start(learn_every_days=20)
+    await plant.live(keeper, creep, (0, 90), every=5)
 
-    steps = store.films.steps("U1", "UJB")
+    steps = plant.store.films.steps("U1", "UJB")
     doubted = {s.version for s in steps if s.step is BaselineStep.LEARNED and "%" in s.reason}
-    found = store.films.history(FilmQuery("U1", "UJB", Estimator.DYNAMIC))
+    found = plant.history()
     assert doubted
     assert in_force(keeper) == min(doubted) - 1
     assert (found.level[:, -1] > 0).all()
@@ -161,39 +149,26 @@ async def test_a_film_that_creeps_away_is_not_learned_little_by_little(
 
 
 async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
+    plant: Plant, film_life: FilmLife
 ) -> None:
     history = film_life(2, days=40)
-    keeper = keeper_of(learn_every_days=100)
-    await keeper.start()
-    await live_through(keeper, store, clock, told, history, (0, 38))
+    keeper = await plant.start(learn_every_days=100)
+    await plant.live(keeper, history, (0, 38))
     before = keeper._films["U1"].watch.judge
 
-    again = keeper_of(learn_every_days=100)
-    await again.start()
+    again = await plant.start(learn_every_days=100)
     after = again._films["U1"].watch.judge
-    for told_next in told(days_of(history, 38, 39)):
+    for told_next in plant.told(days_of(history, 38, 39)):
         [went_on], [through] = (judge.judge([told_next.reading]) for judge in (after, before))
         assert went_on.findings == through.findings
     assert in_force(again) == in_force(keeper) == 1
 
 
-async def test_engineers_decide_where_it_is_left_to_them(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
-) -> None:
-    keeper = keeper_of(acceptance="by_engineer", learn_every_days=5)
-    await keeper.start()
-    await live_through(keeper, store, clock, told, film_life(2, days=28), (0, 28))
+async def test_engineers_decide_where_it_is_left_to_them(plant: Plant, film_life: FilmLife) -> None:
+    keeper = await plant.start(acceptance="by_engineer", learn_every_days=5)
+    await plant.live(keeper, film_life(2, days=28), (0, 28))
     assert in_force(keeper) is None
-    assert [entry.version for entry in store.films.baselines("U1", "UJB")] == [2, 1]
+    assert plant.versions == [2, 1]
 
     await keeper.act(UJB, Accept(2), "Ada", "compared with last year")
     assert in_force(keeper) == 2
@@ -205,7 +180,7 @@ async def test_engineers_decide_where_it_is_left_to_them(
     assert in_force(keeper) is None
     await keeper.act(UJB, Accept(1), "Bo", "of before")
     assert in_force(keeper) == 1
-    steps = store.films.steps("U1", "UJB")
+    steps = plant.store.films.steps("U1", "UJB")
     assert [(s.step, s.version, s.actor) for s in steps] == [
         (BaselineStep.LEARNED, 1, "padwatch"),
         (BaselineStep.LEARNED, 2, "padwatch"),
@@ -216,47 +191,35 @@ async def test_engineers_decide_where_it_is_left_to_them(
 
 
 async def test_what_is_frozen_is_learned_no_further_until_it_is_thawed(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
+    plant: Plant, film_life: FilmLife
 ) -> None:
-    keeper, history = keeper_of(learn_every_days=5), film_life(2, days=45)
-    await keeper.start()
+    keeper, history = await plant.start(learn_every_days=5), film_life(2, days=45)
     with pytest.raises(BaselineRefusedError, match="no baseline in force"):
         await keeper.act(UJB, Freeze(), "Ada", "too early")
-    await live_through(keeper, store, clock, told, history, (0, 22))
+    await plant.live(keeper, history, (0, 22))
     await keeper.act(UJB, Freeze(), "Ada", "enough")
-    await live_through(keeper, store, clock, told, history, (22, 35))
-    assert len(store.films.baselines("U1", "UJB")) == 1
+    await plant.live(keeper, history, (22, 35))
+    assert len(plant.versions) == 1
     with pytest.raises(BaselineRefusedError, match="frozen already"):
         await keeper.act(UJB, Freeze(), "Ada", "again")
     await keeper.act(UJB, Thaw(), "Ada", "winter is missing")
-    await live_through(keeper, store, clock, told, history, (35, 37))
+    await plant.live(keeper, history, (35, 37))
     assert in_force(keeper) == 2
 
 
-async def test_an_overhaul_begins_everything_again(
-    keeper_of: Callable[..., FilmKeeper],
-    store: SqliteStore,
-    clock: HandClock,
-    told: Tell,
-    film_life: FilmLife,
-) -> None:
-    keeper, history = keeper_of(), film_life(2, days=60)
-    await keeper.start()
-    await live_through(keeper, store, clock, told, history, (0, 25))
+async def test_an_overhaul_begins_everything_again(plant: Plant, film_life: FilmLife) -> None:
+    keeper, history = await plant.start(), film_life(2, days=60)
+    await plant.live(keeper, history, (0, 25))
     assert in_force(keeper) == 1
     with pytest.raises(BaselineRefusedError, match="future"):
-        await keeper.act(UJB, Renew(clock.now + 1), "Ada", "overhaul next week")
+        await keeper.act(UJB, Renew(plant.clock.now + 1), "Ada", "overhaul next week")
 
-    await keeper.act(UJB, Renew(clock.now), "Ada", "new pads")
+    await keeper.act(UJB, Renew(plant.clock.now), "Ada", "new pads")
     assert in_force(keeper) is None
     with pytest.raises(BaselineRefusedError, match="before the last machine event"):
         await keeper.act(UJB, Accept(1), "Ada", "the old one")
-    event_ns = clock.now
-    await live_through(keeper, store, clock, told, history, (25, 50))
+    event_ns = plant.clock.now
+    await plant.live(keeper, history, (25, 50))
 
     baseline: BearingBaseline | None = keeper.baseline("U1", "UJB")
     assert baseline is not None
