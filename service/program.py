@@ -196,8 +196,8 @@ async def _run(
             await asyncio.wait([serving])
     finally:
         await captures.close()
-        await evidence.close()
         await recorder.flush()  # also when a bug ends the program
+        await evidence.close()
 
 
 async def _learn(films: FilmKeeper, origin: Origin) -> None:
