@@ -12,7 +12,7 @@ import httpx2
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 40.0
+PATIENCE_S = 90.0
 """Until a test gives up; no test waits that long when all is well."""
 
 
