@@ -109,6 +109,7 @@ def _judged(
     level = np.where(danger, 2, np.where(alert, 1, 0)).astype(np.int8)
     seen_h = np.arange(1, level.size + 1) * baseline.reading_h
     is_enough = findings.is_found & (seen_h >= limits.min_evidence_h)
+    is_enough &= ~_is_passed(findings, limits.alert_change, limits)
     quiet = np.where(is_enough, Verdict.NORMAL, Verdict.GATHERING_EVIDENCE)
     verdict = np.where(level > 0, level, quiet).astype(np.int8)
     return DecisionHistory(verdict, level, *findings.strongest())
@@ -118,17 +119,27 @@ def _level(
     findings: FindingHistory, limit: float, baseline: QuantityBaseline, limits: ChangeLimits
 ) -> _Bools:
     size, significance = np.abs(findings.change), findings.significance
-    sure = np.array([[limits.sure_from(time_h)] for time_h in findings.time_scales_h])
-    sure = sure.reshape(-1, 1)
-    is_passed = (size >= limit) & (significance >= sure)
+    sure = _sure(findings, limits)
     is_held = (size > limit - limits.deadband) & (significance > sure * limits.holding_share)
     return level_history(
-        np.asarray(is_passed.any(axis=0)),
+        _is_passed(findings, limit, limits),
         np.asarray(is_held.any(axis=0)),
         readings_of(limits.on_delay_h, baseline.reading_h),
         readings_of(limits.off_delay_h, baseline.reading_h),
         limits.is_latching,
     )
+
+
+def _is_passed(findings: FindingHistory, limit: float, limits: ChangeLimits) -> _Bools:
+    """(n,) whether a change is large enough and sure on any time scale."""
+    is_sure = findings.significance >= _sure(findings, limits)
+    return np.asarray(np.any(is_sure & (np.abs(findings.change) >= limit), axis=0))
+
+
+def _sure(findings: FindingHistory, limits: ChangeLimits) -> FloatArray:
+    """(n_scales, 1) significance from which a mean is sure."""
+    sure = [limits.sure_from(time_h) for time_h in findings.time_scales_h]
+    return np.array(sure).reshape(-1, 1)
 
 
 def _spread(

@@ -190,4 +190,5 @@ def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
 def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:
     counted_h = decision.evidence.n_counted * baseline.reading_h
     is_enough = decision.finding is not None and counted_h >= limits.min_evidence_h
-    return counted_verdict(decision.level, is_enough)
+    # what is beyond its limit, though not for long enough, is not normal either
+    return counted_verdict(decision.level, is_enough and not decision.alert.n_passed)

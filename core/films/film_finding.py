@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from core.alarms.alarm import AlarmLevel, Condition, unknown
-from core.decision.attribution import Attribution
+from core.decision.attribution import Attribution, Cause
 from core.decision.decision import Decision
 from core.decision.limits import ChangeLimits
 from core.decision.verdict import JUDGED, Verdict
@@ -39,6 +39,15 @@ class FilmFinding:
     attribution: Attribution | None = None
 
 
+CHANGED = {
+    Cause.FILM: "film_changed",
+    Cause.BRACKET_OR_TRANSDUCER: "bracket_or_transducer_changed",
+    Cause.BOTH: "film_and_bracket_or_transducer_changed",
+    Cause.UNKNOWN: "changed_cause_unknown",
+}
+"""Reasons of alarms."""
+
+
 def film_finding(decision: Decision, is_compared: bool, version: int | None) -> FilmFinding:
     """What a decision says.
 
@@ -67,5 +76,5 @@ def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Condition:
     limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
     reason = "ok"
     if finding.level is not None:
-        reason = finding.attribution.cause if finding.attribution else "changed"
+        reason = CHANGED[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
     return Condition(finding.level, value=finding.change, limit=limit, reason=reason)

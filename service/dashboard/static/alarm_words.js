@@ -76,6 +76,10 @@ const REASONS = {
   amplitude_change_above_limit: "above its limit by length alone, no phase",
   no_reference: "no reference in this operating state",
   no_phase: "the phase is lost",
+  film_changed: "the film has changed",
+  bracket_or_transducer_changed: "bracket or transducer has changed",
+  film_and_bracket_or_transducer_changed: "film and bracket or transducer have changed",
+  changed_cause_unknown: "changed, cause not known",
   given_up: "the store did not take them",
   zone_a: "zone A",
   zone_b: "zone B",
@@ -127,10 +131,17 @@ export function levelMark({ level, is_active: active }) {
 }
 
 /** `163.2 µm 0-pk, limit 150.0`; nothing where there are no numbers. */
-export function valueWords({ value, limit, value_unit: unit }) {
+export function valueWords({ kind, value, limit, value_unit: unit }) {
   if (value === null) return "";
+  if (kind?.startsWith("stiffness_")) return filmWords(value, limit);
   const digits = (number) => formatFixed(number, DECIMALS[unit] ?? 2);
   return `${digits(value)} ${unit ?? ""}${limit === null ? "" : `, limit ${digits(limit)}`}`;
+}
+
+/** A change of stiffness, which the API gives in ln: `−11.4 %, limit −3.9 %`. */
+function filmWords(value, limit) {
+  const percent = (ln) => `${formatFixed(100 * Math.expm1(ln), 1)} %`;
+  return percent(value) + (limit === null ? "" : `, limit ${percent(Math.sign(value) * Math.abs(limit))}`);
 }
 
 /** What an alarm watches, now; what is not known is said to be unknown, never to be well. */

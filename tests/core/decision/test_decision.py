@@ -206,3 +206,15 @@ def test_time_cannot_stand_still(
 def test_impossible_limits_are_refused_with_key_and_value(key: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{key} = {value:g}"):
         ChangeLimits(**{key: value})
+
+
+def test_what_is_beyond_its_limit_but_has_not_lasted_yet_is_not_called_normal(
+    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
+) -> None:
+    seen = watch(film_life(3, days=150, change=loss(0.2)), STIFFNESS)
+    said = step_by_step(seen.later, seen.is_settled, seen.stiffness_x, LIMITS)
+    raised = next(i for i, decision in enumerate(said) if decision.level is not None)
+    passed = [d for d in said[:raised] if d.alert.n_passed]
+    assert passed
+    assert Verdict.NORMAL not in {decision.verdict for decision in passed}
+    assert said[0].verdict in (Verdict.TRANSIENT, Verdict.GATHERING_EVIDENCE)
