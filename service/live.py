@@ -11,6 +11,13 @@ from core.blocks import SampleBlock
 from core.device_clock import DeviceClock, StampFault
 from core.quality import Quality, Reading, Reason, bad, missing
 from core.quantities import CATALOGUE
+from service.capture.history import BlockHistory
+
+HELD_S = 10.0
+"""How much of the newest samples is held of each unit."""
+
+HELD_SAMPLES = 2_000_000
+"""Of all channels of a unit together, at most."""
 
 
 class LinkState(StrEnum):
@@ -40,6 +47,8 @@ class UnitStatus:
         How the device's clock stands against the host's, where it can be told.
     stamp_fault
         Why the newest block's own time stamp was not used.
+    n_failed
+        How often connecting has failed, or a link was lost, since the service started.
     """
 
     state: LinkState = LinkState.CONNECTING
@@ -50,6 +59,7 @@ class UnitStatus:
     account: SampleAccount = field(default_factory=SampleAccount)
     clock: DeviceClock | None = None
     stamp_fault: StampFault | None = None
+    n_failed: int = 0
 
 
 @dataclass(frozen=True)
@@ -83,12 +93,15 @@ class LiveView:
         self._stale_after_s = stale_after_s
         self._status = {unit: UnitStatus() for unit in units}
         self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
+        self._blocks: dict[str, BlockHistory] = {}
         self.store_error: str | None = None
         self.n_unstored = 0
 
     def set_link(self, unit: str, state: LinkState, reason: str | None = None) -> bool:
         """Note the state of a link; return whether it changed."""
         before = self._status[unit]
+        if state is LinkState.NOT_CONNECTED:
+            before = self._status[unit] = replace(before, n_failed=before.n_failed + 1)
         if (before.state, before.reason) == (state, reason):
             return False
         since_ns = before.since_ns if before.state is state else self._clock.now_ns()
@@ -97,6 +110,7 @@ class LiveView:
 
     def set_received(self, block: SampleBlock, account: SampleAccount) -> None:
         """Note the arrival of a block."""
+        self._hold(block)
         self._status[block.unit] = replace(
             self._status[block.unit],
             last_sample_ns=block.stop_ns,
@@ -114,6 +128,14 @@ class LiveView:
     def status(self, unit: str) -> UnitStatus:
         """How samples of a unit arrive."""
         return self._status[unit]
+
+    def blocks(self, unit: str) -> list[SampleBlock]:
+        """The newest blocks of a unit, oldest first, current or not."""
+        return list(self._blocks.get(unit, ()))
+
+    def why_no_samples(self, unit: str) -> Reason | None:
+        """Why the newest samples of a unit are not current; None if they are."""
+        return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
         """Time since the newest block arrived; None if none has."""
@@ -147,3 +169,9 @@ class LiveView:
         if age_s is None:
             return Reason.WAITING_FOR_DATA
         return Reason.STALE if age_s > self._stale_after_s else None
+
+    def _hold(self, block: SampleBlock) -> None:
+        if block.unit not in self._blocks:
+            most = HELD_SAMPLES // max(block.samples.shape[0], 1)
+            self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
+        self._blocks[block.unit].add(block)

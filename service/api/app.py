@@ -8,6 +8,7 @@ from service.api.alarm_rate_routes import alarm_rate_router
 from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
 from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
+from service.api.channel_routes import channel_router
 from service.api.context import Context
 from service.api.delivery_routes import delivery_router
 from service.api.evidence_routes import evidence_router
@@ -22,6 +23,7 @@ from service.api.problems import (
     refuse_unknown_parameters,
 )
 from service.api.reference_routes import reference_router
+from service.api.source_routes import source_router
 from service.api.trend_routes import trend_router
 from service.dashboard.routes import dashboard_router
 
@@ -49,6 +51,8 @@ def create_app(context: Context) -> FastAPI:
     for router in (
         health_router(context),
         plant_router(context),
+        channel_router(context),
+        source_router(context),
         gap_router(context),
         bearing_router(context),
         trend_router(context),

@@ -21,7 +21,7 @@ async def test_the_description_is_served(service: Any) -> None:
 
 
 def test_every_operation_is_explained(operations: list[tuple[str, dict[str, Any]]]) -> None:
-    assert len(operations) == 43
+    assert len(operations) == 46
     for name, operation in operations:
         assert operation["summary"], name
         assert len(operation["description"]) > 20, name
@@ -44,6 +44,8 @@ def test_every_error_is_documented_as_a_problem(
 ) -> None:
     expected = {
         "GET /api/v1/units/{unit}": {"404"},
+        "GET /api/v1/units/{unit}/channels": {"404"},
+        "GET /api/v1/units/{unit}/waveform": {"404", "409", "422"},
         "GET /api/v1/units/{unit}/gaps": {"404", "422", "503"},
         "GET /api/v1/units/{unit}/bearings": {"404"},
         "GET /api/v1/units/{unit}/bearings/{bearing}": {"404"},

@@ -1,0 +1,30 @@
+"""What the API answers about the health of a source."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from service.api.plant_models import SourceModel
+
+SourceKind = Literal[
+    "modbus_ring", "modbus_fifo", "modbus_polled", "modbus_vector", "can", "simulated"
+]
+
+
+class SourceHealthModel(SourceModel):
+    """Where the samples of a unit come from, how they arrive and where every one of them went."""
+
+    unit: Annotated[str, Field(examples=["U1"])]
+    """Unit."""
+
+    kind: SourceKind
+    """How they arrive."""
+
+    n_failed: int
+    """How often connecting has failed, or the link was lost, since the service started."""
+
+    rate_hz: float
+    """Samples per second and channel."""
+
+    poll_period_s: float | None
+    """How often the device is asked; null for one that sends by itself."""
