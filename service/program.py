@@ -6,6 +6,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import uvicorn
 
@@ -20,7 +21,9 @@ from service.delivery.deliveries import Deliveries
 from service.delivery.facts import Around
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
+from service.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.live import LiveView
+from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
@@ -28,6 +31,7 @@ from service.runner import BUS_CAPACITY, Runner, WatchedUnit
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.store.port import Store
+from service.supervision import Supervision
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of, router_of
 from service.wiring.evidence import evidence_desk, evidence_of, watch
@@ -47,6 +51,20 @@ class PortInUseError(Exception):
 
 class HttpServer(uvicorn.Server):
     """Uvicorn without its own signal handling: the program stops all its parts together."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._pulse: Pulse = UNHEARD
+
+    async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
+        """Serve until it is told to stop."""
+        self._pulse = pulse
+        await self.serve([listener])
+
+    async def on_tick(self, counter: int) -> bool:
+        """Beat ten times a second."""
+        self._pulse.beat()
+        return await super().on_tick(counter)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -96,6 +114,7 @@ async def run_service(
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
+    manager: ServiceManager = NOBODY,
 ) -> None:
     """Run until SIGINT or SIGTERM, or until a performance that ends is over.
 
@@ -105,6 +124,8 @@ async def run_service(
         Where the HTTP server listens.
     announce
         Called with the URL once the server answers.
+    manager
+        Told when the service is ready, alive and stopping.
 
     Raises
     ------
@@ -116,7 +137,7 @@ async def run_service(
     around = Around(live)
     store = open_store(plant, origin, router_of(plant, origin, around, clock))
     try:
-        await _run(performance, listener, clock, live, around, store, announce)
+        await _run(performance, listener, clock, live, around, store, announce, manager)
     finally:
         store.close()
 
@@ -129,6 +150,7 @@ async def _run(
     around: Around,
     store: Store,
     announce: Callable[[str], None],
+    manager: ServiceManager,
 ) -> None:
     plant, units = performance.plant, performance.units
     receivers = receivers_of(plant, performance.origin, clock)
@@ -146,7 +168,9 @@ async def _run(
     around.watch_films(films.newest)
     evidence = evidence_of(plant, performance.origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, performance.origin)
-    runner = Runner(units, live, recorder, clock, alarms, films, bus)
+    beats = Heartbeats(clock)
+    supervision = Supervision(manager, beats, live, units, clock)
+    runner = Runner(units, live, recorder, clock, alarms, films, bus, beats)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
     context = Context(
@@ -165,6 +189,7 @@ async def _run(
         evidence=evidence_desk(plant, store, evidence, clock),
         origin=performance.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
+        loops=beats.look,
     )
     config = uvicorn.Config(
         create_app(context),
@@ -178,19 +203,25 @@ async def _run(
     try:
         async with asyncio.TaskGroup() as tasks:
             running = tasks.create_task(runner.run(), name="run")
-            looking = tasks.create_task(references.run(), name="references")
-            watching = tasks.create_task(alarms.run(), name="alarms")
-            capturing = tasks.create_task(captures.run(), name="captures")
-            witnessing = tasks.create_task(evidence.run(), name="evidence")
-            learning = tasks.create_task(_learn(films, performance.origin), name="learn")
-            delivering = tasks.create_task(deliveries.run(), name="deliver")
-            serving = tasks.create_task(server.serve([listener]), name="serve")
-            announcing = tasks.create_task(_announce(server, listener, announce), name="announce")
+            looking = tasks.create_task(beats.tend("references", references.run), name="references")
+            watching = tasks.create_task(beats.tend("alarms", alarms.run), name="alarms")
+            capturing = tasks.create_task(beats.tend("captures", captures.run), name="captures")
+            witnessing = tasks.create_task(beats.tend("evidence", evidence.run), name="evidence")
+            learning = tasks.create_task(_learn(films, performance.origin, beats), name="learn")
+            delivering = tasks.create_task(deliveries.run(beats), name="deliver")
+            serving = tasks.create_task(
+                beats.tend("serve", partial(server.run_on, listener)), name="serve"
+            )
+            announcing = tasks.create_task(
+                _announce(server, listener, announce, supervision), name="announce"
+            )
+            supervising = tasks.create_task(supervision.run(), name="supervise")
             if performance.ends:
                 running.add_done_callback(lambda _: stopped.set())
             await stopped.wait()
+            supervision.stopping()
             server.should_exit = True
-            helping = (capturing, witnessing, learning, delivering, announcing)
+            helping = (capturing, witnessing, learning, delivering, announcing, supervising)
             for task in (running, looking, watching, *helping):
                 task.cancel()
             await asyncio.wait([serving])
@@ -200,10 +231,10 @@ async def _run(
         await evidence.close()
 
 
-async def _learn(films: FilmKeeper, origin: Origin) -> None:
+async def _learn(films: FilmKeeper, origin: Origin, beats: Heartbeats) -> None:
     """Learn baselines; what a replay shows is no history of a machine."""
     if origin is Origin.LIVE:
-        await films.run()
+        await beats.tend("learn", films.run)
 
 
 def _refresh_s(plant: PlantFile) -> float:
@@ -225,9 +256,13 @@ def _stop_on_signals() -> asyncio.Event:
 
 
 async def _announce(
-    server: uvicorn.Server, listener: socket.socket, announce: Callable[[str], None]
+    server: uvicorn.Server,
+    listener: socket.socket,
+    announce: Callable[[str], None],
+    supervision: Supervision,
 ) -> None:
     while not server.started:
         await asyncio.sleep(0.01)
+    supervision.ready()
     host, port = listener.getsockname()[:2]
     announce(f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/")

@@ -12,6 +12,7 @@ from acquisition.clock import Clock
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from core.films.film_judge import FilmNews
+from service.heartbeats import UNHEARD, Pulse
 from service.live import LiveView
 from service.store.port import Store, StoreError, UnitGap
 
@@ -99,12 +100,14 @@ class Recorder:
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
             )
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write whatever is queued, for ever."""
         while True:
+            pulse.rest()
             await self._news.wait()
             self._news.clear()
             while self._waiting or self._alarms:
+                pulse.beat(RETRY_S)
                 if not await self._write():
                     await self._clock.sleep(RETRY_S)
 

@@ -9,6 +9,7 @@ import structlog
 from acquisition.clock import Clock
 from core.machine import Bearing, Unit
 from core.monitor_port import Monitor
+from service.heartbeats import UNHEARD, Pulse
 from service.store.gap_reference import GapReference
 from service.store.port import Store, StoreError
 
@@ -70,9 +71,10 @@ class ReferencesInForce:
         reference = self.of(unit, bearing)
         return described if reference is None else with_reference(described, reference)
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Look for new references for ever."""
         while True:
+            pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
             await self.look()
 

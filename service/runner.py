@@ -16,6 +16,7 @@ from service.alarms.engine import AlarmEngine
 from service.bus import Bus
 from service.connect_gate import ConnectGate
 from service.films.keeper import FilmKeeper
+from service.heartbeats import Heartbeats, Pulse
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
 from service.store.port import UnitGap
@@ -59,17 +60,21 @@ class Runner:
         alarms: AlarmEngine,
         films: FilmKeeper,
         bus: Bus | None = None,
+        beats: Heartbeats | None = None,
     ) -> None:
         self._units, self._live, self._recorder, self._clock = units, live, recorder, clock
         self._alarms, self._films = alarms, films
         self._bus = bus or Bus(BUS_CAPACITY, clock)
+        self._beats = beats or Heartbeats(clock)
         self._gate = ConnectGate(CONNECTS_PER_S, clock)
 
     async def run(self) -> None:
         """Acquire and analyse; ends when every source has come to its end."""
         async with asyncio.TaskGroup() as tasks:
-            recording = tasks.create_task(self._recorder.run(), name="record")
-            analysis = tasks.create_task(self._analyse(), name="analyse")
+            recording = tasks.create_task(
+                self._beats.tend("record", self._recorder.run), name="record"
+            )
+            analysis = tasks.create_task(self._beats.tend("analyse", self._analyse), name="analyse")
             async with asyncio.TaskGroup() as sources:
                 for unit, watched in self._units.items():
                     sources.create_task(self._acquire(unit, watched), name=f"acquire {unit}")
@@ -77,6 +82,7 @@ class Runner:
             analysis.cancel()
             await self._recorder.settled()
             recording.cancel()
+            self._beats.release("analyse", "record")  # there is nothing left for them
 
     async def _acquire(self, unit: str, watched: WatchedUnit) -> None:
         """Read one unit for ever; a lost link is tried again and again."""
@@ -105,10 +111,13 @@ class Runner:
             log.warning("not connected", unit=unit, reason=str(error))
         self._alarms.link(unit, False, str(error))
 
-    async def _analyse(self) -> None:
+    async def _analyse(self, pulse: Pulse) -> None:
+        pulse.rest()
         async for block in self._bus.blocks():
+            pulse.beat()
             self._take(block)
             self._bus.done()
+            pulse.rest()
 
     def _take(self, block: SampleBlock) -> None:
         monitor = self._units[block.unit].monitor

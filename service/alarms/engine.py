@@ -16,6 +16,7 @@ from core.alarms.vector_change import VectorReference
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from service.alarms.service_alarms import ServiceAlarms
+from service.heartbeats import UNHEARD, Pulse
 from service.recorder import Findings
 
 log = structlog.get_logger()
@@ -127,9 +128,10 @@ class AlarmEngine:
         """Note whether samples of a unit arrive."""
         self._publish(self._units[unit].link(is_connected, reason, self._clock.now_ns()))
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Let time pass for lost links and for what is shelved, for ever."""
         while True:
+            pulse.beat(TICK_S)
             await self._clock.sleep(TICK_S)
             self.tick()
 

@@ -1,6 +1,6 @@
 """What the API's routes work with."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -38,6 +38,8 @@ class Context:
         Time from one result to the next.
     evidence
         Of alarms; None where none is kept.
+    loops
+        What is wrong with each loop of the program; None where nothing is.
     """
 
     plant_name: str
@@ -55,6 +57,7 @@ class Context:
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
     evidence: EvidenceDesk | None = None
+    loops: Callable[[], Mapping[str, str | None]] = dict
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -21,13 +21,15 @@ def health_router(context: Context) -> APIRouter:
         responses={503: {"model": HealthModel, "description": "Something does not work"}},
     )
     async def readyz(response: Response) -> HealthModel:
-        """Answer 200 if results can be stored, 503 if not.
+        """Answer 200 if results can be stored and every loop of the program is alive, 503 if not.
 
         A DAQ that is away is a plant's fault: it is named, but does not make the service unready.
         """
         checks = {f"unit {unit}": context.live.status(unit).state.value for unit in context.units}
         checks["store"] = context.live.store_error or "ok"
-        ready = context.live.store_error is None
+        loops = context.loops()
+        checks |= {f"loop {name}": trouble or "alive" for name, trouble in loops.items()}
+        ready = context.live.store_error is None and not any(loops.values())
         response.status_code = 200 if ready else 503
         return HealthModel(status="ok" if ready else "not ready", checks=checks)
 

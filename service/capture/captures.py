@@ -17,6 +17,7 @@ from service.capture.folders import clear_leftovers, make_room
 from service.capture.history import BlockHistory
 from service.capture.outcome import Outcome, unheeded
 from service.capture.span import CaptureSettings, Span, is_captured
+from service.heartbeats import UNHEARD, Pulse
 
 log = structlog.get_logger()
 
@@ -162,13 +163,16 @@ class Captures:
             self._give_up(block.unit)
         self._news.set()
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write what is to be written, for ever; afterwards `close`."""
+        pulse.beat(MAX_BUSY_S)
         await self._in_thread(self._clear)
         while True:
+            pulse.rest()
             await self._news.wait()
             self._news.clear()
             while self._all:
+                pulse.beat(MAX_BUSY_S)
                 self._end_idle()
                 await self._write()
                 await self._clock.sleep(WRITE_EVERY_S)

@@ -1,5 +1,6 @@
 """`padwatch run`: the service."""
 
+import os
 from typing import Annotated
 
 import structlog
@@ -9,6 +10,7 @@ import uvloop
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.notify import ServiceManager
 from service.program import Performance, PortInUseError, listen, run_service
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
@@ -34,7 +36,8 @@ def run_plant(plant: PlantFile, port: int) -> None:
         with listen(plant.service.host, port) as listener:
             clock = SystemClock()
             performance = Performance(plant, live_units(plant, clock))
-            uvloop.run(run_service(performance, listener, clock, announce))
+            manager = ServiceManager(os.environ)
+            uvloop.run(run_service(performance, listener, clock, announce, manager))
     except (PortInUseError, StoreError, AcquisitionError) as error:
         fail(f"padwatch: {error}")
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from service.delivery.sender import Receiver, Sender, SenderStatus
+from service.heartbeats import Heartbeats
 from service.store.outbox_port import Backlog, Outbox
 
 
@@ -38,13 +39,15 @@ class Deliveries:
 
     def __init__(self, receivers: Sequence[Receiver], outbox: Outbox, clock: Clock) -> None:
         self._senders = [Sender(receiver, outbox, clock) for receiver in receivers]
-        self._outbox = outbox
+        self._outbox, self._clock = outbox, clock
 
-    async def run(self) -> None:
+    async def run(self, beats: Heartbeats | None = None) -> None:
         """Deliver for ever."""
+        beats = beats or Heartbeats(self._clock)
         async with asyncio.TaskGroup() as tasks:
             for sender in self._senders:
-                tasks.create_task(sender.run(), name=f"deliver {sender.receiver.name}")
+                name = f"deliver {sender.receiver.name}"
+                tasks.create_task(beats.tend(name, sender.run), name=name)
 
     def wake(self) -> None:
         """Say that there may be something new in the outbox."""

@@ -14,6 +14,7 @@ from service.delivery.backoff import wait_s
 from service.delivery.message import loads
 from service.delivery.outcome import Carrier, Delivered, Failed, Outcome
 from service.delivery.quiet import QuietHours
+from service.heartbeats import UNHEARD, Pulse
 from service.store.outbox_port import LetterState, Outbox, StoredLetter
 from service.store.port import StoreError
 
@@ -27,6 +28,9 @@ LOOK_S = 30.0
 quiet hours may have ended."""
 
 STORE_RETRY_S = 1.0
+
+MAX_CARRY_S = 600.0
+"""Longest that a receiver may take, whatever time-outs its settings allow."""
 
 T = TypeVar("T")
 
@@ -96,16 +100,19 @@ class Sender:
         self.receiver, self.status = receiver, SenderStatus()
         self._outbox, self._clock = outbox, clock
         self._news = asyncio.Event()
+        self._pulse: Pulse = UNHEARD
 
     def wake(self) -> None:
         """Look into the outbox now."""
         self._news.set()
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Deliver whatever comes, until cancelled."""
+        self._pulse = pulse
         while True:
             self._news.clear()
             if not await self._deliver_batch():
+                pulse.beat(LOOK_S)
                 await self._news_or(LOOK_S)
 
     async def _deliver_batch(self) -> bool:
@@ -131,6 +138,7 @@ class Sender:
     async def _deliver(self, letter: StoredLetter) -> bool:
         """Try a letter once; return whether the receiver is done with it."""
         self._note(SenderState.SENDING)
+        self._pulse.beat(MAX_CARRY_S)
         outcome = await self.receiver.carrier.carry(loads(letter.body), letter.body)
         if isinstance(outcome, Failed):
             await self._wait_after(letter, outcome)
@@ -167,6 +175,7 @@ class Sender:
             reason=failed.answer,
             next_attempt_ns=now_ns + ns_from_s(pause_s),
         )
+        self._pulse.beat(pause_s)
         await self._clock.sleep(pause_s)
 
     async def _expire(self, answer: str, now_ns: int) -> None:
@@ -186,6 +195,7 @@ class Sender:
             Whether it is finished even when this task is cancelled meanwhile.
         """
         while True:
+            self._pulse.beat(STORE_RETRY_S)
             try:
                 return await (_finished(work) if to_the_end else asyncio.to_thread(work))
             except StoreError as error:

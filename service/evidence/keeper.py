@@ -25,11 +25,15 @@ from service.evidence.folders import (
 )
 from service.evidence.snapshot import Camera, Snapshot
 from service.evidence.writer import EvidenceWriter
+from service.heartbeats import UNHEARD, Pulse
 from service.store.port import StoreError
 
 log = structlog.get_logger()
 
 RETRY_S = 10.0
+
+MAX_BUSY_S = 300.0
+"""Longest that one bundle may take, or to look through all of them."""
 
 MAX_PENDING = 200
 """Snapshots that wait for the disk; one holds a few hundred kilobytes of results alive."""
@@ -107,16 +111,20 @@ class EvidenceKeeper:
         linking = frozenset((event.identity.id, event.occurrence) for event in ended)
         return self._captures.being_made | linking
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write what is to be written, for ever; afterwards `close`."""
+        pulse.beat(MAX_BUSY_S)
         await self._trying(self._begin)
         await self._trying(self._make_room)
         while True:
+            pulse.rest()
             await self._news.wait()
             self._news.clear()
             while self._pending or self._outcomes:
+                pulse.beat(MAX_BUSY_S)
                 if not await self._write_one():
                     await self._clock.sleep(RETRY_S)
+            pulse.beat(MAX_BUSY_S)
             await self._trying(self._make_room)
 
     async def close(self) -> None:

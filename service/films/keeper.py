@@ -20,11 +20,15 @@ from service.films.actions import Action, step_of
 from service.films.learning import FilmPlace, Learner
 from service.films.resume import UnitStart, in_force, unit_start
 from service.films.versions import Versions
+from service.heartbeats import UNHEARD, Pulse
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.film_port import FilmStore, StoredStep
 from service.store.port import StoreError
 
 log = structlog.get_logger()
+
+MAX_LEARN_S = 900.0
+"""Longest that learning one bearing from its whole history may take."""
 
 KINDS = dict(zip(DIRECTIONS, (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y), strict=True))
 
@@ -120,27 +124,31 @@ class FilmKeeper:
             for direction, finding in zip(DIRECTIONS, told.findings, strict=True)
         }
 
-    async def run(self) -> None:
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Learn whatever is due, for ever."""
         period_s = min(3600.0, 86_400.0 * self.settings.learn_every_days / 4)
         while True:
             try:
-                await self.learn_due()
+                await self.learn_due(pulse)
             except StoreError as error:
                 log.error("baselines are not learned", reason=str(error))
+            pulse.beat(period_s)
             await self._clock.sleep(period_s)
 
-    async def learn_due(self) -> None:
+    async def learn_due(self, pulse: Pulse = UNHEARD) -> None:
         """Learn every bearing whose turn it is, one after the other."""
         for unit, films in self._films.items():
+            pulse.beat(MAX_LEARN_S)
             due = [
                 place
                 for place in (FilmPlace(unit, *item) for item in films.rules.estimators.items())
                 if await asyncio.to_thread(self.learner.is_due, place, self._clock.now_ns())
             ]
             for place in due:
+                pulse.beat(MAX_LEARN_S)
                 await self.learn(place)
             if due:
+                pulse.beat(MAX_LEARN_S)
                 await self._learn_response(unit)
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:

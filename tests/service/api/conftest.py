@@ -86,6 +86,7 @@ class Service:
     recorder: Recorder
     evidence: EvidenceKeeper
     films: FilmKeeper
+    loops: dict[str, str | None]
 
     async def get(self, path: str, **parameters: object) -> httpx2.Response:
         return await self.client.get(path, params=parameters)
@@ -150,6 +151,7 @@ async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> Async
     evidence = evidence_of(own, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)
     recording = asyncio.create_task(recorder.run())
+    loops: dict[str, str | None] = {}
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -165,13 +167,24 @@ async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> Async
         deliveries=Deliveries([], store.outbox, clock),
         max_shelf_s=7200.0,
         evidence=evidence_desk(own, store, evidence, clock),
+        loops=lambda: loops,
     )
     app = create_app(context)
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         document = app.openapi()
         yield Service(
-            live, store, clock, references, client, document, alarms, recorder, evidence, films
+            live,
+            store,
+            clock,
+            references,
+            client,
+            document,
+            alarms,
+            recorder,
+            evidence,
+            films,
+            loops,
         )
     recording.cancel()
     await asyncio.wait([recording])

@@ -35,3 +35,17 @@ async def test_a_disk_that_does_not_take_results_makes_it_unready_but_not_dead(
     assert (await running.get("/livez")).status_code == 200
     overview = await running.json("/api/v1/overview")
     assert overview["store"] == {"error": "disk I/O error", "n_unstored": 3}
+
+
+async def test_a_loop_that_is_stuck_or_dead_is_named_and_makes_the_service_unready(
+    running: Any,
+) -> None:
+    running.loops |= {"record": None, "alarms": "has ended"}
+
+    response = await running.get("/readyz")
+
+    assert response.status_code == 503
+    assert response.json()["status"] == "not ready"
+    assert response.json()["checks"]["loop record"] == "alive"
+    assert response.json()["checks"]["loop alarms"] == "has ended"
+    assert (await running.get("/livez")).status_code == 200

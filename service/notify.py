@@ -1,0 +1,80 @@
+"""What the service manager is told: systemd's notification protocol (sd_notify(3))."""
+
+import os
+import socket
+from collections.abc import Mapping
+
+import structlog
+
+log = structlog.get_logger()
+
+US_PER_S = 1e6
+
+
+class ServiceManager:
+    """Sends datagrams to whoever started the program; to nobody if that did not ask for any.
+
+    Parameters
+    ----------
+    environment
+        Where it looks for ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``.
+    """
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        self._address = _address(environment.get("NOTIFY_SOCKET", ""))
+        self.watchdog_s = _watchdog_s(environment) if self._address else None
+        self._is_reached = True
+
+    @property
+    def listens(self) -> bool:
+        """Whether there is anybody to tell."""
+        return self._address is not None
+
+    def tell(self, **assignments: str) -> None:
+        """Send one datagram, never waiting; a manager that does not take it is logged once.
+
+        Parameters
+        ----------
+        assignments
+            As in sd_notify(3): ``READY``, ``STATUS``, ``WATCHDOG``, ``STOPPING``.
+        """
+        if self._address is None:
+            return
+        message = "\n".join(f"{key}={_one_line(value)}" for key, value in assignments.items())
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+                sender.setblocking(False)
+                sender.sendto(message.encode(), self._address)
+        except OSError as error:
+            if self._is_reached:
+                log.warning("the service manager is not reached", reason=str(error))
+            self._is_reached = False
+        else:
+            self._is_reached = True
+
+
+def _address(named: str) -> str | None:
+    """The socket's address: a path, or an abstract name that is written with an @."""
+    if named.startswith("@"):
+        return "\0" + named[1:]
+    if named.startswith("/"):
+        return named
+    if named:
+        log.warning("NOTIFY_SOCKET is neither a path nor an abstract name", value=named)
+    return None
+
+
+def _watchdog_s(environment: Mapping[str, str]) -> float | None:
+    """Longest time without a sign of life, if the manager wants any from this process."""
+    if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
+        return None
+    given = environment.get("WATCHDOG_USEC", "")
+    return int(given) / US_PER_S if given.isdecimal() and int(given) > 0 else None
+
+
+def _one_line(value: str) -> str:
+    """A line break would begin another assignment."""
+    return " ".join(value.split())
+
+
+NOBODY = ServiceManager({})

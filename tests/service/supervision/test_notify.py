@@ -1,0 +1,85 @@
+"""What reaches a service manager's socket."""
+
+import os
+import socket
+from pathlib import Path
+from typing import Any
+
+import pytest
+import structlog
+
+from service.notify import ServiceManager
+
+
+def test_a_manager_hears_what_it_is_told(either_socket: Any) -> None:
+    manager = ServiceManager(either_socket.environment)
+
+    manager.tell(READY="1", STATUS="2 of 2 units connected")
+
+    assert manager.listens
+    assert manager.watchdog_s == 10.0
+    assert either_socket.received == [{"READY": "1", "STATUS": "2 of 2 units connected"}]
+
+
+def test_a_line_break_in_a_status_makes_no_second_message(either_socket: Any) -> None:
+    ServiceManager(either_socket.environment).tell(STATUS="all well\nWATCHDOG=trigger")
+
+    assert either_socket.received == [{"STATUS": "all well WATCHDOG=trigger"}]
+
+
+def test_without_a_socket_nobody_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("a socket was opened")
+
+    monkeypatch.setattr(socket, "socket", refuse)
+    manager = ServiceManager({"WATCHDOG_USEC": "10000000"})
+    manager.tell(READY="1")
+
+    assert not manager.listens
+    assert manager.watchdog_s is None
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_USEC": "0"},
+        {"WATCHDOG_USEC": "-5"},
+        {"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": str(os.getpid() + 1)},
+    ],
+)
+def test_a_watchdog_that_is_not_for_this_process_is_not_fed(given: dict[str, str]) -> None:
+    assert ServiceManager({"NOTIFY_SOCKET": "@x", **given}).watchdog_s is None
+
+
+@pytest.mark.parametrize("address", ["relative/path", "vsock:2:1234"])
+def test_an_address_of_another_kind_is_not_used(address: str) -> None:
+    with structlog.testing.capture_logs() as said:
+        manager = ServiceManager({"NOTIFY_SOCKET": address})
+        manager.tell(READY="1")
+
+    assert not manager.listens
+    assert [entry["value"] for entry in said] == [address]
+
+
+def test_a_manager_that_is_gone_is_logged_once_and_stops_nothing(tmp_path: Path) -> None:
+    manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "gone")})
+
+    with structlog.testing.capture_logs() as said:
+        manager.tell(WATCHDOG="1")
+        manager.tell(WATCHDOG="1")
+
+    assert [entry["event"] for entry in said] == ["the service manager is not reached"]
+
+
+def test_a_manager_that_does_not_read_never_makes_the_service_wait(manager_socket: Any) -> None:
+    manager = ServiceManager(manager_socket.environment)
+
+    with structlog.testing.capture_logs() as said:
+        for _ in range(100_000):
+            manager.tell(WATCHDOG="1")
+            if said:
+                break
+
+    assert [entry["event"] for entry in said] == ["the service manager is not reached"]
+    assert manager_socket.received
