@@ -23,6 +23,9 @@ from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
 from service.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.live import LiveView
+from service.metrics.timed import polls_of, timed
+from service.metrics.timings import Timings
+from service.metrics.watched import Watched
 from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
 from service.recorder import Recorder
@@ -155,8 +158,10 @@ async def _run(
     plant, units = performance.plant, performance.units
     receivers = receivers_of(plant, performance.origin, clock)
     deliveries = Deliveries(receivers, store.outbox, clock)
-    recorder = Recorder(store, live, clock, told=deliveries.wake)
+    timings = Timings(units, clock)
+    recorder = Recorder(store, live, clock, told=deliveries.wake, timed=timings.commits.timed)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
+    units = timed(units, timings)
     captures = captures_of(plant, performance.origin, clock)
     bus = Bus(BUS_CAPACITY, clock)
     look = health_of(units, live, recorder, captures, bus)
@@ -187,6 +192,20 @@ async def _run(
         captures=captures,
         deliveries=deliveries,
         evidence=evidence_desk(plant, store, evidence, clock),
+        metrics=Watched(
+            bearings={unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit},
+            live=live,
+            bus=bus,
+            recorder=recorder,
+            alarms=alarms,
+            films=films,
+            captures=captures,
+            evidence=evidence,
+            deliveries=deliveries,
+            timings=timings,
+            clock=clock,
+            polls=polls_of(units),
+        ),
         origin=performance.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         loops=beats.look,

@@ -3,6 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -47,6 +48,8 @@ class Recorder:
         `MAX_NEWS`, and are given up last.
     told
         Called when news of alarms has been written.
+    timed
+        Entered, in the thread, while the store writes.
     """
 
     def __init__(
@@ -56,14 +59,20 @@ class Recorder:
         clock: Clock,
         capacity: int = 5000,
         told: Callable[[], None] = lambda: None,
+        timed: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
         self._store, self._live, self._clock = store, live, clock
-        self._capacity, self._told = capacity, told
+        self._capacity, self._told, self._timed = capacity, told, timed
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
         self._waits_since_s = 0.0
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
+
+    @property
+    def n_waiting(self) -> int:
+        """Findings and news of alarms that are still to be written."""
+        return len(self._waiting) + len(self._alarms)
 
     @property
     def behind_s(self) -> float:
@@ -124,7 +133,7 @@ class Recorder:
         gaps = [gap for findings in batch for gap in findings.gaps]
         films = [told for findings in batch for told in findings.films]
         try:
-            await asyncio.to_thread(self._store.append, assessments, gaps, alarms, films)
+            await asyncio.to_thread(self._append, assessments, gaps, alarms, films)
         except StoreError as error:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
@@ -141,6 +150,16 @@ class Recorder:
             self._told()
         await self._tell_progress()
         return True
+
+    def _append(
+        self,
+        assessments: Sequence[Assessment],
+        gaps: Sequence[UnitGap],
+        alarms: Sequence[AlarmNews],
+        films: Sequence[FilmNews],
+    ) -> None:
+        with self._timed():
+            self._store.append(assessments, gaps, alarms, films)
 
     async def _tell_progress(self) -> None:
         async with self._progress:

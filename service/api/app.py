@@ -26,6 +26,7 @@ from service.api.reference_routes import reference_router
 from service.api.source_routes import source_router
 from service.api.trend_routes import trend_router
 from service.dashboard.routes import dashboard_router
+from service.metrics.routes import metrics_router
 
 DESCRIPTION = """
 Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs.
@@ -69,5 +70,7 @@ def create_app(context: Context) -> FastAPI:
         alarm_by_id_router(context),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
+    if context.metrics is not None:
+        app.include_router(metrics_router(context.metrics))
     app.include_router(dashboard_router())
     return app

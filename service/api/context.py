@@ -14,6 +14,7 @@ from service.delivery.deliveries import Deliveries
 from service.evidence.desk import EvidenceDesk
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
+from service.metrics.watched import Watched
 from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
@@ -38,6 +39,8 @@ class Context:
         Time from one result to the next.
     evidence
         Of alarms; None where none is kept.
+    metrics
+        What is told to Prometheus; None where nobody asks.
     loops
         What is wrong with each loop of the program; None where nothing is.
     """
@@ -57,6 +60,7 @@ class Context:
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
     evidence: EvidenceDesk | None = None
+    metrics: Watched | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
 
     def unit(self, unit: str) -> UnitSettings:

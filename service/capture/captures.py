@@ -84,8 +84,8 @@ class Captures:
     ----------
     error
         Why the last capture could not be written; None since one could.
-    n_written
-        Captures finished since the start.
+    n_written, n_failed
+        Captures finished, and attempts to write them that failed, since the start.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class Captures:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="captures")
         self._busy_since_s: float | None = None
         self.error: str | None = None
-        self.n_written = 0
+        self.n_written = self.n_failed = 0
 
     def tell(self, ready: Callable[[Outcome], None]) -> None:
         """Tell somebody, on the event loop, what becomes of each capture."""
@@ -252,6 +252,7 @@ class Captures:
                 self._tell(None)
                 make_room(self._root, self._settings.max_bytes)
         except (CaptureError, OSError) as error:
+            self.n_failed += 1
             self._tell(str(error))
 
     def _clear(self) -> None:

@@ -1,6 +1,7 @@
 """Where the samples of each unit come from."""
 
 from collections.abc import Callable
+from functools import partial
 
 from acquisition.calibration import UnitCalibration
 from acquisition.can.source import CanSource
@@ -11,6 +12,7 @@ from acquisition.source import SampleSource
 from core.monitor import UnitMonitor
 from core.monitor_port import Monitor
 from service.conversion import analysis_of, calibration_of, machine_of
+from service.metrics.polls import TimedSource
 from service.runner import WatchedUnit
 from service.settings import modbus_sources, sources
 from service.settings.can import CanSettings
@@ -57,7 +59,7 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> Monitor:
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
     """All units with the sources that the plant file names."""
-    return watched_units(plant, lambda unit: source_of(unit, clock))
+    return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 
 def vector_rows(plant: PlantFile) -> dict[str, list[str]]:

@@ -1,0 +1,97 @@
+"""Metrics of results, alarms and films: what is known of the plant, as counts."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from prometheus_client.metrics_core import Metric
+
+from core.alarms.alarm import PLANT, AlarmLevel, AlarmState
+from core.decision.verdict import Verdict
+from core.quality import Level
+from service.metrics.families import Rows, gauge, histogram
+from service.metrics.watched import Watched
+
+HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
+
+
+def result_metrics(watched: Watched) -> Iterator[Metric]:
+    """Whether there are results, and how good they are."""
+    timings, live = watched.timings, watched.live
+    yield histogram(
+        "assessment_duration_seconds",
+        "What the analysis took for each result of a bearing.",
+        timings.assessments,
+    )
+    current = {
+        (unit, bearing): live.current(unit, bearing)
+        for unit, bearings in watched.bearings.items()
+        for bearing in bearings
+    }
+    yield gauge(
+        "result_age_seconds",
+        "Since the newest result of a bearing.",
+        ("unit", "bearing"),
+        ((place, its.age_s) for place, its in current.items() if its.age_s is not None),
+    )
+    found = Counter((unit, its.quality.level) for (unit, _), its in current.items())
+    yield gauge(
+        "bearings",
+        "Bearings by the quality of what is known of them now; bad without a current result.",
+        ("unit", "quality"),
+        (
+            ((unit, level.name.lower()), found[unit, level])
+            for unit in watched.bearings
+            for level in Level
+        ),
+    )
+
+
+def alarm_metrics(watched: Watched) -> Iterator[Metric]:
+    """Alarms on the list, as the dashboard counts them."""
+    count = watched.alarms.count()
+    yield gauge(
+        "alarms_active",
+        "Active alarms that are not hidden, by priority; unit `plant` is the service itself.",
+        ("unit", "priority"),
+        _active(watched),
+    )
+    numbers = (
+        ("alarms_unacknowledged", "Alarms that nobody has acknowledged.", count.n_unacknowledged),
+        ("alarms_hidden", "Alarms shelved, suppressed or out of service.", count.n_hidden),
+        ("alarms_unjudged", "Alarms whose subject cannot be judged now.", count.n_unjudged),
+    )
+    for name, meaning, number in numbers:
+        yield gauge(name, meaning, (), [((), number)])
+
+
+def film_metrics(watched: Watched) -> Iterator[Metric]:
+    """What was said of films last, by word."""
+    found = Counter(
+        (unit, finding.verdict)
+        for unit, bearings in watched.bearings.items()
+        for bearing in bearings
+        if (news := watched.films.newest(unit, bearing)) is not None
+        for finding in news.findings
+    )
+    yield gauge(
+        "films",
+        "Films, two directions of each bearing, by what was said last since the service started.",
+        ("unit", "verdict"),
+        (
+            ((unit, verdict.name.lower()), found[unit, verdict])
+            for unit in watched.bearings
+            for verdict in Verdict
+        ),
+    )
+
+
+def _active(watched: Watched) -> Rows:
+    """Those of units that are in the plant file no longer count for the plant."""
+    found: Counter[tuple[str, AlarmLevel]] = Counter()
+    for alarm in watched.alarms.alarms:
+        if alarm.level is not None and alarm.state not in HIDDEN:
+            unit = alarm.identity.unit
+            found[unit if unit in watched.bearings else PLANT, alarm.level] += 1
+    for unit in (*watched.bearings, PLANT):
+        for level in AlarmLevel:
+            yield (unit, level.name.lower()), found[unit, level]

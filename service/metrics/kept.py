@@ -1,0 +1,62 @@
+"""Metrics of what waits and what is written: queue, store, captures, evidence."""
+
+from collections.abc import Iterator
+
+from prometheus_client.metrics_core import Metric
+
+from service.metrics.families import counter, gauge, plain_histogram
+from service.metrics.watched import Watched
+
+
+def queue_metrics(watched: Watched) -> Iterator[Metric]:
+    """Blocks on their way from acquisition to analysis."""
+    bus = watched.bus
+    yield _one("queue_blocks", "Blocks that wait for analysis.", bus.depth)
+    yield _one("queue_capacity_blocks", "Most blocks that can wait for it.", bus.capacity)
+    yield _one(
+        "queue_wait_seconds", "For how long the oldest of them has waited.", bus.oldest_wait_s
+    )
+
+
+def store_metrics(watched: Watched) -> Iterator[Metric]:
+    """Whether results reach the disk."""
+    recorder, live = watched.recorder, watched.live
+    yield plain_histogram(
+        "store_commit_duration_seconds",
+        "What it took to write findings to the disk.",
+        watched.timings.commits,
+    )
+    failing = live.store_error is not None
+    yield _one("store_failing", "1 while the store refuses what is written.", failing)
+    yield _one("store_waiting_findings", "Findings that wait for the store.", recorder.n_waiting)
+    yield _one(
+        "store_behind_seconds",
+        "For how long findings have waited without any being written.",
+        recorder.behind_s,
+    )
+    yield counter(
+        "store_lost_findings",
+        "Findings given up because the store did not take them.",
+        (),
+        [((), live.n_unstored)],
+    )
+
+
+def evidence_metrics(watched: Watched) -> Iterator[Metric]:
+    """Samples and evidence around alarms."""
+    captures, evidence = watched.captures, watched.evidence
+    counts = (
+        ("captures_written", "Captures of samples around alarms.", captures.n_written),
+        ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),
+        ("evidence_written", "Bundles of evidence of alarms.", evidence.n_written),
+        ("evidence_failed", "Attempts to write such bundles in vain.", evidence.n_failed),
+        ("evidence_lost", "Occurrences whose evidence was given up.", evidence.n_lost),
+    )
+    for name, meaning, number in counts:
+        yield counter(name, meaning, (), [((), number)])
+    yield _one("captures_running", "Captures that are being made.", captures.n_running)
+    yield _one("evidence_pending", "Bundles that are still to be written.", evidence.n_pending)
+
+
+def _one(name: str, meaning: str, number: float) -> Metric:
+    return gauge(name, meaning, (), [((), number)])

@@ -1,0 +1,75 @@
+"""What a poll takes: the time in which a source works between two waits for its next one."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from acquisition.clock import Clock
+from acquisition.source import SampleSource
+from core.blocks import SampleBlock
+from service.metrics.durations import Durations
+
+POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
+"""A reply comes within milliseconds on a plant's network, and within a time-out at worst."""
+
+
+class PollClock:
+    """A source's clock that notes what the source does between its waits, each task apart."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._woken_s: WeakKeyDictionary[asyncio.Task[Any], float] = WeakKeyDictionary()
+        self.polls = Durations(POLL_BOUNDS_S, clock)
+
+    def now_ns(self) -> int:
+        """UTC nanoseconds since 1970."""
+        return self._clock.now_ns()
+
+    def monotonic_s(self) -> float:
+        """Seconds that never step."""
+        return self._clock.monotonic_s()
+
+    async def sleep(self, duration_s: float) -> None:
+        """Wait; what went before, since the wait before this one, was a poll."""
+        task = asyncio.current_task()
+        if task is None:
+            await self._clock.sleep(duration_s)
+            return
+        if task in self._woken_s:
+            self.polls.observe(self._clock.monotonic_s() - self._woken_s[task])
+        await self._clock.sleep(duration_s)
+        self._woken_s[task] = self._clock.monotonic_s()
+
+    def forget(self) -> None:
+        """Begin anew: what lies between two connections is no poll."""
+        task = asyncio.current_task()
+        if task is not None:
+            self._woken_s.pop(task, None)
+
+
+class TimedSource:
+    """A source whose polls are timed.
+
+    Parameters
+    ----------
+    make
+        Makes the source, which is to wait by this clock.
+    """
+
+    def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
+        self._clock = PollClock(clock)
+        self._source = make(self._clock)
+
+    @property
+    def polls(self) -> Durations:
+        """What polls took so far."""
+        return self._clock.polls
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the link, as the source does, and raises."""
+        self._clock.forget()
+        async with self._source.connect() as blocks:
+            yield blocks

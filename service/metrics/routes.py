@@ -1,0 +1,44 @@
+"""`GET /metrics`, for Prometheus."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Response
+
+from service.metrics.scrape import OPEN_METRICS, rendered, scrape
+from service.metrics.watched import Watched
+
+EXAMPLE = """\
+# HELP padwatch_link_connected 1 while the device is connected.
+# TYPE padwatch_link_connected gauge
+padwatch_link_connected{unit="U1"} 1.0
+"""
+
+ANSWER = {
+    "description": "Metrics in Prometheus' text format, or in OpenMetrics' where that is accepted",
+    "content": {
+        kind: {"schema": {"type": "string"}, "example": EXAMPLE}
+        for kind in ("text/plain", OPEN_METRICS.partition(";")[0])
+    },
+}
+
+
+def metrics_router(watched: Watched) -> APIRouter:
+    """The route that Prometheus asks."""
+    router = APIRouter(tags=["health"])
+
+    @router.get(
+        "/metrics",
+        summary="How the service does, for Prometheus",
+        response_class=Response,
+        responses={200: ANSWER},
+    )
+    async def metrics(
+        accept: Annotated[
+            str, Header(description="Formats that are taken.", examples=["text/plain"])
+        ] = "text/plain",
+    ) -> Response:
+        """Samples, links, results, alarms, store and deliveries as counters and gauges."""
+        body, kind = rendered(await scrape(watched), accept)
+        return Response(body, headers={"content-type": kind, "cache-control": "no-store"})
+
+    return router

@@ -1,0 +1,60 @@
+"""Units whose analysis is timed, without the runner or the numerics knowing of it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from core.account import Gap, SampleAccount
+from core.assessment import Assessment
+from core.blocks import SampleBlock
+from core.machine import Unit
+from core.monitor_port import Monitor
+from service.metrics.durations import Durations
+from service.metrics.polls import TimedSource
+from service.metrics.timings import Timings
+from service.runner import WatchedUnit
+
+
+class TimedMonitor:
+    """A monitor that notes what its results take."""
+
+    def __init__(self, monitor: Monitor, timings: Timings) -> None:
+        self._monitor, self._timings = monitor, timings
+        self.unit: Unit = monitor.unit
+
+    @property
+    def account(self) -> SampleAccount:
+        """Where every sample went that the unit's device offered."""
+        return self._monitor.account
+
+    def adopt(self, unit: Unit) -> None:
+        """Take a new description of the same unit; raises as the monitor does."""
+        self._monitor.adopt(unit)
+        self.unit = unit
+
+    def drain_gaps(self) -> list[Gap]:
+        """Hand over the gaps found since the last call, to be recorded."""
+        return self._monitor.drain_gaps()
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return what has been learnt by it; raises as the monitor does."""
+        began_s = self._timings.begin()
+        found = self._monitor.ingest(block)
+        self._timings.assessed(block.unit, began_s, len(found))
+        return found
+
+
+def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, WatchedUnit]:
+    """The same units with monitors that are timed."""
+    return {
+        unit: replace(watched, monitor=TimedMonitor(watched.monitor, timings))
+        for unit, watched in units.items()
+    }
+
+
+def polls_of(units: Mapping[str, WatchedUnit]) -> dict[str, Durations]:
+    """What polls take, of the units whose source is timed."""
+    return {
+        unit: watched.source.polls
+        for unit, watched in units.items()
+        if isinstance(watched.source, TimedSource)
+    }

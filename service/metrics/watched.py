@@ -1,0 +1,42 @@
+"""`Watched`: the parts of a running service that its metrics are read from."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from acquisition.clock import Clock
+from service.alarms.engine import AlarmEngine
+from service.bus import Bus
+from service.capture.captures import Captures
+from service.delivery.deliveries import Deliveries
+from service.evidence.keeper import EvidenceKeeper
+from service.films.keeper import FilmKeeper
+from service.live import LiveView
+from service.metrics.durations import Durations
+from service.metrics.timings import Timings
+from service.recorder import Recorder
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Where metrics come from; nothing of it is changed.
+
+    Parameters
+    ----------
+    bearings
+        Of every unit.
+    polls
+        What polls take, by unit; of those that are polled.
+    """
+
+    bearings: Mapping[str, Sequence[str]]
+    live: LiveView
+    bus: Bus
+    recorder: Recorder
+    alarms: AlarmEngine
+    films: FilmKeeper
+    captures: Captures
+    evidence: EvidenceKeeper
+    deliveries: Deliveries
+    timings: Timings
+    clock: Clock
+    polls: Mapping[str, Durations] = field(default_factory=dict)

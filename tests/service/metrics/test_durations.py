@@ -1,0 +1,108 @@
+"""Durations are counted where they belong."""
+
+import asyncio
+
+import pytest
+
+from service.metrics.acquired import MAX_REASONS, bounded
+from service.metrics.durations import Durations
+from service.metrics.polls import PollClock
+from service.metrics.timings import Timings
+
+
+class SetClock:
+    """Time that passes when a test says so, and when somebody waits."""
+
+    def __init__(self) -> None:
+        self.s = 100.0
+
+    def now_ns(self) -> int:
+        return 0
+
+    def monotonic_s(self) -> float:
+        return self.s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.s += duration_s
+        await asyncio.sleep(0)
+
+
+@pytest.fixture
+def clock() -> SetClock:
+    return SetClock()
+
+
+def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(clock: SetClock) -> None:
+    durations = Durations((0.1, 0.2), clock)
+    for duration_s in (0.0, 0.1, 0.15, 0.2, 7.0):
+        durations.observe(duration_s)
+
+    seen = durations.seen()
+
+    assert seen.n_up_to == (2, 4, 5)
+    assert seen.sum_s == pytest.approx(7.45)
+
+
+def test_what_fails_is_not_timed(clock: SetClock) -> None:
+    durations = Durations((0.1,), clock)
+    with pytest.raises(OSError, match="full"), durations.timed():
+        raise OSError("full")
+    with durations.timed():
+        clock.s += 3.0
+
+    assert durations.seen().n_up_to == (0, 1)
+    assert durations.seen().sum_s == 3.0
+
+
+@pytest.mark.parametrize("bounds", [(), (0.2, 0.1), (0.1, 0.1)])
+def test_bounds_that_do_not_rise_are_refused(bounds: tuple[float, ...], clock: SetClock) -> None:
+    with pytest.raises(ValueError, match="must rise"):
+        Durations(bounds, clock)
+
+
+def test_blocks_without_results_take_no_part(clock: SetClock) -> None:
+    timings = Timings(["U1"], clock)
+    for n_results in (0, 3):
+        began_s = timings.begin()
+        clock.s += 0.3
+        timings.assessed("U1", began_s, n_results)
+
+    seen = timings.assessments["U1"].seen()
+    assert seen.n_up_to[-1] == 3
+    assert seen.sum_s == pytest.approx(0.3)
+
+
+async def test_a_poll_is_what_lies_between_two_waits_of_one_task(clock: SetClock) -> None:
+    polls = PollClock(clock)
+
+    async def poll(n_times: int, duration_s: float) -> None:
+        for _ in range(n_times):
+            await polls.sleep(1.0)
+            clock.s += duration_s
+        await polls.sleep(1.0)
+
+    await asyncio.create_task(poll(4, 0.25))
+    await asyncio.create_task(poll(2, 0.5))
+
+    seen = polls.polls.seen()
+    assert seen.n_up_to[-1] == 6
+    assert seen.sum_s == pytest.approx(4 * 0.25 + 2 * 0.5)
+
+
+async def test_the_time_without_a_link_is_no_poll(clock: SetClock) -> None:
+    polls = PollClock(clock)
+    await polls.sleep(1.0)
+    clock.s += 3600.0
+    polls.forget()
+    await polls.sleep(1.0)
+
+    assert polls.polls.seen().n_up_to[-1] == 0
+
+
+def test_however_many_reasons_there_are_labels_stay_few() -> None:
+    rejected = {f"reason_{number}": 1 for number in range(1000)} | {"a text, not a word": 5}
+
+    counts = bounded(rejected)
+
+    assert len(counts) == MAX_REASONS + 1
+    assert sum(counts.values()) == 1005
