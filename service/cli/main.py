@@ -8,6 +8,7 @@ import typer
 
 from service.cli import config, delivery, probe, readings, recording, reference
 from service.cli.backtest import backtest
+from service.cli.backup import backup, restore
 from service.cli.daq import daq
 from service.cli.demo import demo
 from service.cli.logs import set_up_logging
@@ -28,6 +29,8 @@ app.command()(replay)
 app.command()(reanalyse)
 app.command()(backtest)
 app.command()(validate)
+app.command()(backup)
+app.command()(restore)
 app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")
 app.add_typer(recording.app, name="recording")

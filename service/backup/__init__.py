@@ -1,0 +1,1 @@
+"""Copies of the database: made while the service runs, verified, and put back."""
