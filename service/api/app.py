@@ -8,7 +8,9 @@ from service.api.alarm_rate_routes import alarm_rate_router
 from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
 from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
+from service.api.centre_routes import centre_router
 from service.api.channel_routes import channel_router
+from service.api.configuration_routes import configuration_router
 from service.api.context import Context
 from service.api.delivery_routes import delivery_router
 from service.api.evidence_routes import evidence_router
@@ -54,9 +56,11 @@ def create_app(context: Context) -> FastAPI:
         plant_router(context),
         channel_router(context),
         source_router(context),
+        configuration_router(context),
         gap_router(context),
         bearing_router(context),
         trend_router(context),
+        centre_router(context),
         reference_router(context),
         film_router(context),
         baseline_router(context),

@@ -2,9 +2,17 @@
 
 import asyncio
 from collections.abc import Callable
+from typing import TypeVar
 
 from fastapi import Response
 from pydantic import BaseModel
+
+T = TypeVar("T")
+
+
+async def worked(do: Callable[[], T]) -> T:
+    """Do something in a thread."""
+    return await asyncio.to_thread(do)
 
 
 async def rendered(make: Callable[[], BaseModel]) -> Response:

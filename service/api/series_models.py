@@ -81,6 +81,13 @@ class TrendModel(ApiModel):
     series: dict[str, TrendSeriesModel]
     """The quantities asked for."""
 
+    simulated_until: Time | None
+    """Until when readings are simulated, not measured on the machine; null where all in this range
+    are measured."""
+
+    next_cursor: Annotated[str | None, Field(examples=["1795248192400000000"])]
+    """With ``cursor``: what to give for the next page; null if this was the last."""
+
     groups: list[TrendGroupModel] | None
     """With ``group_by``, the same for each operating state or cell that has readings; readings
     whose condition is not known are in none."""

@@ -1,9 +1,9 @@
 """Trends of a bearing, whole or parted by condition."""
 
-import asyncio
+from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Depends, Query, Response
 
 from core.condition.cells import CellGrid
 from core.quantities import BY_NAME
@@ -13,9 +13,12 @@ from service.api.context import BearingId, Context, UnitId
 from service.api.film_conditions import states_named
 from service.api.film_routes import States
 from service.api.problems import ProblemError, problem_responses
+from service.api.rendering import rendered, worked
 from service.api.series_models import TrendModel
+from service.api.tables import Format, table_content, table_response
 from service.api.trend_groups import GroupName, TooManyGroupsError, TrendGroup, trend_groups
-from service.api.views import trend_columns, trend_model
+from service.api.trend_tables import trend_table
+from service.api.trend_views import trend_columns, trend_model
 from service.store.port import Trend, TrendQuery
 from service.store.value_range import ValueRange
 
@@ -25,16 +28,33 @@ HOLE_HOPS = 2.5
 """Results further apart than this many refreshes have a hole between them."""
 
 
+Cursor = Annotated[
+    str | None,
+    Query(
+        pattern=r"^(first|[0-9]{1,19})$",
+        description="Pages of single readings, oldest first, instead of buckets: `first`, then"
+        " `next_cursor` of the page before.",
+        examples=["first"],
+    ),
+]
+
+
 def trend_router(context: Context) -> APIRouter:
     """The route of trends."""
     router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
     reading = problem_responses(404, 422, 503)
 
-    @router.get("/{bearing}/trends", summary="Trends", responses=reading)
+    @router.get(
+        "/{bearing}/trends",
+        summary="Trends",
+        response_model=TrendModel,
+        responses={**reading, **table_content("Trends, by column")},
+    )
     async def trends(
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
+        wanted: Format,
         eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
         oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
         quantity: Annotated[
@@ -59,37 +79,59 @@ def trend_router(context: Context) -> APIRouter:
             int,
             Query(ge=2, le=MAX_POINTS, description="More readings are gathered into buckets."),
         ] = 1000,
-    ) -> TrendModel:
-        """Quantities over time: single readings, or buckets with min, max, mean, count, quality."""
+        cursor: Cursor = None,
+    ) -> Response:
+        """Quantities over time: single readings, or buckets with min, max, mean, count, quality.
+
+        As CSV or Parquet, too: a row for each time, with `group_by` for each time of each group.
+        """
         context.bearing(unit, bearing)
+        start_ns = _page_start_ns(cursor, group_by, times[0])
         query = TrendQuery(
             unit=unit,
             bearing=bearing,
             quantities=trend_columns(_known(quantity)),
-            start_ns=times[0],
+            start_ns=start_ns,
             end_ns=times[1],
             max_points=max_points,
             hole_ns=ns_from_s(HOLE_HOPS * context.refresh_s),
             eccentricity_ratio=eccentricity,
             oil_temperature_c=oil_temperature,
             states=states_named(state),
+            is_page=cursor is not None,
         )
         grid = context.films.settings.baseline.settings().grid
-        return trend_model(query, *await asyncio.to_thread(_read, context, query, group_by, grid))
+        read = partial(_read, context, query, group_by, grid)
+        if wanted == "json":
+            return await rendered(lambda: trend_model(query, *read()))
+        whole, groups, past = await worked(read)
+        columns = await worked(lambda: trend_table(whole, groups, past))
+        cursor = None if whole.next_ns is None else str(whole.next_ns)
+        return table_response(wanted, columns, f"trends-{unit}-{bearing}", cursor)
 
     return router
 
 
 def _read(
     context: Context, query: TrendQuery, group_by: GroupName | None, grid: CellGrid
-) -> tuple[Trend, list[TrendGroup] | None]:
+) -> tuple[Trend, list[TrendGroup] | None, int | None]:
+    """The trend, its groups, and until when the past is simulated."""
+    past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
     whole = context.store.trend(query)
     if group_by is None:
-        return whole, None
+        return whole, None, past_end_ns
     try:
-        return whole, trend_groups(context.store, query, group_by, grid)
+        return whole, trend_groups(context.store, query, group_by, grid), past_end_ns
     except TooManyGroupsError as error:
         raise ProblemError(422, "Wrong parameter", str(error), "group_by") from error
+
+
+def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int) -> int:
+    """From when on to read."""
+    if cursor is not None and group_by is not None:
+        detail = "pages are of all readings, not of groups: leave out cursor or group_by"
+        raise ProblemError(422, "Wrong parameter", detail, "cursor")
+    return start_ns if cursor in (None, "first") else max(start_ns, int(cursor or 0))
 
 
 def _known(quantities: list[str]) -> tuple[str, ...]:

@@ -1,13 +1,10 @@
 """From the program's values to the API's models."""
 
-from collections.abc import Iterable, Mapping
-
 from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.quality import Level, Quality, Reading
 from core.quantities import BY_NAME
 from core.uncertainty import Budget
-from core.units import NS_PER_S
 from service.api.budget_models import BudgetLineModel, BudgetModel
 from service.api.models import (
     EstimatorName,
@@ -24,15 +21,9 @@ from service.api.series_models import (
     OrbitModel,
     SpectrumChannelModel,
     SpectrumModel,
-    TrendGroupModel,
-    TrendModel,
-    TrendSeriesModel,
 )
 from service.api.times import rfc3339
-from service.api.trend_groups import TrendGroup
 from service.live import CurrentBearing, LiveView, UnitStatus
-from service.store.codec import U_RANDOM, U_SYSTEMATIC, columns_of
-from service.store.port import Trend, TrendQuery, TrendSeries
 
 LEVEL_NAMES: dict[Level, LevelName] = {
     Level.GOOD: "good",
@@ -187,45 +178,6 @@ def _clock_model(status: UnitStatus) -> DeviceClockModel | None:
     )
 
 
-def trend_model(
-    query: TrendQuery, trend: Trend, groups: list[TrendGroup] | None = None
-) -> TrendModel:
-    """Trends by column, and those of each condition where they were asked for."""
-    return TrendModel(
-        unit=query.unit,
-        bearing=query.bearing,
-        start=rfc3339(query.start_ns),
-        end=rfc3339(query.end_ns),
-        bucket_s=_bucket_s(trend),
-        time=_times_s(trend),
-        series=_series_models(trend),
-        groups=None if groups is None else [_group_model(group) for group in groups],
-    )
-
-
-def _group_model(group: TrendGroup) -> TrendGroupModel:
-    return TrendGroupModel(
-        name=group.name,
-        low=group.low,
-        high=group.high,
-        bucket_s=_bucket_s(group.trend),
-        time=_times_s(group.trend),
-        series=_series_models(group.trend),
-    )
-
-
-def _bucket_s(trend: Trend) -> float | None:
-    return None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S
-
-
-def _times_s(trend: Trend) -> list[float]:
-    return [time_ns / NS_PER_S for time_ns in trend.time_ns]
-
-
-def _series_models(trend: Trend) -> dict[str, TrendSeriesModel]:
-    return {name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME}
-
-
 def spectrum_model(assessment: Assessment) -> SpectrumModel:
     """Amplitude spectra of an assessment."""
     spectrum, readings = assessment.spectrum, assessment.readings
@@ -253,24 +205,4 @@ def orbit_model(orbit: OrbitTrace) -> OrbitModel:
         duration_s=orbit.shaft_x_um.size / orbit.rate_hz,
         shaft_x_um=orbit.shaft_x_um.tolist(),
         shaft_y_um=orbit.shaft_y_um.tolist(),
-    )
-
-
-def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
-    """Columns of the store that a trend of some quantities needs."""
-    return columns_of(BY_NAME[name] for name in quantities)
-
-
-def _series_model(name: str, columns: Mapping[str, TrendSeries]) -> TrendSeriesModel:
-    series = columns[name]
-    random, systematic = columns.get(name + U_RANDOM), columns.get(name + U_SYSTEMATIC)
-    return TrendSeriesModel(
-        unit=BY_NAME[name].unit,
-        min=list(series.minimum),
-        max=list(series.maximum),
-        mean=list(series.mean),
-        count=list(series.count),
-        worst_level=[None if level is None else LEVEL_NAMES[level] for level in series.worst_level],
-        u_random=list(random.mean) if random else None,
-        u_systematic=list(systematic.mean) if systematic else None,
     )

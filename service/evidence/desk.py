@@ -13,6 +13,7 @@ from service.evidence.archive import (
     SamplesState,
 )
 from service.evidence.bundle import bundle_files, zipped
+from service.evidence.configuration import Configuration
 from service.evidence.keeper import EvidenceKeeper
 from service.evidence.report.case import read_case
 from service.evidence.report.page import report_page
@@ -39,12 +40,24 @@ class Found:
 
 
 class EvidenceDesk:
-    """Lists evidence, prints reports, hands out bundles."""
+    """Lists evidence, prints reports, hands out bundles.
+
+    Attributes
+    ----------
+    configuration
+        What the plant is configured as now, without its secrets.
+    """
 
     def __init__(
-        self, archive: EvidenceArchive, keeper: EvidenceKeeper, trend_days: float, clock: Clock
+        self,
+        archive: EvidenceArchive,
+        keeper: EvidenceKeeper,
+        trend_days: float,
+        clock: Clock,
+        configuration: Configuration,
     ) -> None:
         self.archive, self.keeper, self._clock = archive, keeper, clock
+        self.configuration = configuration
         self._trend_days = trend_days
         self._slots = asyncio.Semaphore(SLOTS)
         self._n_downloads = 0

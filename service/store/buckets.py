@@ -1,7 +1,7 @@
 """From single readings to buckets that keep what matters: extremes, mean, count, worst quality."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -58,6 +58,18 @@ def single_points(readings: Readings, hole_ns: int) -> Trend:
         count = np.isfinite(number).astype(int).tolist()
         series[name] = TrendSeries(listed, listed, listed, count, _levels(level))
     return Trend(None, time_ns.tolist(), series)
+
+
+def page(readings: Readings, max_points: int, hole_ns: int) -> Trend:
+    """The first readings, each alone, and from when on the next page goes on."""
+    if readings.time_ns.size <= max_points:
+        return single_points(readings, hole_ns)
+    shown = Readings(
+        readings.time_ns[:max_points],
+        {name: value[:max_points] for name, value in readings.value.items()},
+        {name: level[:max_points] for name, level in readings.level.items()},
+    )
+    return replace(single_points(shown, hole_ns), next_ns=int(readings.time_ns[max_points]))
 
 
 def bucketed(readings: Readings, width_ns: int) -> Trend:

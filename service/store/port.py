@@ -44,6 +44,9 @@ class TrendQuery:
         Neighbouring readings further apart than this have a hole between them.
     states
         Only readings in these operating states; empty for all.
+    is_page
+        Whether readings stay alone, oldest first, and those beyond ``max_points`` wait for the next
+        page.
     """
 
     unit: str
@@ -56,6 +59,7 @@ class TrendQuery:
     eccentricity_ratio: ValueRange = field(default_factory=ValueRange)
     oil_temperature_c: ValueRange = field(default_factory=ValueRange)
     states: tuple[OperatingState, ...] = ()
+    is_page: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,11 +81,14 @@ class Trend:
     ----------
     bucket_ns
         Width of the buckets, whose time is their start; None if every reading stands alone.
+    next_ns
+        Time of the first reading of the next page; None if there is none.
     """
 
     bucket_ns: int | None
     time_ns: Sequence[int]
     series: Mapping[str, TrendSeries]
+    next_ns: int | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
 from service.origin import Origin
 from service.store.alarms import insert_alarms, select_alarms, select_events
-from service.store.buckets import bucket_width_ns, bucketed, single_points
+from service.store.buckets import bucket_width_ns, bucketed, page, single_points
 from service.store.codec import Layout, columns_of, remember_layout
 from service.store.film_readings import insert_film_news
 from service.store.films import SqliteFilms
@@ -112,6 +112,8 @@ class SqliteStore:
         """Read trends of one bearing, gathered into buckets if they are many."""
         with self._reader() as reader:
             readings = select_readings(reader, query)
+        if query.is_page:
+            return page(readings, query.max_points, query.hole_ns)
         if readings.time_ns.size <= query.max_points:
             return single_points(readings, query.hole_ns)
         start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)

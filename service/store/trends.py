@@ -24,12 +24,14 @@ MATCHING = """
 """
 COUNT_ROWS = "SELECT count(*)" + MATCHING
 SELECT_ROWS = (
-    "SELECT time_ns, layout, reading_values, reading_qualities" + MATCHING + "ORDER BY time_ns"
+    "SELECT time_ns, layout, reading_values, reading_qualities"
+    + MATCHING
+    + "ORDER BY time_ns LIMIT :most"
 )
 
 
 def select_readings(reader: sqlite3.Connection, query: TrendQuery) -> Readings:
-    """Readings of one bearing, oldest first.
+    """Readings of one bearing, oldest first; of a page one more than it holds.
 
     Raises
     ------
@@ -37,7 +39,7 @@ def select_readings(reader: sqlite3.Connection, query: TrendQuery) -> Readings:
         If they are more than `MAX_ROWS`.
     """
     arguments = _arguments(query)
-    n_rows = int(reader.execute(COUNT_ROWS, arguments).fetchone()[0])
+    n_rows = 0 if query.is_page else int(reader.execute(COUNT_ROWS, arguments).fetchone()[0])
     if n_rows > MAX_ROWS:
         raise QueryTooLargeError(
             f"{n_rows} readings in this range, at most {MAX_ROWS} are read at once"
@@ -65,6 +67,7 @@ def _arguments(query: TrendQuery) -> dict[str, object]:
         "eccentricity_high": query.eccentricity_ratio.high,
         "oil_low": query.oil_temperature_c.low,
         "oil_high": query.oil_temperature_c.high,
+        "most": query.max_points + 1 if query.is_page else -1,
         "states": "".join(f",{int(state)}," for state in query.states),
     }
 

@@ -8,7 +8,7 @@ from service.alarms.engine import AlarmEngine
 from service.capture.captures import Captures
 from service.cli.made_by import made_by
 from service.evidence.archive import EvidenceArchive
-from service.evidence.configuration import built_from, configuration_of
+from service.evidence.configuration import Configuration, built_from, configuration_of
 from service.evidence.desk import EvidenceDesk
 from service.evidence.folders import EvidenceLimits
 from service.evidence.keeper import EvidenceFolders, EvidenceKeeper
@@ -36,7 +36,8 @@ def evidence_desk(
 ) -> EvidenceDesk:
     """Where evidence is asked for."""
     archive = EvidenceArchive(evidence_folders(plant), store)
-    return EvidenceDesk(archive, keeper, plant.evidence.trend_days, clock)
+    days, configuration = plant.evidence.trend_days, _configuration(plant)
+    return EvidenceDesk(archive, keeper, days, clock, configuration)
 
 
 def evidence_of(
@@ -50,7 +51,7 @@ def evidence_of(
 ) -> EvidenceKeeper:
     """The keeper of all evidence; `watch` lets it see alarms."""
     limits, folders = limits_of(plant), evidence_folders(plant)
-    configuration = configuration_of(plant, version("padwatch"), built_from())
+    configuration = _configuration(plant)
     maker = Maker(plant, configuration, made_by(), origin)
     writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
     camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
@@ -62,6 +63,10 @@ def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origi
     if origin is Origin.LIVE:
         alarms.show(keeper.see)
         captures.tell(keeper.captured)
+
+
+def _configuration(plant: PlantFile) -> Configuration:
+    return configuration_of(plant, version("padwatch"), built_from())
 
 
 def limits_of(plant: PlantFile) -> EvidenceLimits:

@@ -1,0 +1,35 @@
+"""What the API says of the configuration: all of it but the secrets."""
+
+import json
+from typing import Any
+
+from service.evidence.configuration import Configuration
+from service.settings.schema import plant_file_schema
+
+
+async def test_the_configuration_is_the_plant_file_under_the_version_of_its_evidence(
+    service: Any,
+) -> None:
+    body = await service.json("/api/v1/configuration")
+
+    settings = body["settings"]
+    assert settings["plant"] == {"name": "Demo plant"}
+    assert [unit["id"] for unit in settings["unit"]] == ["U1", "U2"]
+    document = {
+        "format": "padwatch-configuration",
+        "version": 1,
+        "padwatch": body["padwatch"],
+        "commit": body["commit"],
+        "settings": settings,
+    }
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    assert body["version"] == Configuration(text.encode()).version
+
+
+async def test_the_configuration_leads_to_the_meaning_of_its_keys(service: Any) -> None:
+    link = (await service.json("/api/v1/configuration"))["json_schema"]
+
+    response = await service.get(link)
+
+    assert response.headers["content-type"] == "application/schema+json"
+    assert response.json() == plant_file_schema()
