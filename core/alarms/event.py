@@ -68,10 +68,17 @@ class AlarmEvent:
 
 @dataclass(frozen=True)
 class AlarmNews:
-    """An alarm with the events that have led to what it is now."""
+    """An alarm with the events that have led to what it is now.
+
+    Parameters
+    ----------
+    peer
+        Address from which somebody asked for them; None if nobody did, or it is not known.
+    """
 
     alarm: Alarm
     events: Sequence[AlarmEvent]
+    peer: str | None = None
 
 
 def changed(

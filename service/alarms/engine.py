@@ -1,7 +1,7 @@
 """`AlarmEngine`: the alarms of all units, fed by the runner, the clock and people."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import structlog
@@ -16,6 +16,7 @@ from core.alarms.vector_change import VectorReference
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from service.alarms.service_alarms import ServiceAlarms
+from service.audit.acting import acting
 from service.heartbeats import UNHEARD, Pulse
 from service.recorder import Findings
 
@@ -151,7 +152,8 @@ class AlarmEngine:
             If it does not fit the alarm as it is now.
         """
         own = self._owner(id_)
-        self._publish(own.operate(id_, action, self._clock.now_ns()))
+        news = own.operate(id_, action, self._clock.now_ns())
+        self._publish([replace(told, peer=acting().peer) for told in news])
         return own.alarm(id_)
 
     def alarm(self, id_: str) -> Alarm:

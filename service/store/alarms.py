@@ -1,7 +1,7 @@
 """Alarms in SQLite: what each is now, and every event there ever was, numbered without a hole."""
 
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from core.alarms.alarm import (
@@ -14,6 +14,8 @@ from core.alarms.alarm import (
     Hold,
 )
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from service.audit.entry import Deed
+from service.store.audit_deeds import alarm_deeds
 from service.store.outbox import insert_letters
 from service.store.outbox_port import Address, nobody
 from service.store.port import AlarmQuery, StoredEvent, StoreError
@@ -52,13 +54,17 @@ SELECT_EVENTS = f"""
 
 
 def insert_alarms(
-    writer: sqlite3.Connection, news: Iterable[AlarmNews], address: Address = nobody
+    writer: sqlite3.Connection,
+    news: Iterable[AlarmNews],
+    tell: Callable[[sqlite3.Connection, Iterable[Deed]], None],
+    address: Address = nobody,
 ) -> None:
     """Add events, queue what tells of them, and bring the alarms to what they are after them."""
     for told in news:
         for event in told.events:
             if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
                 insert_letters(writer, event, address(told.alarm, event))
+                tell(writer, alarm_deeds(event, told))
         writer.execute(UPSERT, _alarm_row(told.alarm))
 
 

@@ -9,6 +9,8 @@ from core.baseline.baseline import BearingBaseline
 from core.baseline.response import ShaftResponse
 from core.estimators import Estimator
 from core.films.film_judge import FilmNews
+from service.store.audit_chain import AuditChain
+from service.store.audit_deeds import step_deeds
 from service.store.baselines import (
     insert_baseline,
     insert_steps,
@@ -44,12 +46,19 @@ class SqliteFilms:
         Opens a connection that only reads.
     series_of
         Number of a unit's bearing, given one within a transaction if it has none.
+    audit
+        Takes what is done to baselines.
     """
 
     def __init__(
-        self, writing: Connect, reading: Connect, series_of: Callable[[str, str], int]
+        self,
+        writing: Connect,
+        reading: Connect,
+        series_of: Callable[[str, str], int],
+        audit: AuditChain,
     ) -> None:
         self._writing, self._reading, self._series_of = writing, reading, series_of
+        self._audit = audit
 
     def add_simulated(self, readings: Iterable[FilmNews]) -> None:
         """Write readings of a simulation, marked as such."""
@@ -98,7 +107,7 @@ class SqliteFilms:
         """Write a learned baseline with what is done with it at once."""
         with self._writing() as writer:
             insert_baseline(writer, baseline)
-            insert_steps(writer, steps)
+            self._add_steps(writer, steps)
 
     def baselines(self, unit: str, bearing: str) -> list[BaselineEntry]:
         """Every baseline that was ever learned of a bearing, newest first."""
@@ -113,7 +122,11 @@ class SqliteFilms:
     def add_steps(self, steps: Sequence[StoredStep]) -> None:
         """Write what was done to baselines."""
         with self._writing() as writer:
-            insert_steps(writer, steps)
+            self._add_steps(writer, steps)
+
+    def _add_steps(self, writer: sqlite3.Connection, steps: Sequence[StoredStep]) -> None:
+        self._audit.add(writer, step_deeds(writer, steps))
+        insert_steps(writer, steps)
 
     def steps(self, unit: str, bearing: str) -> list[StoredStep]:
         """What was done to the baselines of a bearing, oldest first."""

@@ -11,6 +11,7 @@ from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
 from core.films.film_judge import FilmNews
 from core.quality import Level, Reading
+from service.store.audit_port import AuditStore
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.outbox_port import Outbox
@@ -141,6 +142,11 @@ class Store(Protocol):
     @property
     def films(self) -> FilmStore:
         """Readings and baselines of films."""
+        ...
+
+    @property
+    def audit(self) -> AuditStore:
+        """Who did what to what."""
         ...
 
     @property

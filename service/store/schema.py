@@ -3,6 +3,7 @@
 import sqlite3
 
 from service.origin import Origin
+from service.store.audit_schema import AUDIT_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.port import StoreError
@@ -129,6 +130,7 @@ MIGRATIONS = (
     OUTBOX_TABLES,
     FILM_TABLES,
     VECTOR_REFERENCE_TABLES,
+    AUDIT_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -12,8 +12,12 @@ from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
+from service.audit.head import head_path
 from service.origin import Origin
 from service.store.alarms import insert_alarms, select_alarms, select_events
+from service.store.audit import SqliteAudit
+from service.store.audit_chain import AuditChain, begin_head, has_trail
+from service.store.audit_deeds import reference_deed
 from service.store.buckets import bucket_width_ns, bucketed, page, single_points
 from service.store.codec import Layout, columns_of, remember_layout
 from service.store.film_readings import insert_film_news
@@ -68,8 +72,10 @@ class SqliteStore:
         self._path, self._origin, self._address = path, origin, address
         self._lock = Lock()
         self.outbox = SqliteOutbox(self._writing, self._reader)
-        self.films = SqliteFilms(self._writing, self._reader, self._series_id)
-        self.order1_references = SqliteVectorReferences(self._writing, self._reader)
+        self._chain = AuditChain(head_path(path))
+        self.audit = SqliteAudit(self._writing, self._reader, self._chain)
+        self.films = SqliteFilms(self._writing, self._reader, self._series_id, self._chain)
+        self.order1_references = SqliteVectorReferences(self._writing, self._reader, self._chain)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -105,7 +111,7 @@ class SqliteStore:
             rows = [self._row(assessment) for assessment in assessments]
             self._writer.executemany(INSERT_ASSESSMENT, rows)
             self._writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
-            insert_alarms(self._writer, alarms, self._address)
+            insert_alarms(self._writer, alarms, self._chain.add, self._address)
             insert_film_news(self._writer, films, self._series_id)
 
     def trend(self, query: TrendQuery) -> Trend:
@@ -143,6 +149,7 @@ class SqliteStore:
             If it was not written; the message is the database's.
         """
         with self._lock, self._renamed_errors(), self._transaction():
+            self._chain.add(self._writer, [reference_deed(self._writer, reference)])
             insert_reference(self._writer, reference)
 
     def references(self) -> list[GapReference]:
@@ -198,9 +205,12 @@ class SqliteStore:
 
     def _prepare(self) -> int:
         """Bring the file up to date; return the number of the layout that is written."""
+        had_trail = has_trail(self._writer)
         migrate(
             self._writer, str(self._path), self._origin
         )  # first: a file that is not ours stays as it is
+        if not had_trail:
+            begin_head(head_path(self._path))
         for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
             self._writer.execute(f"PRAGMA {setting}")
         with self._transaction():
@@ -209,9 +219,11 @@ class SqliteStore:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         self._writer.execute("BEGIN IMMEDIATE")
+        self._chain.begin()
         try:
             yield
             self._writer.execute("COMMIT")
+            self._chain.settle(self._writer)
         finally:
             # a full disk has rolled back already; a refused commit leaves the transaction open
             if self._writer.in_transaction:

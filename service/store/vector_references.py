@@ -7,6 +7,8 @@ from contextlib import AbstractContextManager
 
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
+from service.store.audit_chain import AuditChain
+from service.store.audit_deeds import vector_deed
 from service.store.port import StoreError
 from service.store.vector_reference_port import SetVectorReference
 
@@ -37,6 +39,10 @@ IN_FORCE = (
     f"SELECT {COLUMNS} FROM vector_reference WHERE id IN"  # noqa: S608
     " (SELECT max(id) FROM vector_reference GROUP BY unit, bearing, state) ORDER BY id"
 )
+RULING = (
+    f"SELECT {COLUMNS} FROM vector_reference"  # noqa: S608
+    " WHERE unit = ? AND bearing = ? AND state = ? ORDER BY id DESC LIMIT 1"
+)
 HISTORY = (
     f"SELECT {COLUMNS} FROM vector_reference"  # noqa: S608
     " WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
@@ -52,8 +58,9 @@ class SqliteVectorReferences:
         self,
         writing: Callable[[], AbstractContextManager[sqlite3.Connection]],
         reading: Callable[[], AbstractContextManager[sqlite3.Connection]],
+        audit: AuditChain,
     ) -> None:
-        self._writing, self._reading = writing, reading
+        self._writing, self._reading, self._audit = writing, reading, audit
 
     def add(self, reference: SetVectorReference) -> None:
         """Write a reference; see :class:`service.store.vector_reference_port.VectorReferenceStore`.
@@ -67,6 +74,9 @@ class SqliteVectorReferences:
         vectors = {p: (v.amplitude_um_pk, v.phase_deg) for p, v in found.vectors.items()}
         row = (found.unit, found.bearing, int(found.state), reference.set_ns)
         with self._writing() as writer:
+            before = writer.execute(RULING, row[:3]).fetchone()
+            deed = vector_deed(_reference(before) if before else None, reference)
+            self._audit.add(writer, [deed])
             writer.execute(INSERT, (*row, reference.author, reference.note, json.dumps(vectors)))
 
     def in_force(self) -> list[SetVectorReference]:

@@ -1,0 +1,46 @@
+"""A trail on a real file, and deeds to put into it."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from service.audit.entry import Deed, Source
+from service.store.sqlite import SqliteStore
+
+T0 = 1_767_225_600_000_000_000
+
+
+@pytest.fixture
+def deed() -> Callable[..., Deed]:
+    """Builds deeds."""
+
+    def build(n: int = 0, **changes: object) -> Deed:
+        arguments: dict[str, object] = {
+            "time_ns": T0 + n * 1_000_000_007,
+            "actor": "A. Name",
+            "action": "alarm.shelved",
+            "object": f"U1:UJB:shaft_x:{n}",
+            "before": {"state": "normal"},
+            "after": {"state": "shelved", "until_s": 2.5, "by": "Ünïcode"} if n % 3 else None,
+            "reason": "cable" if n % 2 else "",
+            "source": Source.API,
+            "peer": "192.0.2.7" if n % 2 else None,
+        }
+        return Deed(**{**arguments, **changes})  # type: ignore[arg-type]
+
+    return build
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Where the database is."""
+    return tmp_path / "data" / "padwatch.sqlite3"
+
+
+@pytest.fixture
+def store(path: Path) -> Iterator[SqliteStore]:
+    """An open, empty store."""
+    opened = SqliteStore(path)
+    yield opened
+    opened.close()

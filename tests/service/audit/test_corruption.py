@@ -1,0 +1,196 @@
+"""Whatever is done to a stored trail is noticed; an untouched one is whole."""
+
+import random
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.audit.entry import Deed
+from service.audit.head import head_path
+from service.store.audit import verify_trail
+from service.store.audit_chain import COLUMNS
+from service.store.sqlite import SqliteStore
+
+N_ENTRIES = 9
+N_CORRUPTIONS = 2000
+NAMES = COLUMNS.split(", ")
+
+
+class Bench:
+    """A trail of nine entries that is damaged and made whole again, over and over."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.head = path, head_path(path)
+        with closing(self.opened()) as database:
+            database.execute("PRAGMA journal_mode = DELETE")
+            for (name,) in database.execute(
+                "SELECT name FROM sqlite_master WHERE type = 'trigger' AND tbl_name = 'audit'"
+            ).fetchall():
+                database.execute(f"DROP TRIGGER {name}")
+        self._database, self._head = path.read_bytes(), self.head.read_bytes()
+
+    def opened(self) -> sqlite3.Connection:
+        return sqlite3.connect(self.path, isolation_level=None)
+
+    def repair(self) -> None:
+        self.path.write_bytes(self._database)
+        self.head.write_bytes(self._head)
+
+    def run(self, corrupt: Callable[[sqlite3.Connection, random.Random], None], seed: int) -> None:
+        with closing(self.opened()) as database:
+            database.executescript("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; BEGIN")
+            corrupt(database, random.Random(seed))  # noqa: S311
+            database.execute("COMMIT")
+
+
+@pytest.fixture
+def bench(path: Path, deed: Callable[..., Deed]) -> Bench:
+    store = SqliteStore(path)
+    for n in range(N_ENTRIES):
+        store.audit.record([deed(n)])
+    store.close()
+    return Bench(path)
+
+
+def some(chance: random.Random) -> int:
+    return chance.randint(1, N_ENTRIES)
+
+
+def flip(database: sqlite3.Connection, chance: random.Random) -> None:
+    """Turn one bit of one column."""
+    name, number = chance.choice(NAMES), some(chance)
+    select = f"SELECT {name}, CAST({name} AS BLOB) FROM audit WHERE number = ?"  # noqa: S608
+    [(value, raw)] = database.execute(select, (number,))
+    changed: object = b"" if value is None else _flipped(raw, chance)
+    if isinstance(value, int):
+        changed = value ^ (
+            1 << (chance.randrange(8, 60) if name == "number" else chance.randrange(60))
+        )
+    as_text = "CAST(? AS TEXT)" if isinstance(changed, bytes) else "?"
+    update = f"UPDATE audit SET {name} = {as_text} WHERE number = ?"  # noqa: S608
+    if name == "source":
+        changed, update = "padwatch", "UPDATE audit SET source = ? WHERE number = ?"
+    database.execute(update, (changed, number))
+
+
+def _flipped(raw: bytes, chance: random.Random) -> bytes:
+    if not raw:
+        return b"x"
+    at = chance.randrange(len(raw))
+    return raw[:at] + bytes([raw[at] ^ (1 << chance.randrange(8))]) + raw[at + 1 :]
+
+
+def drop(database: sqlite3.Connection, chance: random.Random) -> None:
+    database.execute("DELETE FROM audit WHERE number = ?", (some(chance),))
+
+
+def swap(database: sqlite3.Connection, chance: random.Random) -> None:
+    first, second = chance.sample(range(1, N_ENTRIES + 1), 2)
+    for number, other in ((first, -1), (second, first), (-1, second)):
+        database.execute("UPDATE audit SET number = ? WHERE number = ?", (other, number))
+
+
+def renumber(database: sqlite3.Connection, chance: random.Random) -> None:
+    free = N_ENTRIES + chance.randint(1, 9)
+    database.execute("UPDATE audit SET number = ? WHERE number = ?", (free, some(chance)))
+
+
+def shift(database: sqlite3.Connection, chance: random.Random) -> None:
+    """Take one out and close the hole."""
+    gone = some(chance)
+    database.execute("DELETE FROM audit WHERE number = ?", (gone,))
+    for number in range(gone + 1, N_ENTRIES + 1):
+        database.execute("UPDATE audit SET number = ? WHERE number = ?", (number - 1, number))
+
+
+def double(database: sqlite3.Connection, chance: random.Random) -> None:
+    """Add an entry once more at the end."""
+    rest = ", ".join(NAMES[1:])
+    database.execute(
+        f"INSERT INTO audit SELECT {N_ENTRIES + 1}, {rest} FROM audit WHERE number = ?",  # noqa: S608
+        (some(chance),),
+    )
+
+
+def cut(database: sqlite3.Connection, chance: random.Random) -> None:
+    database.execute("DELETE FROM audit WHERE number >= ?", (some(chance),))
+
+
+KINDS = [flip, flip, flip, drop, swap, renumber, shift, double, cut]
+
+
+def test_two_thousand_ways_to_damage_a_trail_are_all_noticed(bench: Bench) -> None:
+    assert verify_trail(bench.path).is_whole
+    unnoticed = []
+    for seed in range(N_CORRUPTIONS):
+        chance = random.Random(seed)  # noqa: S311
+        kind = chance.choice(KINDS)
+        without_head = chance.random() < 0.3
+        bench.run(kind, seed)
+        if without_head:
+            bench.head.unlink()
+        if verify_trail(bench.path).is_whole:
+            unnoticed.append((seed, kind.__name__, without_head))
+        bench.repair()
+    assert unnoticed == []
+    assert verify_trail(bench.path).is_whole
+
+
+def test_every_bit_of_the_head_counts(bench: Bench) -> None:
+    whole = bench.head.read_bytes()
+    for at in range(len(whole)):
+        for bit in range(8):
+            changed = whole[:at] + bytes([whole[at] ^ (1 << bit)]) + whole[at + 1 :]
+            bench.head.write_bytes(changed)
+            assert not verify_trail(bench.path).is_whole, changed
+
+
+def said(bench: Bench, statement: str) -> str:
+    with closing(bench.opened()) as database:
+        database.executescript(statement)
+    found = verify_trail(bench.path).finding
+    assert found is not None
+    return found.detail
+
+
+@pytest.mark.parametrize(
+    ("statement", "expected"),
+    [
+        ("UPDATE audit SET reason = 'other' WHERE number = 4", "entry 4 was altered"),
+        ("UPDATE audit SET peer = '' WHERE number = 5", "entry 5 was altered"),
+        ("UPDATE audit SET actor = CAST(x'ff' AS TEXT) WHERE number = 5", "entry 5 was altered"),
+        ("DELETE FROM audit WHERE number = 4", "entry 4 is missing"),
+        ("DELETE FROM audit WHERE number BETWEEN 4 AND 6", "entries 4 to 6 are missing"),
+        (
+            "DELETE FROM audit WHERE number > 7",
+            "entries 8 to 9 are missing at the end: the head names 9",
+        ),
+        ("DELETE FROM audit", "entries 1 to 9 are missing at the end: the head names 9"),
+        (
+            "DELETE FROM audit WHERE number = 3; UPDATE audit SET number = 3 WHERE number = 8",
+            "entry 3 is out of order: what stands there is entry 8",
+        ),
+        (
+            "UPDATE audit SET number = 0 WHERE number = 3",
+            "entry 0 stands where entry 1 belongs",
+        ),
+    ],
+)
+def test_the_first_wrong_entry_is_named(bench: Bench, statement: str, expected: str) -> None:
+    assert said(bench, statement) == expected
+
+
+def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
+    bench: Bench, tmp_path: Path, deed: Callable[..., Deed]
+) -> None:
+    other = SqliteStore(tmp_path / "other.sqlite3")
+    other.audit.record([deed(n, actor="somebody else") for n in range(N_ENTRIES)])
+    other.close()
+    bench.path.write_bytes((tmp_path / "other.sqlite3").read_bytes())
+
+    found: Any = verify_trail(bench.path).finding
+    assert found.detail == "entry 9 is not the one the head names"

@@ -1,0 +1,256 @@
+"""Entries follow one another, whoever writes them, and are never changed."""
+
+import random
+import sqlite3
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from core.account import Gap
+from service.audit.entry import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
+from service.audit.head import AuditHead, head_path, read_head
+from service.audit.walk import HEAD_DIFFERED
+from service.store.audit import verify_trail
+from service.store.audit_port import AuditQuery
+from service.store.port import StoreError, UnitGap
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Deed]
+
+
+def all_of(store: SqliteStore) -> list[AuditEntry]:
+    """Entries, oldest first."""
+    return list(reversed(store.audit.entries(AuditQuery(limit=10_000))))
+
+
+def test_what_was_done_is_read_back_newest_first_and_page_by_page(
+    store: SqliteStore, deed: Build
+) -> None:
+    store.audit.record([deed(n) for n in range(5)])
+    first = store.audit.entries(AuditQuery(limit=2))
+    second = store.audit.entries(AuditQuery(limit=2, before=first[-1].number))
+
+    assert [entry.number for entry in [*first, *second]] == [5, 4, 3, 2]
+    newest = first[0]
+    assert (newest.actor, newest.source, newest.action) == ("A. Name", "api", "alarm.shelved")
+    assert newest.before == '{"state":"normal"}'
+    assert newest.after == '{"by":"\\u00dcn\\u00efcode","state":"shelved","until_s":2.5}'
+    assert newest.previous_hash == first[1].hash
+
+
+def test_entries_are_found_by_actor_action_object_and_time(store: SqliteStore, deed: Build) -> None:
+    deeds = [deed(0), deed(1, actor="B"), deed(2, action="x.y"), deed(3, object="U2")]
+    store.audit.record(deeds)
+
+    def numbers(**wanted: object) -> list[int]:
+        return [e.number for e in store.audit.entries(AuditQuery(**wanted))]  # type: ignore[arg-type]
+
+    assert numbers(actor="B") == [2]
+    assert numbers(action="x.y") == [3]
+    assert numbers(object="U2") == [4]
+    assert numbers(start_ns=deeds[1].time_ns, end_ns=deeds[3].time_ns) == [3, 2]
+    assert numbers(actor="' OR 1=1 --") == []
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE audit SET actor = 'nobody'",
+        "DELETE FROM audit",
+        "INSERT OR REPLACE INTO audit SELECT * FROM audit WHERE number = 1",
+        "INSERT INTO audit SELECT number + 7, time_ns, actor, source, peer, action, object, before,"
+        " after, reason, previous_hash, hash FROM audit WHERE number = 1",
+    ],
+)
+def test_the_database_refuses_to_change_entries(
+    store: SqliteStore, path: Path, deed: Build, statement: str
+) -> None:
+    store.audit.record([deed(0), deed(1)])
+    with closing(sqlite3.connect(path)) as other, pytest.raises(sqlite3.IntegrityError):
+        other.execute(statement)
+    assert verify_trail(path).is_whole
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(actor=st.text(st.characters(), max_size=400), reason=st.text(st.characters()))
+def test_any_name_and_any_reason_can_be_written(
+    store: SqliteStore, path: Path, deed: Build, actor: str, reason: str
+) -> None:
+    store.audit.record([deed(actor=actor, reason=reason, object=reason, after={"a": actor})])
+
+    newest = store.audit.entries(AuditQuery(limit=1))[0]
+    assert len(newest.actor) <= MAX_NAME
+    assert newest.actor[:200] == actor.encode("utf-8", "replace").decode()[:200]
+    assert verify_trail(path).is_whole
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "=HYPERLINK(1)", "\x00", "a\ud800b", "<script>", "'; DROP TABLE audit; --", "🦭" * 500,
+        "\r\n", "\u202e", "",
+    ],
+)  # fmt: skip
+def test_hostile_names_are_names(store: SqliteStore, path: Path, deed: Build, name: str) -> None:
+    store.audit.record([deed(actor=name, action=name, object=name, reason=name, peer=name)])
+    verdict = verify_trail(path)
+    assert (verdict.is_whole, verdict.n_entries) == (True, 1)
+
+
+def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, deed: Build) -> None:
+    store.audit.record([deed(after={"text": "x" * (2 * MAX_DOCUMENT)})])
+    [entry] = all_of(store)
+    assert entry.after is not None
+    assert len(entry.after) < 2000
+    assert f'"n_characters":{2 * MAX_DOCUMENT + 11}' in entry.after
+
+
+def test_a_deed_that_is_no_json_is_not_written_at_all(store: SqliteStore, deed: Build) -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        store.audit.record([deed(0), deed(1, after={"value": float("nan")})])
+    assert all_of(store) == []
+
+
+def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Build) -> None:
+    other = SqliteStore(path)
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(lambda n: (store, other)[n % 2].audit.record([deed(n)] * 3), range(60)))
+    other.close()
+
+    verdict = verify_trail(path)
+    assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 180, 0)
+    assert read_head(head_path(path)) == AuditHead(180, verdict.hash)
+
+
+def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(
+    store: SqliteStore, path: Path, deed: Build
+) -> None:
+    store.audit.record([deed(0)])
+    before = head_path(path).read_bytes()
+    store.audit.record([deed(1), deed(2)])
+    head_path(path).write_bytes(before)  # as if the process had ended in between
+
+    after_crash = verify_trail(path)
+    again = SqliteStore(path)
+    again.audit.record([deed(3)])
+    again.close()
+    repaired = verify_trail(path)
+
+    assert (after_crash.finding, after_crash.n_behind, after_crash.told) == (None, 2, ())
+    assert (repaired.finding, repaired.n_behind, repaired.told) == (None, 0, ())
+    assert repaired.n_entries == 4
+
+
+def test_a_crash_before_the_very_first_entry_is_no_tampering(path: Path, deed: Build) -> None:
+    SqliteStore(path).close()
+    empty = verify_trail(path)
+    store = SqliteStore(path)
+    store.audit.record([deed(0)])
+    head_path(path).write_bytes(
+        b'{"format": "padwatch-audit-head", "number": 0, "hash": "%s"}' % (b"0" * 64)
+    )
+    after_crash = verify_trail(path)
+    store.close()
+
+    assert (empty.is_whole, empty.n_entries) == (True, 0)
+    assert (after_crash.is_whole, after_crash.n_behind) == (True, 1)
+
+
+@pytest.mark.parametrize("with_head", [True, False])
+def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
+    store: SqliteStore, path: Path, deed: Build, *, with_head: bool
+) -> None:
+    store.audit.record([deed(n) for n in range(4)])
+    with closing(sqlite3.connect(path)) as other:
+        other.executescript("DROP TRIGGER audit_kept; DELETE FROM audit WHERE number > 2")
+    if not with_head:
+        head_path(path).unlink()
+    store.audit.record([deed(9)])
+    store.audit.record([deed(10)])
+
+    verdict = verify_trail(path)
+    told = all_of(store)[2]
+    assert (verdict.is_whole, verdict.told) == (True, (3,))
+    assert (told.actor, told.action) == ("padwatch", HEAD_DIFFERED)
+    assert told.reason == (
+        "the head names entry 4, the trail ended at 2" if with_head else "the head is not there"
+    )
+
+
+def test_a_database_that_was_put_in_the_place_of_another_tells_so(path: Path, deed: Build) -> None:
+    first = SqliteStore(path)
+    first.audit.record([deed(0)])
+    first.close()
+    path.unlink()
+    second = SqliteStore(path)
+    second.audit.record([deed(0)])
+    second.close()
+    assert verify_trail(path).told == (1,)
+
+
+def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(
+    store: SqliteStore, path: Path, deed: Build
+) -> None:
+    head = head_path(path)
+    store.audit.record([deed(0)])
+    head.unlink()
+    (head / "in the way").mkdir(parents=True)
+    store.audit.record([deed(1)])
+    error = store.audit.head_error
+    store.audit.record([deed(2)])
+    (head / "in the way").rmdir()
+    head.rmdir()
+    store.append([], [])  # whatever comes next
+
+    assert error is not None
+    assert str(head) in error
+    assert store.audit.head_error is None
+    assert [entry.action for entry in all_of(store)].count(HEAD_DIFFERED) == 1
+    assert verify_trail(path).is_whole
+
+
+def test_results_leave_the_head_alone(store: SqliteStore, path: Path, deed: Build) -> None:
+    store.audit.record([deed(0)])
+    before = head_path(path).stat()
+    for n in range(20):
+        store.append([], [UnitGap("U1", Gap(1, n, 1, n))])
+    assert head_path(path).stat().st_ino == before.st_ino
+    assert head_path(path).stat().st_mtime_ns == before.st_mtime_ns
+
+
+def test_a_transaction_that_fails_leaves_no_entry(
+    store: SqliteStore, path: Path, deed: Build
+) -> None:
+    store.audit.record([deed(0)])
+    with pytest.raises(StoreError):
+        store.audit.record([deed(1), replace(deed(2), time_ns="soon")])  # type: ignore[arg-type]
+    store.audit.record([deed(3)])
+    assert [entry.number for entry in all_of(store)] == [1, 2]
+    assert verify_trail(path).is_whole
+
+
+def test_a_trail_is_verified_while_others_write(
+    store: SqliteStore, path: Path, deed: Build
+) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        writing = pool.map(lambda n: store.audit.record([deed(n)]), range(100))
+        verdicts = [verify_trail(path) for _ in range(30)]
+        list(writing)
+    assert [v.finding for v in verdicts] == [None] * 30
+    assert random.Random(1).choice(verdicts).told == ()  # noqa: S311
+
+
+def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="there is no database"):
+        verify_trail(tmp_path / "nothing.sqlite3")
+    sqlite3.connect(tmp_path / "other.sqlite3").close()
+    (tmp_path / "broken.sqlite3").write_bytes(b"no database at all" * 500)
+    for name in ("other", "broken"):
+        with pytest.raises(StoreError):
+            verify_trail(tmp_path / f"{name}.sqlite3")
