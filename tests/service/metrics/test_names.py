@@ -1,6 +1,7 @@
 """Names by Prometheus' rules, and labels that cannot grow without bound."""
 
 import re
+from pathlib import Path
 from typing import Any
 
 LABELS = {
@@ -64,3 +65,15 @@ async def test_histograms_rise_and_end_with_all(running: Any) -> None:
                 assert by_unit[unit][-1] == sample.value
         for counts in by_unit.values():
             assert counts == sorted(counts)
+
+
+async def test_the_guide_names_all_that_is_told_and_nothing_else(running: Any) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "metrics.md").read_text("utf-8")
+    table = guide[guide.index("## What there is") : guide.index("## Grafana")]
+
+    told = {
+        family.name + ("_total" if family.type == "counter" else "")
+        for family in (await running.metrics()).values()
+        if family.name.startswith("padwatch_")
+    }
+    assert set(re.findall(r"`(padwatch_\w+)`", table)) == told
