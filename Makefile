@@ -41,7 +41,7 @@ format: install
 	$(BIN)/ruff check --fix .
 
 lock: install
-	for name in run dev; do CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/pip-compile --quiet --generate-hashes \
+	for name in run dev build; do CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/pip-compile --quiet --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --strip-extras --allow-unsafe \
 	  --output-file requirements/$$name.txt requirements/$$name.in || exit 1; done
 

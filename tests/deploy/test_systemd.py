@@ -1,0 +1,99 @@
+"""The systemd units: hardened, understood by systemd, and running commands that there are."""
+
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from service.cli.main import app
+
+UNITS = Path(__file__).parents[2] / "deploy" / "systemd"
+SERVICES = sorted(path.name for path in UNITS.glob("*.service"))
+MAX_EXPOSURE = 1.5
+
+
+def analyse(*arguments: str) -> str:
+    done = subprocess.run(
+        ["systemd-analyze", "--no-pager", *arguments],  # noqa: S607
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    return done.stdout + done.stderr
+
+
+def settings(name: str) -> dict[str, list[str]]:
+    """What a unit file assigns, by key."""
+    found: dict[str, list[str]] = {}
+    for line in (UNITS / name).read_text(encoding="utf-8").splitlines():
+        if "=" in line and not line.startswith("#"):
+            key, _, value = line.partition("=")
+            found.setdefault(key, []).append(value)
+    return found
+
+
+def test_there_is_a_service_and_a_backup_every_night() -> None:
+    assert SERVICES == ["padwatch-backup.service", "padwatch.service"]
+    assert settings("padwatch-backup.timer")["OnCalendar"]
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_service_is_hardly_exposed(name: str) -> None:
+    said = analyse("security", "--offline=true", str(UNITS / name))
+
+    level = re.search(r"Overall exposure level for \S+: ([0-9.]+)", said)
+    assert level is not None, said
+    assert float(level[1]) <= MAX_EXPOSURE
+
+
+@pytest.mark.parametrize("name", [*SERVICES, "padwatch-backup.timer"])
+def test_systemd_understands_every_line_of_a_unit(name: str, tmp_path: Path) -> None:
+    for path in UNITS.glob("padwatch*.*"):
+        text = path.read_text(encoding="utf-8")
+        text = re.sub(r"^ExecStart=\S+", "ExecStart=/bin/true", text, flags=re.MULTILINE)
+        (tmp_path / path.name).write_text(text, encoding="utf-8")
+
+    said = analyse("verify", "--man=no", str(tmp_path / name))
+
+    assert [line for line in said.splitlines() if "padwatch" in line] == []
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_service_runs_a_command_that_there_is(name: str) -> None:
+    (line,) = settings(name)["ExecStart"]
+    program, command, *options = shlex.split(line)
+    helped = CliRunner().invoke(app, [command, "--help"])
+
+    assert program == "/opt/padwatch/bin/padwatch"
+    assert helped.exit_code == 0
+    assert all(option in helped.output for option in options if option.startswith("--"))
+
+
+def test_the_service_is_watched_and_begins_anew() -> None:
+    found = settings("padwatch.service")
+
+    assert found["Type"] == ["notify"]
+    assert found["WatchdogSec"] == ["30"]
+    assert found["Restart"] == ["always"]
+    assert found["User"] == ["padwatch"]
+
+
+def test_the_user_of_the_services_is_made(tmp_path: Path) -> None:
+    (tmp_path / "etc").mkdir()
+    done = subprocess.run(
+        [
+            *("systemd-sysusers", f"--root={tmp_path}"),
+            str(UNITS / "padwatch.sysusers.conf"),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert "padwatch:x:" in (tmp_path / "etc" / "passwd").read_text(encoding="utf-8")
