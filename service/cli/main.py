@@ -6,7 +6,7 @@ import traceback
 
 import typer
 
-from service.cli import config, delivery, probe, readings, recording, reference
+from service.cli import config, delivery, keys, probe, readings, recording, reference, users
 from service.cli.backtest import backtest
 from service.cli.backup import backup, restore
 from service.cli.daq import daq
@@ -37,6 +37,8 @@ app.add_typer(recording.app, name="recording")
 app.add_typer(readings.app, name="readings")
 app.add_typer(probe.app, name="probe")
 app.add_typer(delivery.app, name="delivery")
+app.add_typer(users.app, name="users")
+app.add_typer(keys.app, name="keys")
 
 
 @app.callback()

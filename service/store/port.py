@@ -11,6 +11,7 @@ from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
 from core.films.film_judge import FilmNews
 from core.quality import Level, Reading
+from service.store.access_port import AccessStore
 from service.store.audit_port import AuditStore
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
@@ -152,6 +153,11 @@ class Store(Protocol):
     @property
     def order1_references(self) -> VectorReferenceStore:
         """Where 1× vectors were when all was well."""
+        ...
+
+    @property
+    def access(self) -> AccessStore:
+        """Who may come in: accounts, sessions, keys."""
         ...
 
     def append(

@@ -3,6 +3,7 @@
 import sqlite3
 
 from service.origin import Origin
+from service.store.access_schema import ACCESS_TABLES
 from service.store.audit_schema import AUDIT_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
@@ -131,6 +132,7 @@ MIGRATIONS = (
     FILM_TABLES,
     VECTOR_REFERENCE_TABLES,
     AUDIT_TABLES,
+    ACCESS_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -14,6 +14,7 @@ from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
 from service.audit.head import head_path
 from service.origin import Origin
+from service.store.access import SqliteAccess
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import SqliteAudit
 from service.store.audit_chain import AuditChain, begin_head, has_trail
@@ -76,6 +77,7 @@ class SqliteStore:
         self.audit = SqliteAudit(self._writing, self._reader, self._chain)
         self.films = SqliteFilms(self._writing, self._reader, self._series_id, self._chain)
         self.order1_references = SqliteVectorReferences(self._writing, self._reader, self._chain)
+        self.access = SqliteAccess(self._writing, self._reader)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)

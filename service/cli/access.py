@@ -1,0 +1,45 @@
+"""What commands about accounts and keys share: the plant's database, refusals, times."""
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from datetime import UTC, datetime
+
+import typer
+
+from service.cli.plant_file import fail
+from service.security.names import NameRefusedError
+from service.security.passwords import PasswordRefusedError
+from service.settings.plant import PlantFile
+from service.store.access_port import AccessRefusedError, AccessStore
+from service.store.port import StoreError
+from service.wiring.stores import database_path, open_store
+
+NS_PER_S = 1_000_000_000
+
+
+@contextmanager
+def access_of(plant: PlantFile, command: str, creates: bool = False) -> Iterator[AccessStore]:
+    """The plant's accounts and keys; what is refused ends the command with one line.
+
+    Parameters
+    ----------
+    creates
+        Whether the database is created if there is none.
+    """
+    path = database_path(plant)
+    if not path.exists():  # its folder may be relative to another one than this
+        if not creates:
+            fail(f"{command}: {path.absolute()}: there is no such database")
+        typer.echo(f"{path.absolute()}: a new database; is that where the service runs?", err=True)
+    try:
+        with closing(open_store(plant)) as store:
+            yield store.access
+    except (AccessRefusedError, NameRefusedError, PasswordRefusedError) as error:
+        fail(f"{command}: {error}", 2)
+    except StoreError as error:
+        fail(f"{command}: {error}")
+
+
+def time_text(time_ns: int) -> str:
+    """UTC, to the second."""
+    return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,0 +1,170 @@
+"""Accounts and their sessions behind the store's interface, in SQLite."""
+
+import sqlite3
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any
+
+from service.security.roles import Role
+from service.security.sessions import Session
+from service.store.access_port import AccessRefusedError, Account
+
+Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
+
+MAX_SESSIONS = 16
+"""Of one account; the oldest end when there are more."""
+
+SELECT_ACCOUNTS = """
+    SELECT name, role, password_hash, password_number, created_ns, password_ns FROM account
+    WHERE :name IS NULL OR name = :name ORDER BY name
+"""
+IS_ADMIN = "SELECT EXISTS (SELECT 1 FROM account WHERE role = 'admin' AND name = ?)"
+IS_OTHER_ADMIN = "SELECT EXISTS (SELECT 1 FROM account WHERE role = 'admin' AND name <> ?)"
+IS_OTHER = "SELECT EXISTS (SELECT 1 FROM account WHERE name <> ?)"
+INSERT_SESSION = """
+    INSERT INTO session SELECT ?, name, ?, ? FROM account
+    WHERE name = ? AND password_number = ?
+"""
+SELECT_SESSION = """
+    SELECT digest, session.created_ns, seen_ns, name, role, password_hash, password_number,
+        account.created_ns, password_ns
+    FROM session JOIN account ON account = name WHERE digest = ?
+"""
+END_OLDEST = """
+    DELETE FROM session WHERE account = ? AND digest NOT IN (
+        SELECT digest FROM session WHERE account = ? ORDER BY created_ns DESC, digest LIMIT ?)
+"""
+
+
+class SqliteAccounts:
+    """The accounts of one database.
+
+    Parameters
+    ----------
+    write, read
+        A transaction of the database's one writer, and a short look at it; both raise `StoreError`.
+    """
+
+    def __init__(self, write: Connect, read: Connect) -> None:
+        self._write, self._read = write, read
+
+    def add(self, name: str, role: Role, password_hash: str, now_ns: int) -> None:
+        """Add an account; refused if there is one of that name."""
+        with self._write() as writer:
+            if not insert_account(writer, name, role, password_hash, now_ns):
+                raise AccessRefusedError(f"there is an account {name} already")
+
+    def get(self, name: str) -> Account | None:
+        """Read an account; None if there is none of that name."""
+        with self._read() as reader:
+            row = reader.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
+        return _account(row) if row else None
+
+    def all(self) -> list[Account]:
+        """Read every account, by name."""
+        with self._read() as reader:
+            return [_account(row) for row in reader.execute(SELECT_ACCOUNTS, {"name": None})]
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Change a role; refused if no admin would be left."""
+        with self._write() as writer:
+            if role is not Role.ADMIN:
+                _require_other_admin(writer, name)
+            done = writer.execute("UPDATE account SET role = ? WHERE name = ?", (role.value, name))
+            _require_one(done, name)
+
+    def set_password(self, name: str, password_hash: str, now_ns: int) -> None:
+        """Change a password and end all sessions of the account."""
+        with self._write() as writer:
+            done = writer.execute(
+                "UPDATE account SET password_hash = ?, password_number = password_number + 1,"
+                " password_ns = ? WHERE name = ?",
+                (password_hash, now_ns, name),
+            )
+            _require_one(done, name)
+            writer.execute("DELETE FROM session WHERE account = ?", (name,))
+
+    def rehash(self, account: Account, password_hash: str) -> None:
+        """Write the same password's new hash, unless the password has changed meanwhile."""
+        with self._write() as writer:
+            writer.execute(
+                "UPDATE account SET password_hash = ? WHERE name = ? AND password_number = ?"
+                " AND created_ns = ?",
+                (password_hash, account.name, account.password_number, account.created_ns),
+            )
+
+    def remove(self, name: str) -> None:
+        """Remove an account with its sessions; refused if others would be left without admin."""
+        with self._write() as writer:
+            if writer.execute(IS_OTHER, (name,)).fetchone()[0]:
+                _require_other_admin(writer, name)
+            _require_one(writer.execute("DELETE FROM account WHERE name = ?", (name,)), name)
+
+
+class SqliteSessions:
+    """The sessions of one database.
+
+    Parameters
+    ----------
+    write, read
+        As for `SqliteAccounts`.
+    """
+
+    def __init__(self, write: Connect, read: Connect) -> None:
+        self._write, self._read = write, read
+
+    def add(self, session: Session, password_number: int, oldest_ns: int) -> bool:
+        """Begin a session, unless the password it was given for is no longer the account's."""
+        name = session.account
+        row = (session.digest, session.created_ns, session.seen_ns, name, password_number)
+        with self._write() as writer:
+            writer.execute("DELETE FROM session WHERE created_ns < ?", (oldest_ns,))
+            is_begun = writer.execute(INSERT_SESSION, row).rowcount == 1
+            writer.execute(END_OLDEST, (name, name, MAX_SESSIONS))
+        return is_begun
+
+    def get(self, digest: bytes) -> tuple[Session, Account] | None:
+        """Read a session with its account as it is now."""
+        with self._read() as reader:
+            row = reader.execute(SELECT_SESSION, (digest,)).fetchone()
+        if row is None:
+            return None
+        account = _account(row[3:])
+        return Session(bytes(row[0]), account.name, row[1], row[2]), account
+
+    def see(self, digest: bytes, now_ns: int) -> None:
+        """Note that a session was used."""
+        with self._write() as writer:
+            writer.execute("UPDATE session SET seen_ns = ? WHERE digest = ?", (now_ns, digest))
+
+    def end(self, digest: bytes) -> None:
+        """End a session; ending it twice is fine."""
+        with self._write() as writer:
+            writer.execute("DELETE FROM session WHERE digest = ?", (digest,))
+
+
+def insert_account(
+    writer: sqlite3.Connection, name: str, role: Role, password_hash: str, now_ns: int
+) -> bool:
+    """Add an account unless there is one of that name; whether it was added."""
+    row = (name, role.value, password_hash, now_ns, now_ns)
+    insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?) ON CONFLICT (name) DO NOTHING"
+    return writer.execute(insert, row).rowcount == 1
+
+
+def _require_other_admin(writer: sqlite3.Connection, name: str) -> None:
+    """Refuse what would leave no admin; an account that is no admin may change as it likes."""
+    if not writer.execute(IS_ADMIN, (name,)).fetchone()[0]:
+        return
+    if not writer.execute(IS_OTHER_ADMIN, (name,)).fetchone()[0]:
+        raise AccessRefusedError(f"{name} is the only admin; make somebody else one first")
+
+
+def _require_one(done: sqlite3.Cursor, name: str) -> None:
+    if done.rowcount != 1:
+        raise AccessRefusedError(f"there is no account {name}")
+
+
+def _account(row: tuple[Any, ...]) -> Account:
+    name, role, password_hash, number, created_ns, password_ns = row
+    return Account(name, Role(role), password_hash, number, created_ns, password_ns)

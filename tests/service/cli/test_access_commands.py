@@ -1,0 +1,193 @@
+"""`padwatch users` and `padwatch keys`: who may come in, from the host's own terminal."""
+
+import json
+import os
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from service.cli.main import app
+from service.security.backoff import Backoff
+from service.security.doors import Doors, LoggedIn, Refusal
+from service.security.identity import Identity
+from service.security.passwords import Hashing
+from service.security.roles import Role
+from service.store.access_port import AccessStore
+from service.store.sqlite import SqliteStore
+
+PASSWORD = "rotor rope gauge"  # noqa: S105
+OTHER_PASSWORD = "another rope gauge"  # noqa: S105
+NOW_NS = 1_767_225_600_000_000_000
+
+Padwatch = Callable[..., Result]
+
+
+@pytest.fixture
+def plant_path(plant_text: str, tmp_path: Path) -> Path:
+    path, folder = tmp_path / "plant.toml", tmp_path / "data"
+    old = 'data_folder = "var/demo"'
+    assert old in plant_text
+    path.write_text(plant_text.replace(old, f'data_folder = "{folder}"'), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def padwatch(plant_path: Path) -> Padwatch:
+    """Runs a command on that plant; a password is handed over by a pipe."""
+
+    def run(group: str, command: str, *arguments: str, password: str | bytes = "") -> Result:
+        given = [group, command, str(plant_path), *arguments]
+        if not password:
+            return CliRunner().invoke(app, given)
+        here, there = os.pipe()
+        os.write(there, password.encode() if isinstance(password, str) else password)
+        os.close(there)
+        try:
+            return CliRunner().invoke(app, [*given, "--password-fd", str(here)])
+        finally:
+            os.close(here)
+
+    return run
+
+
+@pytest.fixture
+def access(plant_path: Path) -> Iterator[AccessStore]:
+    """The plant's database, as a running service has it open."""
+    with closing(SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")) as store:
+        yield store.access
+
+
+def test_an_account_that_was_added_can_log_in(padwatch: Padwatch, access: AccessStore) -> None:
+    added = padwatch("users", "add", "Anna", "--role", "admin", password=PASSWORD + "\n")
+    assert (added.exit_code, added.stdout) == (0, "anna: added as admin\n")
+
+    doors = Doors(access, Hashing(), Backoff())
+    assert isinstance(doors.log_in("anna", PASSWORD, "::1", NOW_NS, 0), LoggedIn)
+
+
+def test_accounts_are_listed_without_anything_secret(
+    padwatch: Padwatch, access: AccessStore
+) -> None:
+    for name, role in (("anna", Role.ADMIN), ("berta", Role.VIEWER)):
+        access.accounts.add(name, role, "$argon2id$", NOW_NS)
+
+    (anna, berta) = json.loads(padwatch("users", "list", "--json").stdout)
+    assert (anna["name"], anna["role"]) == ("anna", "admin")
+    assert (berta["name"], berta["role"]) == ("berta", "viewer")
+    assert set(anna) == {"name", "role", "created", "password_set"}
+    lines = padwatch("users", "list").stdout
+    assert lines.startswith("anna: admin, since ")
+    assert "argon2" not in lines
+
+
+def test_roles_and_passwords_change_and_accounts_go(
+    padwatch: Padwatch, access: AccessStore
+) -> None:
+    for name, role in (("anna", Role.ADMIN), ("berta", Role.VIEWER)):
+        access.accounts.add(name, role, "a hash", NOW_NS)
+    before = access.accounts.get("berta")
+
+    assert padwatch("users", "role", "Berta", "operator").exit_code == 0
+    assert padwatch("users", "password", "berta", password=OTHER_PASSWORD).exit_code == 0
+    after = access.accounts.get("berta")
+    assert before is not None
+    assert after is not None
+    assert (after.role, after.password_number) == (Role.OPERATOR, 2)
+    assert after.password_hash != before.password_hash
+    assert padwatch("users", "remove", "berta").exit_code == 0
+    assert [one.name for one in access.accounts.all()] == ["anna"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "password", "said"),
+    [
+        (("add", "anna"), PASSWORD, "there is an account anna already"),
+        (("add", "=anna"), PASSWORD, "a name has 1 to 64"),
+        (("add", "berta"), "short", "a password has 12 to 256 characters"),
+        (("add", "berta"), b"\xff" * 12, "no UTF-8 text"),
+        (("add", "berta"), "x" * 5000, "more than a password"),
+        (("add", "berta"), "", "there is no terminal to ask on; use --password-fd"),
+        (("add", "berta", "--password-fd", "999999"), "", "file descriptor 999999"),
+        (("add", "berta", "--role", "root"), PASSWORD, "Invalid value"),
+        (("role", "anna", "viewer"), "", "anna is the only admin"),
+        (("role", "nobody", "viewer"), "", "there is no account nobody"),
+        (("password", "nobody"), PASSWORD, "there is no account nobody"),
+        (("remove", "nobody"), "", "there is no account nobody"),
+    ],
+)
+def test_what_cannot_be_done_ends_with_one_sentence_and_changes_nothing(
+    padwatch: Padwatch,
+    access: AccessStore,
+    arguments: tuple[str, ...],
+    password: str | bytes,
+    said: str,
+) -> None:
+    access.accounts.add("anna", Role.ADMIN, "a hash", NOW_NS)
+    before = access.accounts.all()
+
+    found = padwatch("users", *arguments, password=password)
+    assert found.exit_code == 2
+    assert said in found.stderr
+    assert "Traceback" not in found.stderr
+    assert access.accounts.all() == before
+
+
+def test_looking_creates_no_database(padwatch: Padwatch, plant_path: Path) -> None:
+    for group, command, *arguments in (
+        ("users", "list"),
+        ("users", "remove", "anna"),
+        ("users", "role", "anna", "admin"),
+        ("keys", "list"),
+        ("keys", "revoke", "0" * 12),
+    ):
+        found = padwatch(group, command, *arguments)
+        assert found.exit_code == 1
+        assert "there is no such database" in found.stderr
+    assert not (plant_path.parent / "data").exists()
+
+
+def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
+    padwatch: Padwatch, access: AccessStore, plant_path: Path
+) -> None:
+    made = padwatch("keys", "create", "historian", "--unit", "U1", "--days", "7")
+    key = made.stdout.strip()
+    (listed,) = json.loads(padwatch("keys", "list", "--json").stdout)
+
+    assert made.exit_code == 0
+    assert key.startswith(f"pw_{listed['id']}_")
+    assert (listed["name"], listed["role"], listed["units"]) == ("historian", "viewer", ["U1"])
+    assert (listed["state"], listed["used"], listed["revoked"]) == ("valid", None, None)
+    with closing(sqlite3.connect(plant_path.parent / "data" / "padwatch.sqlite3")) as connection:
+        assert key not in "\n".join(connection.iterdump())
+
+    doors = Doors(access, Hashing(), Backoff())
+    assert isinstance(doors.machine(key, NOW_NS), Identity)
+    said = [padwatch("keys", "revoke", listed["id"]).stdout for _ in range(2)]
+    assert said == [f"{listed['id']}: revoked\n", f"{listed['id']}: was revoked already\n"]
+    assert doors.machine(key, NOW_NS) is Refusal.REVOKED
+    assert ", revoked, " in padwatch("keys", "list").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("create", "historian", "--unit", "U9"), "there is no unit U9, it has U1, U2"),
+        (("create", "historian", "--days", "0"), "Invalid value"),
+        (("create", "a b"), "a name has 1 to 64"),
+        (("create", "historian", "--role", "admin", "--unit", "U1"), "no admin's"),
+        (("revoke", "000000000000"), "there is no key 000000000000"),
+    ],
+)
+def test_a_key_that_cannot_be_is_not_made(
+    padwatch: Padwatch, arguments: tuple[str, ...], said: str
+) -> None:
+    padwatch("keys", "create", "other")
+    found = padwatch("keys", *arguments)
+    assert found.exit_code == 2
+    assert said in found.stderr
+    assert len(json.loads(padwatch("keys", "list", "--json").stdout)) == 1

@@ -1,0 +1,64 @@
+"""Doors on a real database, with hashes that cost little."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from argon2 import PasswordHasher
+
+from service.security.backoff import Backoff
+from service.security.doors import Doors
+from service.security.passwords import Hashing
+from service.security.people import People
+from service.store.access_port import AccessStore
+from service.store.sqlite import SqliteStore
+
+
+class CountingHasher(PasswordHasher):
+    """Argon2id at its cheapest, which counts what it verifies."""
+
+    def __init__(self, time_cost: int = 1) -> None:
+        super().__init__(time_cost=time_cost, memory_cost=8, parallelism=1)
+        self.n_verified = 0
+
+    def verify(self, hash: str | bytes, password: str | bytes) -> bool:  # noqa: A002
+        self.n_verified += 1
+        return super().verify(hash, password)  # type: ignore[return-value]
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Path:
+    return tmp_path / "padwatch.sqlite3"
+
+
+@pytest.fixture
+def access(database: Path) -> Iterator[AccessStore]:
+    store = SqliteStore(database)
+    yield store.access
+    store.close()
+
+
+@pytest.fixture
+def hasher() -> CountingHasher:
+    return CountingHasher()
+
+
+@pytest.fixture
+def dearer_hasher() -> CountingHasher:
+    """What is in force after the parameters have risen."""
+    return CountingHasher(time_cost=2)
+
+
+@pytest.fixture
+def hashing(hasher: CountingHasher) -> Hashing:
+    return Hashing(hasher)
+
+
+@pytest.fixture
+def people(access: AccessStore, hashing: Hashing) -> People:
+    return People(access, hashing)
+
+
+@pytest.fixture
+def doors(access: AccessStore, hashing: Hashing) -> Doors:
+    return Doors(access, hashing, Backoff())

@@ -1,0 +1,32 @@
+"""At which addresses the service starts."""
+
+import pytest
+
+from service.security.addresses import Doorway, why_closed
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "::1", "localhost"])
+def test_loopback_needs_no_login(host: str) -> None:
+    assert why_closed(Doorway(host)) is None
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["0.0.0.0", "::", "10.0.0.5", "plant.example", "127.0.0.1.example", "", "::ffff:10.0.0.5"],  # noqa: S104
+)
+@pytest.mark.parametrize("has_tls", [False, True])
+@pytest.mark.parametrize("has_account", [False, True])
+def test_other_addresses_need_tls_and_an_account(
+    host: str, has_tls: bool, has_account: bool
+) -> None:
+    why = why_closed(Doorway(host, has_tls=has_tls, has_account=has_account))
+
+    assert (why is None) == (has_tls and has_account)
+    if why is not None:
+        assert ("[service.tls]" in why, "users add" in why) == (not has_tls, not has_account)
+        assert host in why
+        assert "\n" not in why
+
+
+def test_a_unix_socket_is_left_to_the_proxy_that_opens_it() -> None:
+    assert why_closed(Doorway("0.0.0.0", is_unix_socket=True)) is None  # noqa: S104

@@ -1,0 +1,118 @@
+"""How long logins wait after failures."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.security.backoff import OF_ACCOUNT, OF_PEER, Backoff, FailureBook, WaitRule, place_of
+
+S = 1_000_000_000
+HERE, THERE = "10.0.0.1", "10.0.0.2"
+
+
+def fail_until_waiting(backoff: Backoff, name: str, peer: str, now_ns: int = 0) -> int:
+    """Try wrong passwords until one has to wait; how many could be tried."""
+    for n_tried in range(1000):
+        if backoff.attempt(name, peer, now_ns):
+            return n_tried
+    raise AssertionError("never had to wait")
+
+
+def test_a_few_wrong_passwords_are_free_and_then_each_doubles_the_wait() -> None:
+    backoff, now_ns, waits = Backoff(), 0, []
+    assert fail_until_waiting(backoff, "anna", HERE) == OF_ACCOUNT.n_free
+    for _ in range(8):
+        waits.append(backoff.attempt("anna", HERE, now_ns))
+        now_ns += round(waits[-1] * S)
+        assert backoff.attempt("anna", HERE, now_ns) == 0.0
+    assert waits[:5] == [1.0, 2.0, 4.0, 8.0, 16.0]
+
+
+@given(st.lists(st.floats(0.0, 5000.0), max_size=60))
+def test_no_account_waits_longer_than_its_limit_whatever_is_tried(pauses_s: list[float]) -> None:
+    backoff, now_ns = Backoff(), 0
+    for number, pause_s in enumerate(pauses_s):
+        now_ns += round(pause_s * S)
+        backoff.attempt("admin", f"10.0.{number}.1", now_ns)
+    assert backoff.attempt("admin", "192.0.2.1", now_ns) <= OF_ACCOUNT.longest_s
+    assert backoff.attempt("admin", "192.0.2.1", now_ns + round(OF_ACCOUNT.longest_s * S)) == 0.0
+
+
+def test_asking_too_soon_makes_no_wait_longer() -> None:
+    backoff = Backoff()
+    fail_until_waiting(backoff, "anna", HERE)
+    waits = [backoff.attempt("anna", HERE, tenth * S // 10) for tenth in range(10)]
+    assert waits == pytest.approx([1.0 - tenth / 10 for tenth in range(10)])
+    assert backoff.attempt("anna", HERE, S) == 0.0
+
+
+def test_one_who_tries_many_accounts_waits_though_none_of_them_does() -> None:
+    backoff = Backoff()
+    n_tried = next(n for n in range(1000) if backoff.attempt(f"user{n}", HERE, 0))
+    assert n_tried == OF_PEER.n_free
+    assert backoff.attempt("user0", THERE, 0) == 0.0
+
+
+def test_strangers_do_not_keep_an_admin_from_where_he_has_been() -> None:
+    backoff = Backoff()
+    backoff.attempt("admin", HERE, 0)
+    backoff.succeeded("admin", HERE)
+    for number in range(50):
+        backoff.attempt("admin", f"192.0.2.{number}", 0)
+    assert backoff.attempt("admin", "192.0.2.200", 0) > 0.0
+    assert backoff.attempt("admin", HERE, 0) == 0.0
+
+
+def test_a_known_peer_may_not_try_without_end_either() -> None:
+    backoff = Backoff()
+    backoff.attempt("admin", HERE, 0)
+    backoff.succeeded("admin", HERE)
+    assert fail_until_waiting(backoff, "admin", HERE) == OF_PEER.n_free
+
+
+def test_a_login_of_ones_own_does_not_pay_for_failures_at_others() -> None:
+    backoff, n_tried = Backoff(), 0
+    while backoff.attempt(f"victim{n_tried}", HERE, 0) == 0.0:
+        n_tried += 1
+        if backoff.attempt("mallory", HERE, 0) == 0.0:
+            backoff.succeeded("mallory", HERE)
+    assert n_tried <= OF_PEER.n_free
+
+
+def test_right_passwords_never_wait_however_many() -> None:
+    backoff = Backoff()
+    for _ in range(100):
+        assert backoff.attempt("anna", HERE, 0) == 0.0
+        backoff.succeeded("anna", HERE)
+
+
+def test_all_is_forgotten_after_an_hour_without_failures() -> None:
+    backoff = Backoff()
+    fail_until_waiting(backoff, "anna", HERE)
+    later_ns = round(OF_ACCOUNT.forget_s * S)
+    assert fail_until_waiting(backoff, "anna", HERE, later_ns) == OF_ACCOUNT.n_free
+
+
+def test_a_million_names_take_no_more_memory_than_the_first_thousands() -> None:
+    book = FailureBook(WaitRule(1, 60.0), max_remembered=100)
+    for number in range(10_000):
+        book.add(number, number)
+    assert len(book) == 100
+    assert book.wait(9_999, 9_999) > 0
+    assert book.wait(0, 9_999) == 0
+
+
+@pytest.mark.parametrize(
+    ("peer", "place"),
+    [
+        ("10.0.0.1", "10.0.0.1"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::"),
+        ("2001:db8:1:2:ffff::1", "2001:db8:1:2::"),
+        ("::ffff:10.0.0.1", "10.0.0.1"),
+        ("fe80::1%eth0", "fe80::"),
+        ("unix", "unix"),
+        ("", ""),
+    ],
+)
+def test_one_host_with_many_addresses_is_one_place(peer: str, place: str) -> None:
+    assert place_of(peer) == place

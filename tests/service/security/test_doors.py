@@ -1,0 +1,263 @@
+"""Who is let in, for how long, and what ends it."""
+
+import sqlite3
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from argon2 import PasswordHasher
+
+from service.security.backoff import OF_ACCOUNT, Backoff
+from service.security.doors import Doors, LoggedIn, NotLoggedIn, Refusal
+from service.security.identity import Identity, Means
+from service.security.passwords import Hashing
+from service.security.people import People, create_key
+from service.security.roles import Role
+from service.security.sessions import SessionLimits
+from service.security.tokens import digest
+from service.store.access_port import AccessStore
+from service.store.accounts import MAX_SESSIONS
+
+T0 = 1_767_225_600_000_000_000
+S = 1_000_000_000
+H = 3600 * S
+PASSWORD = "rotor rope gauge"  # noqa: S105
+HERE = "10.0.0.1"
+
+
+@pytest.fixture
+def anna(people: People) -> str:
+    return people.add("anna", Role.OPERATOR, PASSWORD, T0)
+
+
+def log_in(doors: Doors, now_ns: int = T0, name: str = "anna", password: str = PASSWORD) -> str:
+    found = doors.log_in(name, password, HERE, now_ns, now_ns)
+    assert isinstance(found, LoggedIn)
+    return found.token
+
+
+def test_the_right_password_opens_and_its_token_says_who_it_is(doors: Doors, anna: str) -> None:
+    found = doors.log_in(" Anna ", PASSWORD, HERE, T0, 0)
+
+    assert isinstance(found, LoggedIn)
+    assert found.identity == Identity(anna, Role.OPERATOR, Means.SESSION)
+    assert doors.person(found.token, T0 + S) == found.identity
+    assert found.token not in repr(found)
+
+
+@pytest.mark.usefixtures("anna")
+@pytest.mark.parametrize(
+    ("name", "password"),
+    [("anna", "rotor rope gaug"), ("anna", ""), ("ann", PASSWORD), ("", ""), ("\ud800", "\ud800")],
+)
+def test_a_wrong_name_and_a_wrong_password_are_told_alike(
+    doors: Doors, name: str, password: str
+) -> None:
+    assert doors.log_in(name, password, HERE, T0, 0) == NotLoggedIn()
+
+
+def test_a_name_that_no_account_has_costs_as_many_hashes_as_one_that_has(
+    doors: Doors, anna: str, hasher: PasswordHasher
+) -> None:
+    costs = []
+    for name in (anna, "nobody", "no name at all"):
+        before = vars(hasher)["n_verified"]
+        doors.log_in(name, "another password", HERE, T0, 0)
+        costs.append(vars(hasher)["n_verified"] - before)
+    assert costs == [1, 1, 1]
+
+
+@pytest.mark.usefixtures("anna")
+def test_every_login_has_its_own_token_of_256_bits(doors: Doors) -> None:
+    tokens = {log_in(doors) for _ in range(10)}
+    assert len(tokens) == 10
+    assert {len(token) for token in tokens} == {43}  # 32 bytes in base64
+
+
+@pytest.mark.usefixtures("anna")
+def test_neither_password_nor_token_nor_key_is_in_the_database(
+    doors: Doors, access: AccessStore, database: Path
+) -> None:
+    token = log_in(doors)
+    _, key = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    with closing(sqlite3.connect(database)) as connection:
+        stored = "\n".join(connection.iterdump())
+    files = b"".join(path.read_bytes() for path in database.parent.glob("padwatch.sqlite3*"))
+
+    assert digest(token).hex().upper() in stored.upper()
+    for secret in (PASSWORD, token, key):
+        assert secret not in stored
+        assert secret.encode() not in files
+
+
+@pytest.mark.usefixtures("anna")
+def test_a_login_ends_half_an_hour_after_its_last_use(doors: Doors) -> None:
+    token, now_ns = log_in(doors), T0
+    for _ in range(10):
+        now_ns += 29 * 60 * S
+        assert isinstance(doors.person(token, now_ns), Identity)
+    assert doors.person(token, now_ns + 30 * 60 * S) is Refusal.EXPIRED
+    assert doors.person(token, now_ns) is Refusal.UNKNOWN  # it is over, not only late
+
+
+@pytest.mark.usefixtures("anna")
+def test_a_login_ends_twelve_hours_after_it_began_whatever_is_done(doors: Doors) -> None:
+    token = log_in(doors)
+    for quarter in range(1, 48):
+        assert isinstance(doors.person(token, T0 + quarter * H // 4), Identity)
+    assert doors.person(token, T0 + 12 * H) is Refusal.EXPIRED
+
+
+@pytest.mark.usefixtures("anna")
+def test_a_clock_that_was_years_ahead_leaves_no_login_behind(doors: Doors) -> None:
+    token = log_in(doors, T0 + 9000 * H)
+    assert doors.person(token, T0) is Refusal.EXPIRED
+
+
+@pytest.mark.usefixtures("anna")
+def test_a_clock_put_right_by_a_minute_ends_no_login(doors: Doors) -> None:
+    token = log_in(doors)
+    assert isinstance(doors.person(token, T0 - 60 * S), Identity)
+
+
+@pytest.mark.usefixtures("anna")
+def test_a_use_is_written_once_a_minute(doors: Doors, access: AccessStore) -> None:
+    token, seen = log_in(doors), set()
+    for second in range(180):
+        doors.person(token, T0 + second * S)
+        found = access.sessions.get(digest(token))
+        assert found is not None
+        seen.add(found[0].seen_ns)
+    assert sorted(seen) == [T0, T0 + 60 * S, T0 + 120 * S]
+
+
+@pytest.mark.usefixtures("anna")
+def test_logging_out_ends_this_login_and_no_other(doors: Doors) -> None:
+    here, there = log_in(doors), log_in(doors)
+    doors.log_out(here)
+    doors.log_out(here)
+    doors.log_out("no token")
+    assert doors.person(here, T0) is Refusal.UNKNOWN
+    assert isinstance(doors.person(there, T0), Identity)
+
+
+def test_a_new_password_ends_every_login_of_its_account_alone(
+    doors: Doors, people: People, anna: str
+) -> None:
+    people.add("berta", Role.VIEWER, PASSWORD, T0)
+    hers, others = [log_in(doors) for _ in range(3)], log_in(doors, name="berta")
+    people.set_password(anna, "another rope gauge", T0 + S)
+
+    assert {doors.person(token, T0 + S) for token in hers} == {Refusal.UNKNOWN}
+    assert isinstance(doors.person(others, T0 + S), Identity)
+    assert doors.log_in(anna, PASSWORD, HERE, T0, T0) == NotLoggedIn()
+    log_in(doors, password="another rope gauge")  # noqa: S106
+
+
+def test_a_password_changed_while_the_old_one_is_checked_opens_nothing(
+    access: AccessStore, hasher: PasswordHasher, anna: str
+) -> None:
+    class Meanwhile(Hashing):
+        """Somebody changes the password right after it was found to be right."""
+
+        def verify(self, stored: str | None, password: str) -> bool:
+            is_right = super().verify(stored, password)
+            access.accounts.set_password(anna, self.hash("another rope gauge"), T0)
+            return is_right
+
+    doors = Doors(access, Meanwhile(hasher), Backoff())
+    assert doors.log_in(anna, PASSWORD, HERE, T0, 0) == NotLoggedIn()
+
+
+def test_another_role_counts_from_the_next_request_on(
+    doors: Doors, access: AccessStore, anna: str
+) -> None:
+    token = log_in(doors)
+    access.accounts.set_role(anna, Role.VIEWER)
+    found = doors.person(token, T0)
+    assert isinstance(found, Identity)
+    assert found.role is Role.VIEWER
+
+
+def test_removing_an_account_ends_its_logins_also_for_one_of_the_same_name(
+    doors: Doors, people: People, access: AccessStore, anna: str
+) -> None:
+    token = log_in(doors)
+    access.accounts.remove(anna)
+    people.add(anna, Role.ADMIN, PASSWORD, T0)
+    assert doors.person(token, T0) is Refusal.UNKNOWN
+
+
+@pytest.mark.usefixtures("anna")
+def test_an_account_has_only_so_many_logins_and_the_oldest_goes(doors: Doors) -> None:
+    tokens = [log_in(doors, T0 + number * S) for number in range(MAX_SESSIONS + 2)]
+    now_ns = T0 + MAX_SESSIONS * S
+    lives = [isinstance(doors.person(token, now_ns), Identity) for token in tokens]
+    assert lives == [False, False] + [True] * MAX_SESSIONS
+
+
+@pytest.mark.usefixtures("anna")
+def test_old_logins_are_forgotten_when_somebody_logs_in(
+    doors: Doors, people: People, database: Path
+) -> None:
+    people.add("berta", Role.VIEWER, PASSWORD, T0)
+    log_in(doors)
+    log_in(doors, T0 + 13 * H, "berta")
+    with closing(sqlite3.connect(database)) as connection:
+        assert connection.execute("SELECT account FROM session").fetchall() == [("berta",)]
+
+
+def test_a_login_renews_a_hash_once_the_parameters_have_risen(
+    access: AccessStore, doors: Doors, dearer_hasher: PasswordHasher, anna: str
+) -> None:
+    before = log_in(doors)
+    dearer = Hashing(dearer_hasher)
+    later = Doors(access, dearer, Backoff())
+    stored = []
+    for number in range(2):
+        log_in(later, T0 + number * S)
+        account = access.accounts.get(anna)
+        assert account is not None
+        stored.append(account.password_hash)
+
+    assert "t=2" in stored[0]
+    assert stored[0] == stored[1]  # once
+    assert isinstance(doors.person(before, T0), Identity)  # the password is the same
+
+
+def test_after_failures_not_even_the_right_password_is_looked_at_until_the_wait_is_over(
+    doors: Doors, anna: str, hasher: PasswordHasher
+) -> None:
+    for _ in range(OF_ACCOUNT.n_free):
+        assert doors.log_in(anna, "wrong", HERE, T0, 0) == NotLoggedIn()
+    before = vars(hasher)["n_verified"]
+
+    assert doors.log_in(anna, PASSWORD, HERE, T0, S // 2) == NotLoggedIn(wait_s=0.5)
+    assert vars(hasher)["n_verified"] == before
+    assert isinstance(doors.log_in(anna, PASSWORD, HERE, T0, S), LoggedIn)
+
+
+def test_passwords_tried_all_at_once_are_counted_one_by_one(doors: Doors, anna: str) -> None:
+    with ThreadPoolExecutor(16) as threads:
+        found = list(
+            threads.map(lambda n: doors.log_in(anna, f"wrong {n}", HERE, T0, 0), range(64))
+        )
+    n_tried = sum(isinstance(one, NotLoggedIn) and one.wait_s == 0.0 for one in found)
+    assert n_tried == OF_ACCOUNT.n_free
+
+
+@pytest.mark.usefixtures("anna")
+@pytest.mark.parametrize(
+    "token", ["", "x", "x" * 43, "ä" * 43, "\ud800" * 43, "' OR 1=1 --", "a" * 9999]
+)
+def test_a_forged_token_opens_nothing(doors: Doors, token: str) -> None:
+    log_in(doors)
+    assert doors.person(token, T0) is Refusal.UNKNOWN
+    assert doors.machine(token, T0) is Refusal.UNKNOWN
+
+
+@pytest.mark.usefixtures("anna")
+def test_limits_of_logins_can_be_set(access: AccessStore, hashing: Hashing) -> None:
+    doors = Doors(access, hashing, Backoff(), SessionLimits(idle_s=60.0, absolute_s=120.0))
+    assert doors.person(log_in(doors), T0 + 60 * S) is Refusal.EXPIRED

@@ -1,0 +1,234 @@
+"""Accounts, the first of them, and keys of machines."""
+
+import sqlite3
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from service.security.doors import Doors, LoggedIn, Refusal
+from service.security.identity import Identity, Means
+from service.security.keys import NS_PER_DAY, KeyState
+from service.security.names import NameRefusedError
+from service.security.passwords import PasswordRefusedError
+from service.security.people import SET_UP_S, People, create_key
+from service.security.roles import Role
+from service.security.tokens import key_id, new_key
+from service.store.access_port import AccessRefusedError, AccessStore
+
+T0 = 1_767_225_600_000_000_000
+S = 1_000_000_000
+PASSWORD = "rotor rope gauge"  # noqa: S105
+
+
+def test_an_account_is_kept_as_it_was_made(people: People, access: AccessStore) -> None:
+    people.add("Berta", Role.VIEWER, PASSWORD, T0)
+    people.add("anna", Role.ADMIN, PASSWORD, T0 + S)
+
+    found = access.accounts.all()
+    assert [(one.name, one.role, one.created_ns) for one in found] == [
+        ("anna", Role.ADMIN, T0 + S),
+        ("berta", Role.VIEWER, T0),
+    ]
+    assert access.accounts.get("anna") == found[0]
+    assert access.accounts.get("nobody") is None
+    assert found[0].password_hash not in repr(found[0])
+
+
+def test_there_are_no_two_accounts_of_one_name(people: People, access: AccessStore) -> None:
+    people.add("anna", Role.VIEWER, PASSWORD, T0)
+    before = access.accounts.get("anna")
+    with pytest.raises(AccessRefusedError, match="an account anna already"):
+        people.add("ANNA", Role.ADMIN, PASSWORD, T0)
+    assert access.accounts.get("anna") == before
+
+
+def test_what_is_not_accepted_changes_nothing(people: People, access: AccessStore) -> None:
+    with pytest.raises(NameRefusedError):
+        people.add("=anna", Role.VIEWER, PASSWORD, T0)
+    with pytest.raises(PasswordRefusedError):
+        people.add("anna", Role.VIEWER, "short", T0)
+    assert access.accounts.all() == []
+
+
+def test_the_only_admin_stays_one_while_there_are_others(
+    people: People, access: AccessStore
+) -> None:
+    people.add("anna", Role.ADMIN, PASSWORD, T0)
+    people.add("berta", Role.ENGINEER, PASSWORD, T0)
+    for change in (
+        lambda: access.accounts.remove("anna"),
+        lambda: access.accounts.set_role("anna", Role.ENGINEER),
+    ):
+        with pytest.raises(AccessRefusedError, match="anna is the only admin"):
+            change()
+    access.accounts.set_role("berta", Role.ADMIN)
+    access.accounts.remove("anna")
+    access.accounts.remove("berta")  # the last of all may go
+    assert access.accounts.all() == []
+
+
+def test_of_two_admins_who_leave_at_once_one_stays(people: People, access: AccessStore) -> None:
+    people.add("viewer", Role.VIEWER, PASSWORD, T0)
+
+    def leave(name: str) -> bool:
+        try:
+            access.accounts.remove(name)
+        except AccessRefusedError:
+            return False
+        return True
+
+    for _ in range(20):
+        for name in ("anna", "berta"):
+            if access.accounts.get(name) is None:
+                people.add(name, Role.ADMIN, PASSWORD, T0)
+        with ThreadPoolExecutor(2) as threads:
+            assert sorted(threads.map(leave, ("anna", "berta"))) == [False, True]
+
+
+def test_nobody_is_changed_who_is_not_there(people: People, access: AccessStore) -> None:
+    for change in (
+        lambda: access.accounts.remove("nobody"),
+        lambda: access.accounts.set_role("nobody", Role.VIEWER),
+        lambda: people.set_password("nobody", PASSWORD, T0),
+    ):
+        with pytest.raises(AccessRefusedError, match="there is no account nobody"):
+            change()
+
+
+def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
+    people: People, doors: Doors
+) -> None:
+    token = people.offer_set_up(T0)
+    assert token is not None
+    assert people.set_up(token, "anna", PASSWORD, T0)
+    assert not people.set_up(token, "berta", PASSWORD, T0)
+    found = doors.log_in("anna", PASSWORD, "::1", T0, 0)
+    assert isinstance(found, LoggedIn)
+    assert found.identity.role is Role.ADMIN
+
+
+def test_no_set_up_token_is_drawn_once_there_is_an_account(people: People) -> None:
+    token = people.offer_set_up(T0)
+    people.add("anna", Role.VIEWER, PASSWORD, T0)
+    assert token is not None
+    assert not people.set_up(token, "berta", PASSWORD, T0)
+    assert people.offer_set_up(T0) is None
+
+
+def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people: People) -> None:
+    first, second = people.offer_set_up(T0), people.offer_set_up(T0)
+    assert first is not None
+    assert second is not None
+    late_ns = T0 + round(SET_UP_S * S)
+    assert not people.set_up(first, "anna", PASSWORD, T0)
+    assert not people.set_up(second, "anna", PASSWORD, late_ns)
+    assert not people.set_up("", "anna", PASSWORD, T0)
+    assert people.set_up(second, "anna", PASSWORD, late_ns - 1)
+
+
+def test_a_refused_password_does_not_use_the_set_up_token_up(people: People) -> None:
+    token = people.offer_set_up(T0)
+    assert token is not None
+    with pytest.raises(PasswordRefusedError):
+        people.set_up(token, "anna", "short", T0)
+    assert people.set_up(token, "anna", PASSWORD, T0)
+
+
+def test_of_many_who_set_up_at_once_one_is_admin(people: People, access: AccessStore) -> None:
+    token = people.offer_set_up(T0)
+    assert token is not None
+    with ThreadPoolExecutor(8) as threads:
+        done = list(threads.map(lambda n: people.set_up(token, f"user{n}", PASSWORD, T0), range(8)))
+    assert (sum(done), len(access.accounts.all())) == (1, 1)
+
+
+def test_a_key_opens_as_what_it_was_made_for(access: AccessStore, doors: Doors) -> None:
+    key, shown = create_key(access, "Historian", Role.VIEWER, ("U1", "U2", "U1"), 30, T0)
+
+    assert doors.machine(shown, T0 + S) == Identity(
+        "historian", Role.VIEWER, Means.KEY, ("U1", "U2")
+    )
+    assert access.keys.get(key.id) != key  # its use is noted
+    assert shown not in repr(access.keys.all())
+
+
+def test_a_key_is_good_until_its_day_and_not_after(access: AccessStore, doors: Doors) -> None:
+    _, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    end_ns = T0 + 30 * NS_PER_DAY
+    assert isinstance(doors.machine(shown, end_ns - 1), Identity)
+    assert doors.machine(shown, end_ns) is Refusal.EXPIRED
+
+
+def test_a_revoked_key_opens_nothing_ever_again(access: AccessStore, doors: Doors) -> None:
+    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    assert access.keys.revoke(key.id, T0 + S)
+    assert not access.keys.revoke(key.id, T0 + 2 * S)
+    assert doors.machine(shown, T0 + S) is Refusal.REVOKED
+    (stored,) = access.keys.all()
+    assert (stored.revoked_ns, stored.state(T0 + 99 * NS_PER_DAY)) == (T0 + S, KeyState.REVOKED)
+
+
+def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
+    access: AccessStore, doors: Doors
+) -> None:
+    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    other_id, other = new_key()
+    forged = other.replace(other_id, key.id, 1)
+    assert key_id(forged) == key.id
+    for wrong in (forged, shown[:-1], shown + "A", shown.upper(), f" {shown}", shown.swapcase()):
+        assert doors.machine(wrong, T0) is Refusal.UNKNOWN
+    (stored,) = access.keys.all()
+    assert stored.used_ns is None
+
+
+def test_the_last_use_of_a_key_is_written_once_a_minute(access: AccessStore, doors: Doors) -> None:
+    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    seen = set()
+    for second in range(150):
+        doors.machine(shown, T0 + second * S)
+        stored = access.keys.get(key.id)
+        assert stored is not None
+        seen.add(stored.used_ns)
+    assert seen == {T0, T0 + 60 * S, T0 + 120 * S}
+
+
+def test_a_key_says_its_id_and_nothing_else_does(access: AccessStore) -> None:
+    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    assert key_id(shown) == key.id
+    for other in ("", "pw_", "pw__", shown + "\n", key.id, "pw_" + "0" * 12 + "_"):
+        assert key_id(other) is None
+
+
+@pytest.mark.parametrize("days", [0, 3651])
+def test_a_key_for_ever_is_not_made(access: AccessStore, days: int) -> None:
+    with pytest.raises(AccessRefusedError, match="1 to 3650 days"):
+        create_key(access, "historian", Role.VIEWER, (), days, T0)
+
+
+def test_an_admin_of_one_unit_is_not_made(access: AccessStore) -> None:
+    with pytest.raises(AccessRefusedError, match="no admin"):
+        create_key(access, "historian", Role.ADMIN, ("U1",), 30, T0)
+
+
+@pytest.mark.parametrize(
+    ("statement", "said"),
+    [
+        ("UPDATE api_key SET revoked_ns = NULL", "stays revoked"),
+        ("UPDATE api_key SET expires_ns = expires_ns + 1", "kept as they were made"),
+        ("UPDATE api_key SET role = 'admin'", "kept as they were made"),
+        ("DELETE FROM api_key", "revoked, not forgotten"),
+        ("INSERT INTO account VALUES ('x', 'root', '', 1, 0, 0)", "CHECK"),
+    ],
+)
+def test_the_database_itself_refuses_to_bring_a_key_back(
+    access: AccessStore, database: Path, statement: str, said: str
+) -> None:
+    key, _ = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    access.keys.revoke(key.id, T0)
+    with (
+        closing(sqlite3.connect(database)) as connection,
+        pytest.raises(sqlite3.IntegrityError, match=said),
+    ):
+        connection.execute(statement)
