@@ -4,8 +4,9 @@ PORT ?= 8080
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-.PHONY: install run test check bench accuracy format lock clean
+.PHONY: install run test check docs bench accuracy format lock clean
 
 $(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
@@ -27,6 +28,10 @@ check: install
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/sphinx-build $(SPHINX) --quiet docs build/docs
+
+docs: install
+	$(BIN)/sphinx-build $(SPHINX) docs build/docs
 
 bench: install
 	$(BIN)/python benchmarks/ingest.py

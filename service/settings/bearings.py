@@ -54,26 +54,30 @@ class BearingSettings(Settings):
     """Slow channel (degC) of the oil temperature, if measured."""
 
     gap_x: Identifier | None = None
-    """Slow channel (mm) of the x gap; without it the mean of a proximity probe is the gap."""
+    """Slow channel (mm) of the x gap; without it the mean of a proximity probe is the gap;
+    example: "ujb_gap_x"."""
 
     gap_y: Identifier | None = None
-    """Slow channel (mm) of the y gap."""
+    """Slow channel (mm) of the y gap; example: "ujb_gap_y"."""
 
     opposite_x: Identifier | None = None
     """Proximity probe across the shaft from shaft_x, if there is one: with it the shaft's motion
-    is told from thermal growth."""
+    is told from thermal growth; example: "ujb_shaft_minus_x"."""
 
     opposite_y: Identifier | None = None
-    """Proximity probe across the shaft from shaft_y, if there is one."""
+    """Proximity probe across the shaft from shaft_y, if there is one; example:
+    "ujb_shaft_minus_y"."""
 
     opposite_gap_x: Identifier | None = None
-    """Slow channel (mm) of the gap opposite x; without it the mean of opposite_x is the gap."""
+    """Slow channel (mm) of the gap opposite x; without it the mean of opposite_x is the gap;
+    example: "ujb_gap_minus_x"."""
 
     opposite_gap_y: Identifier | None = None
-    """Slow channel (mm) of the gap opposite y."""
+    """Slow channel (mm) of the gap opposite y; example: "ujb_gap_minus_y"."""
 
     opposite_reference_um: MicrometrePair | None = None
-    """Gaps [x, y] in µm of the opposite probes with the shaft centred."""
+    """Gaps [x, y] in µm of the opposite probes with the shaft centred; example:
+    [1980.0, 2010.0]."""
 
     gap_reference_uncertainty_um: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
     """Half-width of what a reference gap may be off, µm."""

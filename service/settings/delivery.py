@@ -78,7 +78,7 @@ class _ReceiverSettings(Settings):
     """Shown with its backlog; what waits for it is kept under this name."""
 
     units: tuple[str, ...] | None = None
-    """Units whose alarms it is told of; all unless given."""
+    """Units whose alarms it is told of; all unless given; example: ["U1"]."""
 
     kinds: tuple[AlarmKind, ...] | None = None
     """Kinds of alarms that it is told of; all unless given. Example: ["link_lost"]."""
@@ -109,7 +109,8 @@ class _ReceiverSettings(Settings):
     """What is older than this when an attempt fails is given up, hours."""
 
     ca_file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    """Certificates (PEM) to trust instead of the system's; for a plant with a CA of its own."""
+    """Certificates (PEM) to trust instead of the system's; for a plant with a CA of its own;
+    example: "/etc/padwatch/plant-ca.pem"."""
 
 
 class WebhookSettings(_ReceiverSettings):

@@ -65,7 +65,7 @@ class BaselineModel(Settings):
 
     attitude_width_deg: Annotated[float, Field(ge=1.0, le=360.0)] | None = None
     """Width of a cell in attitude angle, degrees, a divisor of 360; without it the attitude does
-    not part cells."""
+    not part cells; example: 45.0."""
 
     uses_attitude: bool = BaselineSettings.uses_attitude
     """Whether stiffness may depend on the attitude angle, too."""

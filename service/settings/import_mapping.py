@@ -106,7 +106,8 @@ class MappedSlowChannel(Settings):
     """Unit of the values in the file; example: "degC", "r/min", "kW"."""
 
     time_column: ColumnName | None = None
-    """Its own time column, of the same form as that of the waveforms, if it has another rate."""
+    """Its own time column, of the same form as that of the waveforms, if it has another rate;
+    example: "slow/time"."""
 
     time_group: Annotated[str, StringConstraints(max_length=500)] = ""
     """Group of that column."""

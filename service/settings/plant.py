@@ -63,7 +63,7 @@ class DynamicModel(Settings):
 
     probe_noise_um2_per_hz: Annotated[float, Field(ge=0.0, le=1e3)] | None = None
     """Known one-sided noise density of the shaft probes, µm²/Hz; without it the quiet band shows
-    it. White noise of 1.2 µm rms up to 300 Hz is 0.0048."""
+    it; example: 0.0048, which is white noise of 1.2 µm rms up to 300 Hz."""
 
     quiet_band_hz: tuple[float, float] = (15.0, 25.0)
     """Band [low, high] in Hz in which the shaft hardly moves, for the probes' noise."""

@@ -34,7 +34,7 @@ class CellSettings(Settings):
     """"ABCD", "CDAB", "BADC" or "DCBA", A the most significant byte; default: the map's."""
 
     bit: Annotated[int, Field(ge=0, le=15)] | None = None
-    """Of a register, 0 the least significant; with type "bit" and function 3 or 4."""
+    """Of a register, 0 the least significant; with type "bit" and function 3 or 4; example: 0."""
 
 
 class ScaleRegisterSettings(CellSettings):
@@ -127,7 +127,7 @@ class ValueSettings(CellSettings):
     """Raw numbers below stand for an error; example: -32000."""
 
     invalid_above: float | None = None
-    """Raw numbers above stand for an error."""
+    """Raw numbers above stand for an error; example: 32000.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

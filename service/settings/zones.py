@@ -28,7 +28,7 @@ class ZoneTableSettings(Settings):
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] | None = None
     """How far below a boundary the value must fall for its zone to be left; without it a twentieth
-    of a_b."""
+    of a_b; example: 5.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -92,10 +92,10 @@ class VectorReferenceSettings(Settings):
     """Of the shaft in y."""
 
     bearing_x: Vector | None = None
-    """Of the bearing in x."""
+    """Of the bearing in x; example: [12.0, 135.0]."""
 
     bearing_y: Vector | None = None
-    """Of the bearing in y."""
+    """Of the bearing in y; example: [11.0, 45.0]."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,0 +1,39 @@
+"""Reference pages that are made of the program itself whenever the documentation is built.
+
+A page of `docs/reference` holds a heading, a word to the reader and a line such as
+``<!-- made when built: configuration -->``; that line is replaced as the page is read. Nothing of
+it is kept in the repository, so that nothing of it can be out of date.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from sphinx.application import Sphinx
+
+from padwatch_reference.commands import commands_markdown
+from padwatch_reference.configuration import import_markdown, plant_markdown
+
+MADE: Mapping[str, Callable[[], str]] = {
+    "configuration": plant_markdown,
+    "import mapping": import_markdown,
+    "commands": commands_markdown,
+}
+
+
+def filled(page: str) -> str:
+    """Fill a page's places with what they stand for."""
+    for name, make in MADE.items():
+        place = f"<!-- made when built: {name} -->"
+        if place in page:
+            page = page.replace(place, make())
+    return page
+
+
+def _fill(_app: Sphinx, _name: str, source: list[str]) -> None:
+    source[0] = filled(source[0])
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Fill the places while Sphinx reads the pages."""
+    app.connect("source-read", _fill)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

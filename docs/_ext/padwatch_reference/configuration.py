@@ -1,0 +1,96 @@
+"""The reference of settings: every table, every key, from the models that check them."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from padwatch_reference.examples import Examples, examples
+from padwatch_reference.schema import ROOT, Node, Table, submodels, tables
+from padwatch_reference.words import code, literal, type_words
+from service.settings.import_mapping import ImportMapping
+from service.settings.schema import plant_file_schema
+
+HEAD = "| Key | Meaning | Type and limits | Default | Example |\n|---|---|---|---|---|"
+
+
+def plant_markdown() -> str:
+    """Every key of a plant file."""
+    return schema_markdown(plant_file_schema())
+
+
+def import_markdown() -> str:
+    """Every key of a mapping file for imports."""
+    return schema_markdown(ImportMapping.model_json_schema())
+
+
+def schema_markdown(schema: Node) -> str:
+    """Write a chapter for each table of a schema."""
+    shown = examples(schema)
+    return "\n\n".join(_chapter(schema, table, shown) for table in tables(schema)) + "\n"
+
+
+def _chapter(schema: Node, table: Table, shown: Examples) -> str:
+    first, *others = table.headers
+    heading = "Top level" if first == ROOT else f"`{first}`"
+    rows = "\n".join(_rows(schema, table, shown))
+    also = "Also at " + ", ".join(f"`{header}`" for header in others) + "." if others else ""
+    parts = (f"({table.anchor})=\n## {heading}", _line(table.node), also, f"{HEAD}\n{rows}")
+    return "\n\n".join(part for part in parts if part)
+
+
+def _rows(schema: Node, table: Table, shown: Examples) -> Iterator[str]:
+    required = table.node.get("required", ())
+    for key, node in table.node["properties"].items():
+        cells = (
+            code(key),
+            _line(node).replace("|", "\\|"),
+            _type(schema, node),
+            "required" if key in required else _default(schema, node),
+            _example(schema, table.model, key, node, shown),
+        )
+        yield "| " + " | ".join(cells) + " |"
+
+
+def _line(node: Node) -> str:
+    text = " ".join(str(node.get("description", "")).split())
+    return text.replace("<", "&lt;").replace("*", "\\*")
+
+
+def _type(schema: Node, node: Node) -> str:
+    links = [
+        f"[{'tables' if is_list else 'table'} of {_name(schema, model)}](#table-{model.lower()})"
+        for model, is_list in submodels(schema, node)
+    ]
+    return " or ".join([words for words in (type_words(schema, node),) if words] + links)
+
+
+def _name(schema: Node, model: str) -> str:
+    kind = schema["$defs"][model]["properties"].get("kind", {}).get("const")
+    return f"kind {kind}" if kind else "these keys"
+
+
+def _default(schema: Node, node: Node) -> str:
+    value = node.get("default")
+    if value is None:
+        return "not set"
+    if list(submodels(schema, node)):
+        return "the defaults there" if value else "none"
+    return code(literal(value))
+
+
+def _example(schema: Node, model: str, key: str, node: Node, shown: Examples) -> str:
+    """An example; those that the meaning gives are not repeated."""
+    if "xample" in str(node.get("description", "")):
+        return "see meaning"
+    if list(submodels(schema, node)):
+        return "see there"
+    value: Any = shown.get((model, key), node.get("const", node.get("default")))
+    if value is None:
+        value = next(_choices(schema, node), None)
+    return "" if value is None else code(literal(value))
+
+
+def _choices(schema: Node, node: Node) -> Iterator[Any]:
+    for option in (node, *node.get("anyOf", ())):
+        if "$ref" in option:
+            option = schema["$defs"][str(option["$ref"]).rsplit("/", 1)[-1]]
+        yield from option.get("enum", ())

@@ -1,0 +1,86 @@
+"""Command lines in the documentation are ones that padwatch takes."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from service.cli.main import app
+
+FENCE = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"`(?:\.venv/bin/)?padwatch ([a-z][^`]*)`")
+ENDS = (">", "|", "&&", ";", "2>")
+HARMLESS = (["config", "example"], ["config", "schema"], ["validate"])
+
+
+def lines(text: str) -> Iterator[list[str]]:
+    """Arguments of every `padwatch` line in the shell examples of a page."""
+    for fence in FENCE.findall(text):
+        for line in fence.replace("\\\n", " ").splitlines():
+            if re.match(r"(\.venv/bin/)?padwatch ", line):
+                words = shlex.split(line, comments=True)
+                stop = next((n for n, word in enumerate(words) if word in ENDS), len(words))
+                yield words[1:stop]
+
+
+def parsed(arguments: list[str]) -> None:
+    """Parse as the command line would, up to the files that are not there."""
+    command: Any = typer.main.get_command(app)
+    context = None
+    while hasattr(command, "commands"):
+        name, *arguments = arguments
+        assert name in command.commands, f"no such command as {name}"
+        context = command.context_class(command, info_name=name, parent=context)
+        command = command.commands[name]
+    try:
+        command.make_context(name, list(arguments), parent=context)
+    except Exception as refusal:
+        if "does not exist" not in str(refusal):
+            raise AssertionError(f"{name} {arguments}: {refusal}") from refusal
+
+
+def test_command_lines_in_examples_are_taken(page: Path) -> None:
+    for arguments in lines(page.read_text(encoding="utf-8")):
+        parsed(arguments)
+
+
+def test_commands_named_in_sentences_exist(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    for words in INLINE.findall(text):
+        command: Any = typer.main.get_command(app)
+        for word in words.split():
+            if not hasattr(command, "commands"):
+                break
+            for name in word.split("|"):
+                assert name in command.commands, f"padwatch {words}: no such command as {name}"
+            command = command.commands[word.split("|")[0]]
+        known = {option for each in getattr(command, "params", ()) for option in each.opts}
+        for option in re.findall(r"--[a-z-]+", words):
+            assert option in {*known, "--help"}, f"padwatch {words}: no such option as {option}"
+
+
+def test_a_line_that_padwatch_does_not_take_would_be_noticed() -> None:
+    wrong = "```sh\npadwatch run plant.toml --prot 80 > log\n```\n"
+    with pytest.raises(AssertionError, match="--prot"):
+        [parsed(arguments) for arguments in lines(wrong)]
+    with pytest.raises(AssertionError, match="no such command as rnu"):
+        parsed(["rnu", "plant.toml"])
+
+
+@pytest.mark.parametrize("arguments", HARMLESS, ids=" ".join)
+def test_commands_that_only_print_print(arguments: list[str]) -> None:
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0
+    assert result.output
+
+
+def test_the_first_steps_of_the_readme_lead_to_a_plant_file_that_is_fine(tmp_path: Path) -> None:
+    plant = tmp_path / "plant.toml"
+    plant.write_text(CliRunner().invoke(app, ["config", "example"]).output, encoding="utf-8")
+    checked = CliRunner().invoke(app, ["config", "check", str(plant)])
+    assert (checked.exit_code, "is fine" in checked.output) == (0, True), checked.output
