@@ -1,13 +1,15 @@
 """Metrics of results, alarms and films: what is known of the plant, as counts."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from prometheus_client.metrics_core import Metric
 
-from core.alarms.alarm import PLANT, AlarmLevel, AlarmState
+from core.alarms.alarm import PLANT, Alarm, AlarmLevel, AlarmState
 from core.decision.verdict import Verdict
+from core.films.film_judge import FilmNews
 from core.quality import Level
+from service.alarms.engine import AlarmEngine
 from service.metrics.families import Rows, gauge, histogram
 from service.metrics.watched import Watched
 
@@ -46,14 +48,14 @@ def result_metrics(watched: Watched) -> Iterator[Metric]:
     )
 
 
-def alarm_metrics(watched: Watched) -> Iterator[Metric]:
+def alarm_metrics(alarms: AlarmEngine, units: Iterable[str]) -> Iterator[Metric]:
     """Alarms on the list, as the dashboard counts them."""
-    count = watched.alarms.count()
+    count = alarms.count()
     yield gauge(
         "alarms_active",
         "Active alarms that are not hidden, by priority; unit `plant` is the service itself.",
         ("unit", "priority"),
-        _active(watched),
+        _active(alarms.alarms, list(units)),
     )
     numbers = (
         ("alarms_unacknowledged", "Alarms that nobody has acknowledged.", count.n_unacknowledged),
@@ -64,13 +66,21 @@ def alarm_metrics(watched: Watched) -> Iterator[Metric]:
         yield gauge(name, meaning, (), [((), number)])
 
 
-def film_metrics(watched: Watched) -> Iterator[Metric]:
-    """What was said of films last, by word."""
+def film_metrics(
+    newest: Callable[[str, str], FilmNews | None], bearings: Mapping[str, Sequence[str]]
+) -> Iterator[Metric]:
+    """What was said of films last, by word.
+
+    Parameters
+    ----------
+    newest
+        Of a unit's bearing; None before its first reading.
+    """
     found = Counter(
         (unit, finding.verdict)
-        for unit, bearings in watched.bearings.items()
-        for bearing in bearings
-        if (news := watched.films.newest(unit, bearing)) is not None
+        for unit, its in bearings.items()
+        for bearing in its
+        if (news := newest(unit, bearing)) is not None
         for finding in news.findings
     )
     yield gauge(
@@ -79,19 +89,19 @@ def film_metrics(watched: Watched) -> Iterator[Metric]:
         ("unit", "verdict"),
         (
             ((unit, verdict.name.lower()), found[unit, verdict])
-            for unit in watched.bearings
+            for unit in bearings
             for verdict in Verdict
         ),
     )
 
 
-def _active(watched: Watched) -> Rows:
+def _active(alarms: Iterable[Alarm], units: Sequence[str]) -> Rows:
     """Those of units that are in the plant file no longer count for the plant."""
     found: Counter[tuple[str, AlarmLevel]] = Counter()
-    for alarm in watched.alarms.alarms:
+    for alarm in alarms:
         if alarm.level is not None and alarm.state not in HIDDEN:
             unit = alarm.identity.unit
-            found[unit if unit in watched.bearings else PLANT, alarm.level] += 1
-    for unit in (*watched.bearings, PLANT):
+            found[unit if unit in units else PLANT, alarm.level] += 1
+    for unit in (*units, PLANT):
         for level in AlarmLevel:
             yield (unit, level.name.lower()), found[unit, level]

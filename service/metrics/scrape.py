@@ -46,10 +46,12 @@ class Scrape:
             [((version("padwatch"), platform.python_version()), 1)],
         )
         for metrics in (
-            *(sample_metrics, link_metrics, queue_metrics, result_metrics, alarm_metrics),
-            *(film_metrics, store_metrics, evidence_metrics),
+            *(sample_metrics, link_metrics, queue_metrics, result_metrics),
+            *(store_metrics, evidence_metrics),
         ):
             yield from metrics(watched)
+        yield from alarm_metrics(watched.alarms, watched.bearings)
+        yield from film_metrics(watched.films.newest, watched.bearings)
         yield from delivery_metrics(self.receivers, watched.clock.now_ns())
         yield from ProcessCollector(registry=None).collect()
 

@@ -1,0 +1,134 @@
+"""Alarms, films and deliveries are counted under the right words."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+from prometheus_client import Metric
+
+from core.alarms.operation import Shelve
+from core.alarms.rules import UnitRules
+from core.alarms.unit_alarms import UnitAlarms
+from core.decision.verdict import Verdict
+from core.films.film_finding import FilmFinding
+from core.films.film_judge import FilmNews
+from core.machine import Bearing, Channel, Measurand, Unit
+from service.alarms.engine import AlarmEngine
+from service.delivery.deliveries import ReceiverView
+from service.delivery.sender import Receiver, SenderStatus
+from service.metrics.judged import alarm_metrics, film_metrics
+from service.metrics.told import delivery_metrics
+from service.store.outbox_port import Backlog
+
+HOUR_NS = 3_600_000_000_000
+NOW_NS = 1_000 * HOUR_NS
+
+
+class SetClock:
+    def __init__(self) -> None:
+        self.ns = NOW_NS
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def monotonic_s(self) -> float:
+        return self.ns / 1e9
+
+    async def sleep(self, duration_s: float) -> None:
+        self.ns += round(duration_s * 1e9)
+
+
+def of(metrics: Iterable[Metric], name: str) -> dict[tuple[str, ...], float]:
+    """What is not zero, by values of labels."""
+    return {
+        tuple(sample.labels.values()): sample.value
+        for family in metrics
+        for sample in family.samples
+        if sample.name == f"padwatch_{name}" and sample.value
+    }
+
+
+def unit_named(name: str) -> Unit:
+    channels = tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in ("sx", "sy", "bx", "by"))
+    bearing = Bearing("UJB", 1.18e9, "sx", "sy", "bx", "by", 200.0, (2000.0, 2000.0))
+    return Unit(name, 60.0, 100.0, channels, (bearing,))
+
+
+def test_an_alarm_counts_while_it_is_active_and_not_hidden() -> None:
+    clock = SetClock()
+    boards = {name: UnitAlarms(unit_named(name), UnitRules()) for name in ("U1", "U2", "U9")}
+    engine = AlarmEngine(boards, lambda _: None, clock)
+    units = ("U1", "U2")  # U9 is in the plant file no longer
+
+    assert of(alarm_metrics(engine, units), "alarms_active") == {}
+
+    for name in ("U1", "U9"):
+        engine.link(name, is_connected=False, reason="nobody answers")
+    clock.ns += 60 * 1_000_000_000
+    engine.tick()
+    found = of(alarm_metrics(engine, units), "alarms_active")
+    assert found == {("U1", "alert"): 1.0, ("plant", "alert"): 1.0}
+    assert of(alarm_metrics(engine, units), "alarms_unacknowledged") == {(): 2.0}
+
+    engine.operate("U1:link:link_lost", Shelve("Ada", "new switch", clock.ns + HOUR_NS))
+    found = of(alarm_metrics(engine, units), "alarms_active")
+    assert found == {("plant", "alert"): 1.0}
+    assert of(alarm_metrics(engine, units), "alarms_hidden") == {(): 1.0}
+
+
+def test_films_count_under_the_word_that_was_said_last() -> None:
+    def said(*verdicts: Verdict) -> FilmNews:
+        x, y = (FilmFinding(verdict) for verdict in verdicts)
+        reading: Any = None
+        decisions: Any = ()
+        return FilmNews(reading, (x, y), decisions)
+
+    newest = {
+        ("U1", "UJB"): said(Verdict.NORMAL, Verdict.DANGER),
+        ("U1", "LJB"): said(Verdict.NORMAL, Verdict.NO_BASELINE),
+    }
+    bearings = {"U1": ["UJB", "LJB"], "U2": ["UJB"]}
+
+    found = list(film_metrics(lambda unit, bearing: newest.get((unit, bearing)), bearings))
+
+    assert of(found, "films") == {
+        ("U1", "normal"): 2.0,
+        ("U1", "danger"): 1.0,
+        ("U1", "no_baseline"): 1.0,
+    }
+    assert len(found[0].samples) == len(bearings) * len(Verdict)  # every word, from the start on
+
+
+@pytest.fixture
+def views() -> list[ReceiverView]:
+    """Two recipients of one mail, and a webhook that is in the plant file no longer."""
+    carrier: Any = None
+
+    def view(name: str, n_waiting: int, hours: int | None, n_dead: int) -> ReceiverView:
+        oldest_ns = None if hours is None else NOW_NS - hours * HOUR_NS
+        return ReceiverView(
+            name,
+            Receiver(name, "smtp", "somebody@plant.example", carrier),
+            SenderStatus(n_failures=n_waiting),
+            Backlog(name, n_waiting, oldest_ns, n_dead, None, None),
+        )
+
+    gone = ReceiverView("old-hook", None, None, Backlog("old-hook", 9, 0, 9, None, None))
+    return [view("shift:a@plant.example", 2, 3, 1), view("shift:b@plant.example", 0, None, 4), gone]
+
+
+def test_recipients_of_one_mail_are_added_up_and_never_named(views: list[ReceiverView]) -> None:
+    found = list(delivery_metrics(views, NOW_NS))
+
+    assert of(found, "delivery_waiting_messages") == {("shift",): 2.0}
+    assert of(found, "delivery_dead_messages") == {("shift",): 5.0}
+    assert of(found, "delivery_failed_attempts") == {("shift",): 2.0}
+    assert of(found, "delivery_wait_seconds") == {("shift",): 3 * 3600.0}
+    assert "@" not in str(found)
+
+
+def test_of_an_outbox_that_cannot_be_read_no_zero_is_told() -> None:
+    found = list(delivery_metrics(None, NOW_NS))
+
+    assert [sample.value for family in found for sample in family.samples] == [0.0]
+    assert found[0].name == "padwatch_outbox_readable"
