@@ -1,10 +1,11 @@
 """What tests of every package share: a plant of numbers, a clock, results, readings of films."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+import structlog
 from scipy.signal import lfilter
 
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
@@ -19,6 +20,13 @@ from core.stiffness_history import StiffnessHistory
 
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
+
+
+@pytest.fixture(autouse=True)
+def _logging_as_it_was() -> Iterator[None]:
+    """A command that was run within a test leaves a log behind whose stream is closed."""
+    yield
+    structlog.reset_defaults()
 
 
 class CountingFeed:
