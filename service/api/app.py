@@ -24,6 +24,7 @@ from service.api.problems import (
     install_problem_handlers,
     refuse_unknown_parameters,
 )
+from service.api.recording_routes import recording_router
 from service.api.reference_routes import reference_router
 from service.api.source_routes import source_router
 from service.api.trend_routes import trend_router
@@ -70,6 +71,7 @@ def create_app(context: Context) -> FastAPI:
         order1_reference_router(context),
         operation_router(context),
         evidence_router(context),
+        recording_router(context),
         delivery_router(context),
         alarm_by_id_router(context),
     ):

@@ -1,9 +1,8 @@
 """The film of a bearing: what is said of it now, and its readings with their conditions."""
 
-import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Depends, Query, Response
 
 from service.api.bearing_routes import TimeRange, eccentricity_range, oil_temperature_range
 from service.api.context import BearingId, Context, UnitId
@@ -11,8 +10,11 @@ from service.api.film_conditions import states_named
 from service.api.film_models import FilmModel, OperatingStateName
 from service.api.film_series_models import FilmReadingsModel
 from service.api.film_series_views import film_readings_model, rows_shown
+from service.api.film_tables import film_table
 from service.api.film_views import film_model, why_unwatched
 from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.rendering import rendered, worked
+from service.api.tables import Column, Format, table_content, table_response
 from service.films.learning import FilmPlace
 from service.store.film_port import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
@@ -51,11 +53,17 @@ def film_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         return film_model(context, unit, bearing)
 
-    @router.get("/readings", summary="Readings of a film", responses=READING_PROBLEMS)
+    @router.get(
+        "/readings",
+        summary="Readings of a film",
+        response_model=FilmReadingsModel,
+        responses={**READING_PROBLEMS, **table_content("Readings, by column")},
+    )
     async def readings(
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
+        wanted: Format,
         eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
         oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
         state: States = None,
@@ -70,8 +78,11 @@ def film_router(context: Context) -> APIRouter:
                 " the page before."
             ),
         ] = True,
-    ) -> FilmReadingsModel:
-        """Stiffness with the conditions that it was read under, by column, oldest first."""
+    ) -> Response:
+        """Stiffness with the conditions that it was read under, by column, oldest first.
+
+        As CSV or Parquet, too: a row for each reading.
+        """
         place = watched_place(context, unit, bearing)
         query = FilmQuery(
             unit=unit,
@@ -84,8 +95,18 @@ def film_router(context: Context) -> APIRouter:
             oil_temperature_c=oil_temperature,
             newest=MAX_READ + 1,
         )
-        found = await asyncio.to_thread(_history, context, query)
-        return film_readings_model(query, found, rows_shown(len(found), max_points, thin))
+
+        def read() -> tuple[FilmReadingsModel, FilmHistory, list[int]]:
+            found = _history(context, query)
+            rows = rows_shown(len(found), max_points, thin)
+            return film_readings_model(query, found, rows), found, rows.tolist()
+
+        def read_columns() -> list[Column]:
+            return film_table(*read())
+
+        if wanted == "json":
+            return await rendered(lambda: read()[0])
+        return table_response(wanted, await worked(read_columns), f"film-{unit}-{bearing}")
 
     return router
 

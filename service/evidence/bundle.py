@@ -61,7 +61,7 @@ def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
     OSError
         If a file cannot be read.
     """
-    sink = _Sink()
+    sink = Sink()
     with ExitStack() as opened:
         streams = {name: opened.enter_context(_open(each)) for name, each in files.items()}
         with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -80,17 +80,19 @@ def _open(each: Path | bytes) -> BinaryIO:
     return BytesIO(each) if isinstance(each, bytes) else each.open("rb")
 
 
-class _Sink(RawIOBase):
-    """Collects what the ZIP file is made of; it is never sought in."""
+class Sink(RawIOBase):
+    """Collects what a file is made of; it is never sought in."""
 
     def __init__(self) -> None:
         super().__init__()
         self._pieces: list[bytes] = []
 
     def writable(self) -> bool:
+        """Whether it can be written to: yes."""
         return True
 
     def write(self, piece: object) -> int:
+        """Take a piece."""
         content = bytes(piece)  # type: ignore[call-overload]
         self._pieces.append(content)
         return len(content)

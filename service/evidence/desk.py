@@ -102,7 +102,18 @@ class EvidenceDesk:
             raise TooManyDownloadsError(f"{MAX_DOWNLOADS} bundles are on their way")
         page = await self.report(found)
         files = await self._worked(lambda: bundle_files(self.archive, found, page))
-        pieces = zipped(files)
+        return await self.download(zipped(files))
+
+    async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
+        """What is made piece by piece in threads, a little at once, as fast as it is taken.
+
+        Raises
+        ------
+        TooManyDownloadsError
+            If too many are on their way; and what making the first piece raises.
+        """
+        if self._n_downloads >= MAX_DOWNLOADS:
+            raise TooManyDownloadsError(f"{MAX_DOWNLOADS} bundles are on their way")
         first = await self._worked(lambda: next(pieces, b""))  # now all files are open
         return self._sent(first, pieces)
 

@@ -1,5 +1,6 @@
 """CSV and Parquet: a row for each sample."""
 
+from io import RawIOBase
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 class CsvExporter:
     """Headings have the unit in brackets; none can be taken for a formula by a spreadsheet."""
 
-    def __init__(self, path: Path, manifest: Manifest) -> None:
+    def __init__(self, path: Path | RawIOBase, manifest: Manifest) -> None:
         time = pa.field("time_utc", pa.timestamp("us", tz="UTC"))
         headings = [_harmless(f"{id_} [{unit}]") for id_, unit in _columns(manifest)]
         self._schema = _schema(manifest, time, headings)

@@ -21,7 +21,7 @@ async def test_the_description_is_served(service: Any) -> None:
 
 
 def test_every_operation_is_explained(operations: list[tuple[str, dict[str, Any]]]) -> None:
-    assert len(operations) == 49
+    assert len(operations) == 53
     for name, operation in operations:
         assert operation["summary"], name
         assert len(operation["description"]) > 20, name
@@ -53,6 +53,8 @@ def test_every_error_is_documented_as_a_problem(
         "GET /api/v1/units/{unit}/bearings/{bearing}/trends": {"404", "422", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/shaft-centre": {"404", "422", "503"},
         "GET /api/v1/configuration": {"404"},
+        "GET /api/v1/recordings": {"404", "422"},
+        "GET /api/v1/recordings/{recording}": {"404", "422", "500", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/references": {"404", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/film/readings": {"404", "409", "422", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/baselines": {"404", "503"},

@@ -1,8 +1,11 @@
 """Readings of films over HTTP: what was stored, with the conditions, thinned or page by page."""
 
+import csv
+import io
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from core.stiffness_history import StiffnessHistory
@@ -104,3 +107,22 @@ async def test_readings_of_a_film_that_is_not_watched_are_refused_with_the_reaso
 
     assert "rated_power_mw" in found["detail"]
     assert "XJB" in unknown["detail"]
+
+
+async def test_readings_of_a_film_are_the_same_numbers_as_a_file(
+    service: Any, lived: StiffnessHistory
+) -> None:
+    asked = {**ALL, "end": rfc3339(int(lived.time_ns[0]) + DAY_NS)}
+    found = await service.json(READINGS, **asked)
+
+    text = (await service.get(READINGS, **asked, format="csv")).text
+    file = (await service.get(READINGS, **asked, format="parquet")).content
+
+    rows, table = list(csv.DictReader(io.StringIO(text))), pq.read_table(io.BytesIO(file))
+    assert len(rows) == table.num_rows == found["n_found"]
+    k = [float(row["x_stiffness_n_per_m [N/m]"] or "nan") for row in rows]
+    assert [None if np.isnan(value) else value for value in k] == found["x"]["stiffness_n_per_m"]
+    assert table["y_shaft_um_pk"].to_pylist() == found["y"]["shaft_um_pk"]
+    assert {row["provenance"] for row in rows} == {"simulated"}
+    assert rows[0]["time_utc"] == rfc3339(int(lived.time_ns[0]))
+    assert [float(row["oil_temperature_c [°C]"]) for row in rows] == found["oil_temperature_c"]

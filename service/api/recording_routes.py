@@ -1,0 +1,159 @@
+"""Recordings of samples around alarms: listed, described, and to take away."""
+
+from collections.abc import Callable, Generator
+from typing import Annotated, Any
+
+import structlog
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.responses import StreamingResponse
+
+from acquisition.errors import ConfigError
+from service.api.context import Context
+from service.api.problems import ProblemError, described_problems
+from service.api.recording_models import (
+    RecordingInfoModel,
+    RecordingsModel,
+    RunningRecordingModel,
+)
+from service.api.recording_views import recording_info, recording_model
+from service.api.rendering import rendered, worked
+from service.evidence.desk import EvidenceDesk, TooManyDownloadsError
+from service.recordings.shelf import Shelf
+
+RecordingId = Annotated[
+    str,
+    Path(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,119}$",
+        description="Name of a recording.",
+        examples=["U1-20261121T090312.400Z-shaft_x"],
+    ),
+]
+
+LIST_PROBLEMS = described_problems({404: "No recordings are kept here", 422: "A wrong parameter"})
+
+PROBLEMS = described_problems(
+    {
+        404: "Unknown recording",
+        422: "A wrong parameter",
+        500: "Damaged on the disk",
+        503: "Too many downloads are on their way",
+    }
+)
+
+Pieces = Generator[bytes, None, None]
+
+log = structlog.get_logger()
+
+
+def recording_router(context: Context) -> APIRouter:
+    """Routes about recordings; they change nothing."""
+    router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+
+    @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
+    async def recordings(
+        unit: Annotated[
+            str | None, Query(description="Only of this unit.", examples=["U1"])
+        ] = None,
+        limit: Annotated[int, Query(ge=1, le=500, description="Most recordings given.")] = 100,
+    ) -> RecordingsModel:
+        """The newest recordings of samples around alarms, and what is still being written."""
+        if unit is not None:
+            context.unit(unit)
+        found = await worked(lambda: _shelf(context).newest(limit, unit))
+        running = sorted(context.captures.being_made)
+        return RecordingsModel(
+            recordings=[recording_model(kept) for kept in found],
+            being_made=[RunningRecordingModel(alarm=a, occurrence=n) for a, n in running],
+            error=context.captures.trouble,
+        )
+
+    @router.get(
+        "/{recording}",
+        summary="One recording",
+        responses=PROBLEMS,
+        response_model=RecordingInfoModel,
+    )
+    async def one_recording(recording: RecordingId) -> Response:
+        """Channels, holes, refused samples and files of a recording, after checking all of it."""
+        shelf = _shelf(context)
+        kept = await worked(lambda: shelf.one(recording))
+        if kept is None:
+            raise _unknown(recording)
+        try:
+            return await rendered(lambda: recording_info(shelf, kept))
+        except ConfigError as error:
+            raise _damaged(recording, error) from error
+
+    @router.get(
+        "/{recording}/files.zip",
+        summary="The files of a recording",
+        response_class=StreamingResponse,
+        responses={**PROBLEMS, 200: _content("application/zip", "A ZIP file")},
+    )
+    async def files(recording: RecordingId) -> StreamingResponse:
+        """The recording as it lies on the disk: `padwatch recording` and `padwatch replay` read it.
+
+        Its checksums are in its manifest.
+        """
+        make = _shelf(context).zip_pieces
+        return await _download(context, recording, make, "application/zip", "zip")
+
+    @router.get(
+        "/{recording}/samples.csv",
+        summary="The samples of a recording",
+        response_class=StreamingResponse,
+        responses={**PROBLEMS, 200: _content("text/csv", "A CSV file")},
+    )
+    async def samples(recording: RecordingId) -> StreamingResponse:
+        """A row for each sample in engineering units, which are in the headings.
+
+        Like the files of `padwatch recording export`: where samples are missing there are no rows,
+        and where a channel was bad, its cells say nan.
+        """
+        make = _shelf(context).csv_pieces
+        return await _download(context, recording, make, "text/csv", "csv")
+
+    return router
+
+
+async def _download(
+    context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
+) -> StreamingResponse:
+    desk, shelf = _desk(context), _shelf(context)
+    if await worked(lambda: shelf.one(recording)) is None:
+        raise _unknown(recording)
+    try:
+        pieces = await desk.download(make(recording))
+    except TooManyDownloadsError as error:
+        raise ProblemError(503, "Busy", f"{error}; try again later") from error
+    except (ConfigError, OSError) as error:
+        raise _damaged(recording, error) from error
+    headers = {
+        "Content-Disposition": f'attachment; filename="{recording}.{suffix}"',
+        "X-Content-Type-Options": "nosniff",
+    }
+    return StreamingResponse(pieces, media_type=media_type, headers=headers)
+
+
+def _desk(context: Context) -> EvidenceDesk:
+    if context.evidence is None:
+        raise ProblemError(404, "No recordings", "no recordings are kept here")
+    return context.evidence
+
+
+def _shelf(context: Context) -> Shelf:
+    return Shelf(_desk(context).archive.folders.captures)
+
+
+def _unknown(recording: str) -> ProblemError:
+    return ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+
+
+def _damaged(recording: str, error: Exception) -> ProblemError:
+    log.error("a recording cannot be read", recording=recording, reason=str(error))
+    return ProblemError(500, "Damaged", f"recording {recording} cannot be read from the disk")
+
+
+def _content(media_type: str, words: str) -> dict[str, Any]:
+    schema = {"type": "string", "format": "binary"}
+    return {"description": words, "content": {media_type: {"schema": schema}}}

@@ -1,0 +1,1 @@
+"""Recordings of samples around alarms, as they lie on the disk."""

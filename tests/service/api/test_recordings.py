@@ -1,0 +1,193 @@
+"""What the API says of recordings, and hands out of them."""
+
+import csv
+import io
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.recording.manifest import RecordedChannel, RecordedUnit
+from acquisition.recording.reader import open_recording
+from acquisition.recording.writer import RecordingWriter
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.life_cycle import advance
+from core.blocks import SampleBlock
+from core.machine import Measurand
+from core.quality import GOOD, Reason, bad
+from service.capture.file import CaptureFile
+
+RECORDINGS = "/api/v1/recordings"
+START_NS = 1_767_225_600_000_000_000
+N = 10
+ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
+Keep = Callable[..., Path]
+
+
+def block(number: int, unit: str, lost: bool) -> SampleBlock:
+    """Channel a is the number of the sample."""
+    index = np.arange(number * N, (number + 1) * N, dtype=np.float32)
+    return SampleBlock(
+        unit=unit,
+        epoch=1,
+        first_index=number * N,
+        start_ns=START_NS + number * 200_000_000,
+        rate_hz=50.0,
+        samples=np.array([index, -index]),
+        channel_quality=(bad(Reason.SENSOR_FAILURE) if lost else GOOD, GOOD),
+    )
+
+
+def recorded_unit(unit: str) -> RecordedUnit:
+    limits = {"full_scale_v": 10.0, "unit_per_v": 1e7, "ok_min_v": -10.0, "ok_max_v": 10.0}
+    channels = tuple(
+        RecordedChannel(id=id_, measurand=Measurand.DISPLACEMENT_UM, **limits) for id_ in "ab"
+    )
+    return RecordedUnit(
+        unit=unit,
+        rate_hz=50.0,
+        channels=channels,
+        slow_channels=(),
+        sample_type="float32",
+        block_samples=N,
+    )
+
+
+@pytest.fixture
+def keep(tmp_path: Path) -> Keep:
+    """Puts a recording of some blocks where captures are; the fourth block is missing."""
+
+    def make(at_s: int, unit: str = "U1", lost: bool = False) -> Path:
+        alarm = Alarm(AlarmIdentity(unit, "UJB", AlarmKind.SHAFT_X))
+        _, events = advance(alarm, ALERT, START_NS + at_s * 1_000_000_000, AlarmRule())
+
+        def writer(folder: Path, made_by: str) -> RecordingWriter:
+            return RecordingWriter(folder, recorded_unit(unit), made_by)
+
+        file = CaptureFile(tmp_path / "captures", events[0], writer)
+        file.write([block(n, unit, lost and n == 1) for n in (0, 1, 2, 4)])
+        file.finish(events)
+        assert file.finished is not None
+        return file.finished
+
+    return make
+
+
+async def test_recordings_are_listed_with_what_they_are_for(service: Any, keep: Keep) -> None:
+    first, second = keep(10).name, keep(20, "U2").name
+
+    body = await service.json(RECORDINGS)
+    of_one = await service.json(RECORDINGS, unit="U1")
+
+    assert {each["id"] for each in body["recordings"]} == {first, second}
+    assert (body["being_made"], body["error"]) == ([], None)
+    [one] = of_one["recordings"]
+    assert (one["id"], one["state"], one["unit"]) == (first, "complete", "U1")
+    assert (one["n_samples"], one["rate_hz"], one["duration_s"]) == (40, 50.0, 0.8)
+    assert one["start"].startswith("2026-01-01T00:00:00.000")
+    assert one["alarms"] == [
+        {
+            "alarm": f"U1:UJB:{AlarmKind.SHAFT_X.value}",
+            "occurrence": 1,
+            "change": "raised",
+            "level": "alert",
+            "time": "2026-01-01T00:00:10.000Z",
+        }
+    ]
+    assert len((await service.json(RECORDINGS, limit=1))["recordings"]) == 1
+    await service.problem(RECORDINGS, 404, unit="U9")
+
+
+async def test_a_recording_is_described_with_its_holes_and_checksums(
+    service: Any, keep: Keep
+) -> None:
+    folder = keep(10, lost=True)
+
+    body = await service.json(f"{RECORDINGS}/{folder.name}")
+
+    manifest = open_recording(folder).manifest
+    assert body["recording"]["id"] == folder.name
+    assert (body["n_gaps"], body["n_gap_samples"], body["epochs"]) == (1, N, [1])
+    assert body["end"] == "2026-01-01T00:00:01.000Z"
+    assert [each["id"] for each in body["channels"]] == ["a", "b"]
+    assert {each["unit"] for each in body["channels"]} == {"um"}
+    assert body["files"] == {name: file.model_dump() for name, file in manifest.files.items()}
+
+
+async def test_the_files_of_a_recording_arrive_whole(
+    service: Any, keep: Keep, tmp_path: Path
+) -> None:
+    folder = keep(10)
+
+    response = await service.get(f"{RECORDINGS}/{folder.name}/files.zip")
+
+    assert response.headers["content-type"] == "application/zip"
+    with zipfile.ZipFile(io.BytesIO(response.content)) as archive:
+        archive.extractall(tmp_path / "taken")
+    taken = open_recording(tmp_path / "taken" / folder.name)
+    numbers = [int(value) for raw in taken.raw_blocks() for value in raw.counts[0]]
+    assert numbers == [*range(30), *range(40, 50)]
+
+
+async def test_the_samples_of_a_recording_come_as_csv_without_the_missing_ones(
+    service: Any, keep: Keep
+) -> None:
+    name = keep(10, lost=True).name
+
+    response = await service.get(f"{RECORDINGS}/{name}/samples.csv")
+
+    assert response.headers["content-disposition"] == f'attachment; filename="{name}.csv"'
+    rows = list(csv.DictReader(io.StringIO(response.text)))
+    assert [int(row["index"]) for row in rows] == [*range(30), *range(40, 50)]
+    assert [float(row["b [um]"]) for row in rows] == [-float(row["index"]) for row in rows]
+    lost = [row["index"] for row in rows if row["a [um]"] == "nan"]
+    assert lost == [str(index) for index in range(N, 2 * N)]
+
+
+async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(
+    service: Any, keep: Keep, tmp_path: Path
+) -> None:
+    whole, cut = keep(10), keep(20)
+    (cut / "manifest.json").write_text("{")
+    samples = whole / "samples.parquet"
+    samples.write_bytes(samples.read_bytes()[:-1] + b"x")
+
+    body = await service.json(RECORDINGS)
+
+    states = {each["id"]: each for each in body["recordings"]}
+    assert states[cut.name]["state"] == "damaged"
+    assert str(tmp_path) not in states[cut.name]["reason"]
+    for path in (f"{cut.name}", f"{whole.name}", f"{whole.name}/samples.csv"):
+        problem = await service.problem(f"{RECORDINGS}/{path}", 500)
+        assert str(tmp_path) not in problem["detail"]
+
+
+async def test_no_name_leads_out_of_the_folder_of_recordings(
+    service: Any, keep: Keep, tmp_path: Path
+) -> None:
+    folder = keep(10)
+    (tmp_path / "captures" / "link").symlink_to(tmp_path)
+    folder.with_name(f"{folder.name}-2.incomplete").mkdir()
+
+    names = (
+        "%2e%2e",
+        "..%2f..%2fpasswd",
+        "link",
+        "U1",
+        f"{folder.name}-2.incomplete",
+        "a" * 121,
+        "-x",
+    )
+    for name in names:
+        for what in ("", "/files.zip", "/samples.csv"):
+            response = await service.get(f"{RECORDINGS}/{name}{what}")
+            assert response.status_code in (404, 422), f"{name}{what}"
+    assert len((await service.json(RECORDINGS))["recordings"]) == 1
+
+
+async def test_without_any_recording_the_list_is_empty(service: Any) -> None:
+    assert (await service.json(RECORDINGS))["recordings"] == []
+    await service.problem(f"{RECORDINGS}/U1-20260101T000000.000Z-shaft_x", 404)
