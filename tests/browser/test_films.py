@@ -51,6 +51,15 @@ async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
     assert complaints == []
 
 
+async def test_a_trend_that_reaches_into_a_simulated_past_says_so(living_plant, page) -> None:
+    await page.goto(living_plant.url + BEARING)
+    await page.get_by_role("radio", name="30 d", exact=True).check()
+
+    caption = page.locator("[data-chart=stiffness-trend] figcaption")
+
+    await expect(caption).to_contain_text("are simulated, not measured", timeout=DATA_MS)
+
+
 async def test_an_engineer_freezes_a_baseline_and_thaws_it_without_a_mouse(
     living_plant, page
 ) -> None:

@@ -137,6 +137,12 @@ function column(points) {
   return { x: points.map((point) => point[0]), y: points.map((point) => point[1]) };
 }
 
+/** A sentence on what of a trend was simulated, not measured on the machine; empty if nothing was. */
+export function simulatedSentence(trends) {
+  if (trends.simulated_until == null) return "";
+  return ` Up to ${formatTime(Date.parse(trends.simulated_until))} the values are simulated, not measured.`;
+}
+
 /** Layout with the whole asked-for span on the time axis, however little of it has data. */
 export function trendLayout(trends, title, revision, rangemode) {
   const range = [trends.start, trends.end].map((time) => formatTime(Date.parse(time)));

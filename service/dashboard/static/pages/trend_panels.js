@@ -2,7 +2,7 @@
 
 import { NotReachable, ask } from "../api.js";
 import { panel } from "../charts/panel.js";
-import { doubtTrace, piecesOf, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
+import { doubtTrace, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
 import { element } from "../dom.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
@@ -109,7 +109,7 @@ async function showTrends(box, { trends, refreshS, span, scale, latest }, lines,
     trendTraces(all[index], name, label, letter, changes),
   );
   const layout = trendLayout(trends, title, `${span.value()} ${scale} ${title}`, scale);
-  await box.show([...traces, doubtTrace(all)], layout, trendCaption(all));
+  await box.show([...traces, doubtTrace(all)], layout, trendCaption(all) + simulatedSentence(trends));
 }
 
 /** Means of the shaft centre over the chosen span, oldest first; without gaps' empty buckets. */
