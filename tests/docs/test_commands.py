@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +15,29 @@ from service.cli.main import app
 
 FENCE = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`(?:\.venv/bin/)?padwatch ([a-z][^`]*)`")
+CALL = re.compile(r"(?:^|\| *)(?:\.venv/bin/)?padwatch .*")
 ENDS = (">", "|", "&&", ";", "2>")
 HARMLESS = (["config", "example"], ["config", "schema"], ["validate"])
+
+
+@cache
+def command_line() -> Any:
+    return typer.main.get_command(app)
 
 
 def lines(text: str) -> Iterator[list[str]]:
     """Arguments of every `padwatch` line in the shell examples of a page."""
     for fence in FENCE.findall(text):
         for line in fence.replace("\\\n", " ").splitlines():
-            if re.match(r"(\.venv/bin/)?padwatch ", line):
-                words = shlex.split(line, comments=True)
+            if found := CALL.search(line):
+                words = shlex.split(found[0].lstrip("| "), comments=True)
                 stop = next((n for n, word in enumerate(words) if word in ENDS), len(words))
                 yield words[1:stop]
 
 
 def parsed(arguments: list[str]) -> None:
     """Parse as the command line would, up to the files that are not there."""
-    command: Any = typer.main.get_command(app)
-    context = None
+    command, context = command_line(), None
     while hasattr(command, "commands"):
         name, *arguments = arguments
         assert name in command.commands, f"no such command as {name}"
@@ -52,7 +58,7 @@ def test_command_lines_in_examples_are_taken(page: Path) -> None:
 def test_commands_named_in_sentences_exist(page: Path) -> None:
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
     for words in INLINE.findall(text):
-        command: Any = typer.main.get_command(app)
+        command = command_line()
         for word in words.split():
             if not hasattr(command, "commands"):
                 break

@@ -1,6 +1,6 @@
 """The reference of settings: every table, every key, from the models that check them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from padwatch_reference.examples import Examples, examples
@@ -24,26 +24,27 @@ def import_markdown() -> str:
 
 def schema_markdown(schema: Node) -> str:
     """Write a chapter for each table of a schema."""
-    shown = examples(schema)
-    return "\n\n".join(_chapter(schema, table, shown) for table in tables(schema)) + "\n"
+    shown, found = examples(schema), tables(schema)
+    names = {table.model: table.headers[0] for table in found}
+    return "\n\n".join(_chapter(schema, table, shown, names) for table in found) + "\n"
 
 
-def _chapter(schema: Node, table: Table, shown: Examples) -> str:
+def _chapter(schema: Node, table: Table, shown: Examples, names: Mapping[str, str]) -> str:
     first, *others = table.headers
     heading = "Top level" if first == ROOT else f"`{first}`"
-    rows = "\n".join(_rows(schema, table, shown))
+    rows = "\n".join(_rows(schema, table, shown, names))
     also = "Also at " + ", ".join(f"`{header}`" for header in others) + "." if others else ""
     parts = (f"({table.anchor})=\n## {heading}", _line(table.node), also, f"{HEAD}\n{rows}")
     return "\n\n".join(part for part in parts if part)
 
 
-def _rows(schema: Node, table: Table, shown: Examples) -> Iterator[str]:
+def _rows(schema: Node, table: Table, shown: Examples, names: Mapping[str, str]) -> Iterator[str]:
     required = table.node.get("required", ())
     for key, node in table.node["properties"].items():
         cells = (
             code(key),
             _line(node).replace("|", "\\|"),
-            _type(schema, node),
+            _type(schema, node, names),
             "required" if key in required else _default(schema, node),
             _example(schema, table.model, key, node, shown),
         )
@@ -55,17 +56,9 @@ def _line(node: Node) -> str:
     return text.replace("<", "&lt;").replace("*", "\\*")
 
 
-def _type(schema: Node, node: Node) -> str:
-    links = [
-        f"[{'tables' if is_list else 'table'} of {_name(schema, model)}](#table-{model.lower()})"
-        for model, is_list in submodels(schema, node)
-    ]
+def _type(schema: Node, node: Node, names: Mapping[str, str]) -> str:
+    links = [f"[`{names[model]}`](#table-{model.lower()})" for model, _ in submodels(schema, node)]
     return " or ".join([words for words in (type_words(schema, node),) if words] + links)
-
-
-def _name(schema: Node, model: str) -> str:
-    kind = schema["$defs"][model]["properties"].get("kind", {}).get("const")
-    return f"kind {kind}" if kind else "these keys"
 
 
 def _default(schema: Node, node: Node) -> str:
