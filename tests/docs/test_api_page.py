@@ -108,6 +108,7 @@ async def test_every_line_on_the_page_about_the_api_works(address: str, tmp_path
     assert json.loads((tmp_path / "openapi.json").read_text())["info"]["title"] == "padwatch"
     assert json.loads((tmp_path / "evidence.json").read_text())["alarm"]["occurrence"] == 1
     assert "<html" in (tmp_path / "report.html").read_text()
+    assert "µm" in (tmp_path / "trend.csv").read_text(encoding="utf-8").splitlines()[0]
     async with httpx2.AsyncClient(base_url=address, trust_env=False) as client:
         assert (await client.get(ALARM)).json()["is_acknowledged"]
         events = (await client.get("/api/v1/alarms/events")).json()["events"]
