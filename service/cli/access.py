@@ -6,6 +6,9 @@ from datetime import UTC, datetime
 
 import typer
 
+from service.audit.acting import Acting, acting_as
+from service.audit.entry import Source
+from service.cli.made_by import made_by
 from service.cli.plant_file import fail
 from service.security.names import NameRefusedError
 from service.security.passwords import PasswordRefusedError
@@ -31,8 +34,9 @@ def access_of(plant: PlantFile, command: str, creates: bool = False) -> Iterator
         if not creates:
             fail(f"{command}: {path.absolute()}: there is no such database")
         typer.echo(f"{path.absolute()}: a new database; is that where the service runs?", err=True)
+    who = Acting(Source.COMMAND_LINE, made_by())
     try:
-        with closing(open_store(plant)) as store:
+        with acting_as(who), closing(open_store(plant)) as store:
             yield store.access
     except (AccessRefusedError, NameRefusedError, PasswordRefusedError) as error:
         fail(f"{command}: {error}", 2)

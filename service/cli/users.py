@@ -65,7 +65,7 @@ def list_users(
 def set_role(plant_file: PlantPath, name: Name, role: WantedRole) -> None:
     """Change the role of an account, from its next request on."""
     with access_of(read_plant_file(plant_file), "padwatch users role") as access:
-        access.accounts.set_role(account_name(name), role)
+        access.accounts.set_role(account_name(name), role, SystemClock().now_ns())
     typer.echo(f"{account_name(name)}: is {role}")
 
 
@@ -84,5 +84,5 @@ def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = No
 def remove(plant_file: PlantPath, name: Name) -> None:
     """Remove an account; whoever is logged in to it is logged out."""
     with access_of(read_plant_file(plant_file), "padwatch users remove") as access:
-        access.accounts.remove(account_name(name))
+        access.accounts.remove(account_name(name), SystemClock().now_ns())
     typer.echo(f"{account_name(name)}: removed")

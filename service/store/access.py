@@ -5,7 +5,9 @@ from typing import Any
 
 from service.security.keys import ApiKey
 from service.security.roles import Role
+from service.store.access_deeds import account_deed, key_deed
 from service.store.accounts import Connect, SqliteAccounts, SqliteSessions, insert_account
+from service.store.audit_chain import AuditChain
 
 SELECT_KEYS = """
     SELECT id, name, digest, role, units, created_ns, expires_ns, used_ns, revoked_ns FROM api_key
@@ -22,12 +24,12 @@ class SqliteKeys:
 
     Parameters
     ----------
-    write, read
+    write, read, audit
         As for `SqliteAccounts`.
     """
 
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
+        self._write, self._read, self._audit = write, read, audit
 
     def add(self, key: ApiKey) -> None:
         """Add a key."""
@@ -35,6 +37,7 @@ class SqliteKeys:
         made = (key.id, key.name, key.digest, key.role.value, units, key.created_ns, key.expires_ns)
         with self._write() as writer:
             writer.execute("INSERT INTO api_key VALUES (?, ?, ?, ?, ?, ?, ?, NULL, NULL)", made)
+            self._audit.add(writer, [key_deed("created", key.id, key.created_ns, key)])
 
     def get(self, id_: str) -> ApiKey | None:
         """Read a key; None if there is none with that id."""
@@ -56,7 +59,10 @@ class SqliteKeys:
         """Take a key back for ever; whether it was not taken back before."""
         revoke = "UPDATE api_key SET revoked_ns = ? WHERE id = ? AND revoked_ns IS NULL"
         with self._write() as writer:
-            return writer.execute(revoke, (now_ns, id_)).rowcount == 1
+            is_news = writer.execute(revoke, (now_ns, id_)).rowcount == 1
+            if is_news:
+                self._audit.add(writer, [key_deed("revoked", id_, now_ns)])
+        return is_news
 
 
 class SqliteSetUp:
@@ -64,12 +70,12 @@ class SqliteSetUp:
 
     Parameters
     ----------
-    write, read
+    write, read, audit
         As for `SqliteAccounts`.
     """
 
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
+        self._write, self._read, self._audit = write, read, audit
 
     def offer(self, digest: bytes, expires_ns: int) -> bool:
         """Put a token in the place of any before it; not if there is an account."""
@@ -91,7 +97,9 @@ class SqliteSetUp:
             if not writer.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0]:
                 return False
             writer.execute("DELETE FROM set_up_token")
-            return insert_account(writer, name, Role.ADMIN, password_hash, now_ns)
+            insert_account(writer, name, Role.ADMIN, password_hash, now_ns)
+            self._audit.add(writer, [account_deed("set_up", name, now_ns, after=Role.ADMIN)])
+        return True
 
 
 class SqliteAccess:
@@ -99,15 +107,15 @@ class SqliteAccess:
 
     Parameters
     ----------
-    write, read
+    write, read, audit
         As for `SqliteAccounts`.
     """
 
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self.accounts = SqliteAccounts(write, read)
+    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
+        self.accounts = SqliteAccounts(write, read, audit)
         self.sessions = SqliteSessions(write, read)
-        self.keys = SqliteKeys(write, read)
-        self.set_up = SqliteSetUp(write, read)
+        self.keys = SqliteKeys(write, read, audit)
+        self.set_up = SqliteSetUp(write, read, audit)
 
 
 def _key(row: tuple[Any, ...]) -> ApiKey:

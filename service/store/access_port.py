@@ -1,6 +1,6 @@
 """Accounts, sessions and keys as the rest of the service sees them.
 
-Each method that changes something is on the disk when it returns.
+Each method that changes something is on the disk when it returns, with what the audit trail tells.
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ class AccountStore(Protocol):
         """Read every account, by name."""
         ...
 
-    def set_role(self, name: str, role: Role) -> None:
+    def set_role(self, name: str, role: Role, now_ns: int) -> None:
         """Change a role. Raises `AccessRefusedError` if no admin would be left, or none such."""
         ...
 
@@ -65,7 +65,7 @@ class AccountStore(Protocol):
         """Write the same password's new hash, unless the password has changed meanwhile."""
         ...
 
-    def remove(self, name: str) -> None:
+    def remove(self, name: str, now_ns: int) -> None:
         """Remove an account with its sessions.
 
         Raises `AccessRefusedError` if there are others and no admin would be left, or none such.

@@ -7,7 +7,9 @@ from typing import Any
 
 from service.security.roles import Role
 from service.security.sessions import Session
+from service.store.access_deeds import account_deed
 from service.store.access_port import AccessRefusedError, Account
+from service.store.audit_chain import AuditChain
 
 Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
 
@@ -18,7 +20,6 @@ SELECT_ACCOUNTS = """
     SELECT name, role, password_hash, password_number, created_ns, password_ns FROM account
     WHERE :name IS NULL OR name = :name ORDER BY name
 """
-IS_ADMIN = "SELECT EXISTS (SELECT 1 FROM account WHERE role = 'admin' AND name = ?)"
 IS_OTHER_ADMIN = "SELECT EXISTS (SELECT 1 FROM account WHERE role = 'admin' AND name <> ?)"
 IS_OTHER = "SELECT EXISTS (SELECT 1 FROM account WHERE name <> ?)"
 INSERT_SESSION = """
@@ -43,16 +44,19 @@ class SqliteAccounts:
     ----------
     write, read
         A transaction of the database's one writer, and a short look at it; both raise `StoreError`.
+    audit
+        Told of each change in its own transaction.
     """
 
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
+        self._write, self._read, self._audit = write, read, audit
 
     def add(self, name: str, role: Role, password_hash: str, now_ns: int) -> None:
         """Add an account; refused if there is one of that name."""
         with self._write() as writer:
             if not insert_account(writer, name, role, password_hash, now_ns):
                 raise AccessRefusedError(f"there is an account {name} already")
+            self._audit.add(writer, [account_deed("added", name, now_ns, after=role)])
 
     def get(self, name: str) -> Account | None:
         """Read an account; None if there is none of that name."""
@@ -65,24 +69,26 @@ class SqliteAccounts:
         with self._read() as reader:
             return [_account(row) for row in reader.execute(SELECT_ACCOUNTS, {"name": None})]
 
-    def set_role(self, name: str, role: Role) -> None:
+    def set_role(self, name: str, role: Role, now_ns: int) -> None:
         """Change a role; refused if no admin would be left."""
         with self._write() as writer:
+            before = _role(writer, name)
             if role is not Role.ADMIN:
-                _require_other_admin(writer, name)
-            done = writer.execute("UPDATE account SET role = ? WHERE name = ?", (role.value, name))
-            _require_one(done, name)
+                _require_other_admin(writer, name, before)
+            writer.execute("UPDATE account SET role = ? WHERE name = ?", (role.value, name))
+            self._audit.add(writer, [account_deed("role_set", name, now_ns, before, role)])
 
     def set_password(self, name: str, password_hash: str, now_ns: int) -> None:
         """Change a password and end all sessions of the account."""
         with self._write() as writer:
-            done = writer.execute(
+            _role(writer, name)
+            writer.execute(
                 "UPDATE account SET password_hash = ?, password_number = password_number + 1,"
                 " password_ns = ? WHERE name = ?",
                 (password_hash, now_ns, name),
             )
-            _require_one(done, name)
             writer.execute("DELETE FROM session WHERE account = ?", (name,))
+            self._audit.add(writer, [account_deed("password_set", name, now_ns)])
 
     def rehash(self, account: Account, password_hash: str) -> None:
         """Write the same password's new hash, unless the password has changed meanwhile."""
@@ -93,12 +99,14 @@ class SqliteAccounts:
                 (password_hash, account.name, account.password_number, account.created_ns),
             )
 
-    def remove(self, name: str) -> None:
+    def remove(self, name: str, now_ns: int) -> None:
         """Remove an account with its sessions; refused if others would be left without admin."""
         with self._write() as writer:
+            role = _role(writer, name)
             if writer.execute(IS_OTHER, (name,)).fetchone()[0]:
-                _require_other_admin(writer, name)
-            _require_one(writer.execute("DELETE FROM account WHERE name = ?", (name,)), name)
+                _require_other_admin(writer, name, role)
+            writer.execute("DELETE FROM account WHERE name = ?", (name,))
+            self._audit.add(writer, [account_deed("removed", name, now_ns, before=role)])
 
 
 class SqliteSessions:
@@ -107,7 +115,7 @@ class SqliteSessions:
     Parameters
     ----------
     write, read
-        As for `SqliteAccounts`.
+        As for `SqliteAccounts`; logins are told of where they are asked for.
     """
 
     def __init__(self, write: Connect, read: Connect) -> None:
@@ -152,17 +160,18 @@ def insert_account(
     return writer.execute(insert, row).rowcount == 1
 
 
-def _require_other_admin(writer: sqlite3.Connection, name: str) -> None:
+def _require_other_admin(writer: sqlite3.Connection, name: str, role: Role) -> None:
     """Refuse what would leave no admin; an account that is no admin may change as it likes."""
-    if not writer.execute(IS_ADMIN, (name,)).fetchone()[0]:
-        return
-    if not writer.execute(IS_OTHER_ADMIN, (name,)).fetchone()[0]:
+    if role is Role.ADMIN and not writer.execute(IS_OTHER_ADMIN, (name,)).fetchone()[0]:
         raise AccessRefusedError(f"{name} is the only admin; make somebody else one first")
 
 
-def _require_one(done: sqlite3.Cursor, name: str) -> None:
-    if done.rowcount != 1:
+def _role(writer: sqlite3.Connection, name: str) -> Role:
+    """Role of an account that is about to be changed; refused if there is none such."""
+    row = writer.execute("SELECT role FROM account WHERE name = ?", (name,)).fetchone()
+    if row is None:
         raise AccessRefusedError(f"there is no account {name}")
+    return Role(row[0])
 
 
 def _account(row: tuple[Any, ...]) -> Account:

@@ -77,7 +77,7 @@ class SqliteStore:
         self.audit = SqliteAudit(self._writing, self._reader, self._chain)
         self.films = SqliteFilms(self._writing, self._reader, self._series_id, self._chain)
         self.order1_references = SqliteVectorReferences(self._writing, self._reader, self._chain)
-        self.access = SqliteAccess(self._writing, self._reader)
+        self.access = SqliteAccess(self._writing, self._reader, self._chain)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from service.cli.made_by import made_by
 from service.cli.main import app
 from service.security.backoff import Backoff
 from service.security.doors import Doors, LoggedIn, Refusal
@@ -18,6 +19,7 @@ from service.security.identity import Identity
 from service.security.passwords import Hashing
 from service.security.roles import Role
 from service.store.access_port import AccessStore
+from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 
 PASSWORD = "rotor rope gauge"  # noqa: S105
@@ -191,3 +193,19 @@ def test_a_key_that_cannot_be_is_not_made(
     assert found.exit_code == 2
     assert said in found.stderr
     assert len(json.loads(padwatch("keys", "list", "--json").stdout)) == 1
+
+
+def test_the_audit_trail_says_who_on_the_host_has_changed_an_account(
+    padwatch: Padwatch, plant_path: Path
+) -> None:
+    with closing(SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")) as store:
+        store.access.accounts.add("anna", Role.VIEWER, "a hash", NOW_NS)
+        padwatch("users", "role", "anna", "operator")
+        newest = store.audit.entries(AuditQuery(limit=1))[0]
+
+    assert (newest.action, newest.object, newest.source) == (
+        "account.role_set",
+        "anna",
+        "command_line",
+    )
+    assert newest.peer == made_by()

@@ -28,14 +28,31 @@ def test_a_few_wrong_passwords_are_free_and_then_each_doubles_the_wait() -> None
     assert waits[:5] == [1.0, 2.0, 4.0, 8.0, 16.0]
 
 
-@given(st.lists(st.floats(0.0, 5000.0), max_size=60))
-def test_no_account_waits_longer_than_its_limit_whatever_is_tried(pauses_s: list[float]) -> None:
-    backoff, now_ns = Backoff(), 0
-    for number, pause_s in enumerate(pauses_s):
-        now_ns += round(pause_s * S)
-        backoff.attempt("admin", f"10.0.{number}.1", now_ns)
-    assert backoff.attempt("admin", "192.0.2.1", now_ns) <= OF_ACCOUNT.longest_s
-    assert backoff.attempt("admin", "192.0.2.1", now_ns + round(OF_ACCOUNT.longest_s * S)) == 0.0
+def test_no_account_waits_longer_than_its_limit_however_often_strangers_fail() -> None:
+    backoff, now_ns, waits = Backoff(), 0, []
+    for number in range(200):
+        wait_s = backoff.attempt("admin", f"192.0.2.{number}", now_ns)
+        if wait_s:
+            waits.append(wait_s)
+            now_ns += round(wait_s * S)
+            assert backoff.attempt("admin", f"198.51.100.{number}", now_ns) == 0.0
+    assert waits[:8] == [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0, 60.0]
+    assert max(waits) == OF_ACCOUNT.longest_s
+
+
+def test_no_place_waits_longer_than_its_limit() -> None:
+    backoff, now_ns, waits = Backoff(), 0, []
+    for number in range(40):
+        wait_s = backoff.attempt(f"user{number}", HERE, now_ns)
+        waits.append(wait_s)
+        now_ns += round(wait_s * S)
+        backoff.attempt(f"user{number}", HERE, now_ns)
+    assert max(waits) == OF_PEER.longest_s
+
+
+@given(st.integers(0, 10_000))
+def test_waits_never_shrink_with_failures(n_failures: int) -> None:
+    assert OF_PEER.wait_ns(n_failures) <= OF_PEER.wait_ns(n_failures + 1)
 
 
 def test_asking_too_soon_makes_no_wait_longer() -> None:

@@ -174,7 +174,7 @@ def test_another_role_counts_from_the_next_request_on(
     doors: Doors, access: AccessStore, anna: str
 ) -> None:
     token = log_in(doors)
-    access.accounts.set_role(anna, Role.VIEWER)
+    access.accounts.set_role(anna, Role.VIEWER, T0)
     found = doors.person(token, T0)
     assert isinstance(found, Identity)
     assert found.role is Role.VIEWER
@@ -184,7 +184,7 @@ def test_removing_an_account_ends_its_logins_also_for_one_of_the_same_name(
     doors: Doors, people: People, access: AccessStore, anna: str
 ) -> None:
     token = log_in(doors)
-    access.accounts.remove(anna)
+    access.accounts.remove(anna, T0)
     people.add(anna, Role.ADMIN, PASSWORD, T0)
     assert doors.person(token, T0) is Refusal.UNKNOWN
 

@@ -58,14 +58,14 @@ def test_the_only_admin_stays_one_while_there_are_others(
     people.add("anna", Role.ADMIN, PASSWORD, T0)
     people.add("berta", Role.ENGINEER, PASSWORD, T0)
     for change in (
-        lambda: access.accounts.remove("anna"),
-        lambda: access.accounts.set_role("anna", Role.ENGINEER),
+        lambda: access.accounts.remove("anna", T0),
+        lambda: access.accounts.set_role("anna", Role.ENGINEER, T0),
     ):
         with pytest.raises(AccessRefusedError, match="anna is the only admin"):
             change()
-    access.accounts.set_role("berta", Role.ADMIN)
-    access.accounts.remove("anna")
-    access.accounts.remove("berta")  # the last of all may go
+    access.accounts.set_role("berta", Role.ADMIN, T0)
+    access.accounts.remove("anna", T0)
+    access.accounts.remove("berta", T0)  # the last of all may go
     assert access.accounts.all() == []
 
 
@@ -74,7 +74,7 @@ def test_of_two_admins_who_leave_at_once_one_stays(people: People, access: Acces
 
     def leave(name: str) -> bool:
         try:
-            access.accounts.remove(name)
+            access.accounts.remove(name, T0)
         except AccessRefusedError:
             return False
         return True
@@ -89,8 +89,8 @@ def test_of_two_admins_who_leave_at_once_one_stays(people: People, access: Acces
 
 def test_nobody_is_changed_who_is_not_there(people: People, access: AccessStore) -> None:
     for change in (
-        lambda: access.accounts.remove("nobody"),
-        lambda: access.accounts.set_role("nobody", Role.VIEWER),
+        lambda: access.accounts.remove("nobody", T0),
+        lambda: access.accounts.set_role("nobody", Role.VIEWER, T0),
         lambda: people.set_password("nobody", PASSWORD, T0),
     ):
         with pytest.raises(AccessRefusedError, match="there is no account nobody"):
@@ -107,6 +107,16 @@ def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
     found = doors.log_in("anna", PASSWORD, "::1", T0, 0)
     assert isinstance(found, LoggedIn)
     assert found.identity.role is Role.ADMIN
+
+
+def test_a_used_set_up_token_stays_void_when_its_account_is_gone(
+    people: People, access: AccessStore
+) -> None:
+    token = people.offer_set_up(T0)
+    assert token is not None
+    assert people.set_up(token, "anna", PASSWORD, T0)
+    access.accounts.remove("anna", T0)
+    assert not people.set_up(token, "berta", PASSWORD, T0)
 
 
 def test_no_set_up_token_is_drawn_once_there_is_an_account(people: People) -> None:
