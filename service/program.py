@@ -35,6 +35,7 @@ from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.supervision import Supervision
+from service.wiring.audit import ServiceTrail
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of, router_of
 from service.wiring.evidence import evidence_desk, evidence_of, watch
@@ -178,6 +179,8 @@ async def _run(
     runner = Runner(units, live, recorder, clock, alarms, films, bus, beats)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
+    audit = ServiceTrail(plant, performance.origin, store.audit, clock)
+    await audit.begin()
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -209,6 +212,7 @@ async def _run(
         origin=performance.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         loops=beats.look,
+        refusals=audit.refusals,
     )
     config = uvicorn.Config(
         create_app(context),
@@ -248,6 +252,7 @@ async def _run(
         await captures.close()
         await recorder.flush()  # also when a bug ends the program
         await evidence.close()
+        await audit.end()
 
 
 async def _learn(films: FilmKeeper, origin: Origin, beats: Heartbeats) -> None:

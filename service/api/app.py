@@ -6,6 +6,8 @@ from fastapi import Depends, FastAPI
 
 from service.api.alarm_rate_routes import alarm_rate_router
 from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
+from service.api.audit_routes import audit_router
+from service.api.audit_trail import AuditTrail
 from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.centre_routes import centre_router
@@ -28,6 +30,7 @@ from service.api.recording_routes import recording_router
 from service.api.reference_routes import reference_router
 from service.api.source_routes import source_router
 from service.api.trend_routes import trend_router
+from service.audit.refusals import Refusals
 from service.dashboard.routes import dashboard_router
 from service.metrics.routes import metrics_router
 
@@ -51,6 +54,8 @@ def create_app(context: Context) -> FastAPI:
         responses=any_other_problem(),
     )
     app.add_middleware(OriginHeader, origin=context.origin)
+    refusals = context.refusals or Refusals(context.store.audit, context.clock)
+    app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
     install_problem_handlers(app)
     for router in (
         health_router(context),
@@ -73,6 +78,7 @@ def create_app(context: Context) -> FastAPI:
         evidence_router(context),
         recording_router(context),
         delivery_router(context),
+        audit_router(context),
         alarm_by_id_router(context),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])

@@ -9,6 +9,7 @@ from fastapi import Path
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.api.problems import ProblemError
+from service.audit.refusals import Refusals
 from service.capture.captures import Captures
 from service.delivery.deliveries import Deliveries
 from service.evidence.desk import EvidenceDesk
@@ -43,6 +44,8 @@ class Context:
         What is told to Prometheus; None where nobody asks.
     loops
         What is wrong with each loop of the program; None where nothing is.
+    refusals
+        Takes refused requests; None for a taker of the application's own.
     """
 
     plant_name: str
@@ -62,6 +65,7 @@ class Context:
     evidence: EvidenceDesk | None = None
     metrics: Watched | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
+    refusals: Refusals | None = None
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

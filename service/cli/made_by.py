@@ -8,8 +8,13 @@ from importlib.metadata import version
 
 def made_by() -> str:
     """Program, person and host."""
+    return f"padwatch {version('padwatch')}, {person()}"[:200]
+
+
+def person() -> str:
+    """Person and host."""
     try:
-        person = getpass.getuser()
+        name = getpass.getuser()
     except (KeyError, OSError):  # a container's user need not have a name
-        person = f"user {os.getuid()}"
-    return f"padwatch {version('padwatch')}, {person} on {platform.node()}"[:200]
+        name = f"user {os.getuid()}"
+    return f"{name} on {platform.node()}"

@@ -6,7 +6,7 @@ import traceback
 
 import typer
 
-from service.cli import config, delivery, keys, probe, readings, recording, reference, users
+from service.cli import audit, config, delivery, keys, probe, readings, recording, reference, users
 from service.cli.backtest import backtest
 from service.cli.backup import backup, restore
 from service.cli.daq import daq
@@ -33,6 +33,7 @@ app.command()(backup)
 app.command()(restore)
 app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")
+app.add_typer(audit.app, name="audit")
 app.add_typer(recording.app, name="recording")
 app.add_typer(readings.app, name="readings")
 app.add_typer(probe.app, name="probe")

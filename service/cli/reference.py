@@ -9,6 +9,9 @@ from pydantic import TypeAdapter
 
 from acquisition.clock import SystemClock
 from core.machine import Bearing
+from service.audit.acting import Acting, acting_as
+from service.audit.entry import Source
+from service.cli.made_by import person
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.reference_listing import BearingReferences, bearing_references, text_lines
 from service.cli.units import UnitOption, one_unit
@@ -111,7 +114,8 @@ def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
     path = database_path(plant)
     if not path.exists():  # its folder may be relative to another one than this
         typer.echo(f"{path.absolute()}: a new database; is that where the service runs?", err=True)
-    with closing(open_store(plant)) as store:
+    who = Acting(Source.COMMAND_LINE, person())
+    with acting_as(who), closing(open_store(plant)) as store:
         store.add_reference(reference)
         return store.reference_history(reference.unit, reference.bearing)
 

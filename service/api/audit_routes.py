@@ -1,0 +1,113 @@
+"""The audit trail over HTTP: who did what to what."""
+
+import asyncio
+import json
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query
+
+from service.api.audit_models import AuditEntryModel, AuditModel
+from service.api.bearing_routes import Moment
+from service.api.context import Context
+from service.api.problems import ProblemError, described_problems
+from service.api.times import ns_from_datetime, rfc3339
+from service.audit.entry import MAX_NAME, AuditEntry
+from service.store.audit_port import AuditQuery
+
+MAX_ENTRIES = 1000
+
+PROBLEMS = described_problems({422: "A wrong parameter", 503: "The store cannot be read"})
+
+
+def audit_router(context: Context) -> APIRouter:
+    """The route that shows the audit trail."""
+    router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
+
+    @router.get("", summary="Audit trail", responses=PROBLEMS)
+    async def audit(query: Annotated[AuditQuery, Depends(audit_query)]) -> AuditModel:
+        """Who did what to what, before and after: newest first, page by page."""
+        one_more = AuditQuery(**{**vars(query), "limit": query.limit + 1})
+        found = await asyncio.to_thread(context.store.audit.entries, one_more)
+        page = list(found[: query.limit])
+        return AuditModel(
+            entries=[_model(entry) for entry in page],
+            next_before=page[-1].number if len(found) > query.limit else None,
+            head_error=context.store.audit.head_error,
+        )
+
+    return router
+
+
+def audit_query(
+    actor: Annotated[
+        str | None, Query(max_length=MAX_NAME, description="Of this actor.", examples=["A. Name"])
+    ] = None,
+    action: Annotated[
+        str | None,
+        Query(max_length=MAX_NAME, description="Of this action.", examples=["alarm.shelved"]),
+    ] = None,
+    object: Annotated[  # noqa: A002
+        str | None,
+        Query(
+            max_length=MAX_NAME,
+            description="On this object.",
+            examples=["U1:ujb_shaft_x:channel_not_ok"],
+        ),
+    ] = None,
+    start: Annotated[
+        Moment | None,
+        Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
+    ] = None,
+    end: Annotated[
+        Moment | None,
+        Query(description="Time up to which, likewise.", examples=["2026-11-21T09:00:00Z"]),
+    ] = None,
+    before: Annotated[
+        int | None,
+        Query(ge=1, le=2**62, description="Only entries older than this number.", examples=[117]),
+    ] = None,
+    limit: Annotated[
+        int, Query(ge=1, le=MAX_ENTRIES, description="Most entries in the answer.")
+    ] = 100,
+) -> AuditQuery:
+    """Check which entries are wanted."""
+    everything = AuditQuery()
+    start_ns = ns_from_datetime(start, "start") if start else everything.start_ns
+    end_ns = ns_from_datetime(end, "end") if end else everything.end_ns
+    if start_ns >= end_ns:
+        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
+        raise ProblemError(422, "Wrong parameter", detail, "start")
+    return AuditQuery(
+        before=everything.before if before is None else before,
+        limit=limit,
+        actor=actor,
+        action=action,
+        object=object,
+        start_ns=max(start_ns, everything.start_ns),
+        end_ns=min(end_ns, everything.end_ns),
+    )
+
+
+def _model(entry: AuditEntry) -> AuditEntryModel:
+    shown: dict[str, Any] = vars(entry) | {
+        "before": _document(entry.before),
+        "after": _document(entry.after),
+        "time": rfc3339(entry.time_ns),
+    }
+    del shown["time_ns"]
+    return AuditEntryModel.model_validate(shown)
+
+
+def _document(text: str | None) -> dict[str, Any] | None:
+    """A stored document; what is none, as the text that it is."""
+    if text is None:
+        return None
+    try:
+        document = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        document = text
+    return document if isinstance(document, dict) else {"text": text}
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no number")

@@ -1,0 +1,82 @@
+"""`padwatch audit`: who did what, whether all of it is there, and as a file."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import TypeAdapter
+
+from service.audit.csv_file import write_csv
+from service.audit.walk import Verdict
+from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.store.audit import trail, verify_trail
+from service.store.port import StoreError
+from service.wiring.stores import database_path
+
+app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what to what.")
+
+
+@app.command()
+def verify(
+    plant_file: PlantPath,
+    known: Annotated[
+        list[int] | None,
+        typer.Option(help="Entry that tells of a restored backup; may be given several times."),
+    ] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Walk the audit trail; exit code 1 if anything in it is altered, missing or out of order.
+
+    The service may go on running. Names the first entry that is wrong, and compares the last with
+    the file beside the database.
+    """
+    path = database_path(read_plant_file(plant_file))
+    try:
+        verdict = verify_trail(path)
+    except StoreError as error:
+        fail(f"padwatch audit verify: {error}")
+    told = [number for number in verdict.told if number not in (known or [])]
+    is_whole = verdict.is_whole and not told
+    if json_output:
+        document = {"is_whole": is_whole, **asdict(verdict), "told": told}
+        typer.echo(TypeAdapter(dict[str, object]).dump_json(document, indent=1).decode())
+    else:
+        typer.echo("\n".join(_lines(verdict, told)))
+    if not is_whole:
+        raise typer.Exit(1)
+
+
+@app.command()
+def export(
+    plant_file: PlantPath,
+    out: Annotated[Path, typer.Argument(help="CSV file to write, a new one.", show_default=False)],
+) -> None:
+    """Write the whole audit trail, oldest first, as a CSV file that spreadsheets take for text."""
+    path = database_path(read_plant_file(plant_file))
+    if out.suffix != ".csv":
+        fail(f"padwatch audit export: {out}: must end in .csv", code=2)
+    try:
+        with trail(path) as entries, out.open("x", encoding="utf-8", newline="") as file:
+            n_entries = write_csv(file, entries)
+    except StoreError as error:
+        fail(f"padwatch audit export: {error}")
+    except OSError as error:
+        fail(f"padwatch audit export: {out}: {error.strerror}")
+    typer.echo(f"{out}: {n_entries} entries")
+
+
+def _lines(verdict: Verdict, told: list[int]) -> list[str]:
+    lines = [f"{verdict.n_entries} entries are whole; the last has the hash {verdict.hash}"]
+    if verdict.finding is not None:
+        lines.append(f"NOT WHOLE: {verdict.finding.detail}")
+    if verdict.n_behind:
+        lines.append(
+            f"the head lags by {verdict.n_behind}, as after a crash; the next entry repairs it"
+        )
+    lines += [
+        f"NOT WHOLE: entry {number} tells that the head did not fit the trail"
+        " (--known for a restored backup)"
+        for number in told
+    ]
+    return lines

@@ -1,0 +1,58 @@
+"""`ServiceTrail`: what the running service tells the audit trail of itself."""
+
+import asyncio
+from collections.abc import Callable
+from importlib.metadata import version
+
+import structlog
+
+from acquisition.clock import Clock
+from service.audit.life import STARTED, Release, start_deeds, stop_deed
+from service.audit.refusals import Refusals
+from service.evidence.configuration import built_from, configuration_of
+from service.origin import Origin
+from service.settings.plant import PlantFile
+from service.store.audit_port import AuditQuery, AuditStore
+from service.store.port import StoreError
+
+log = structlog.get_logger()
+
+
+class ServiceTrail:
+    """Tells when the service starts and stops; a plant is watched also where that fails.
+
+    Parameters
+    ----------
+    audit
+        Where it is written.
+    """
+
+    def __init__(self, plant: PlantFile, origin: Origin, audit: AuditStore, clock: Clock) -> None:
+        program = version("padwatch")
+        configuration = configuration_of(plant, program, built_from())
+        self._release = Release(program, configuration.version, origin.value)
+        self._audit, self._clock = audit, clock
+        self.refusals = Refusals(audit, clock)
+
+    async def begin(self) -> None:
+        """Tell that the service starts, and whether its configuration has changed."""
+        await asyncio.to_thread(self._tell, self._start)
+
+    async def end(self) -> None:
+        """Tell that it stops."""
+        await asyncio.to_thread(self._tell, self._stop)
+
+    def _start(self) -> None:
+        last = self._audit.entries(AuditQuery(limit=1, action=STARTED))
+        now_ns = self._clock.now_ns()
+        self._audit.record(start_deeds(self._release, last[0] if last else None, now_ns))
+
+    def _stop(self) -> None:
+        deed = stop_deed(self._release, self.refusals.n_more, self._clock.now_ns())
+        self._audit.record([deed])
+
+    def _tell(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+        except StoreError as error:
+            log.error("the audit trail cannot be written", reason=str(error))

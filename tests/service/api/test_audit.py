@@ -1,0 +1,131 @@
+"""The audit trail over HTTP: who did what from where, and what was refused."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from service.audit.refusals import N_AT_ONCE, SECONDS_EACH
+
+AUDIT = "/api/v1/audit"
+FREEZE = "/api/v1/units/U1/bearings/UJB/baselines/freeze"
+ANNA = {"actor": "A. Name", "reason": "because"}
+UNKNOWN = "/api/v1/alarms/U1:none:shaft_x/acknowledge"
+
+
+async def entries(service: Any, **wanted: object) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = (await service.json(AUDIT, **wanted))["entries"]
+    return found
+
+
+async def test_a_service_that_nobody_has_touched_has_an_empty_trail(service: Any) -> None:
+    assert await service.json(AUDIT) == {"entries": [], "next_before": None, "head_error": None}
+
+
+async def test_a_comment_on_an_alarm_is_told_with_its_peer(service: Any) -> None:
+    service.alarms.link("U1", False, "no route")
+    service.clock.s += 60.0
+    service.clock.ns += 60_000_000_000
+    service.alarms.tick()
+    [alarm] = [a.identity.id for a in service.alarms.alarms if a.level is not None]
+    answer = await service.client.post(
+        f"/api/v1/alarms/{alarm}/comment", json={"actor": "A. Name", "text": "<b>=1+1</b>"}
+    )
+    [told] = await entries(service)
+
+    assert answer.status_code == 200, answer.text
+    assert (told["actor"], told["source"], told["peer"]) == ("A. Name", "api", "127.0.0.1")
+    assert (told["action"], told["object"]) == ("alarm.commented", alarm)
+    assert told["reason"] == "<b>=1+1</b>"
+    assert told["before"]["state"] == told["after"]["state"]
+    assert told["previous_hash"] == "0" * 64
+    assert len(told["hash"]) == 64
+
+
+async def test_refused_actions_are_told_with_the_reason(service: Any) -> None:
+    wrong = await service.client.post(UNKNOWN, json={"actor": ""})
+    foreign = await service.client.post(
+        FREEZE, json=ANNA, headers={"origin": "https://elsewhere.example"}
+    )
+    unfit = await service.client.post(FREEZE, json=ANNA)
+    told = await entries(service)
+
+    assert [wrong.status_code, foreign.status_code, unfit.status_code] == [422, 403, 409]
+    assert [entry["after"] for entry in told] == [{"status": n} for n in (409, 403, 422)]
+    assert [entry["action"] for entry in told] == ["request.refused"] * 3
+    assert told[0]["object"] == f"POST {FREEZE}"
+    assert told[0]["reason"] == unfit.json()["detail"]
+    assert told[0]["peer"] == "127.0.0.1"
+
+
+async def test_reading_is_not_told_however_wrong_it_is(service: Any) -> None:
+    await service.problem(AUDIT, 422, limit=0)
+    await service.problem("/api/v1/units/U9", 404)
+    assert await entries(service) == []
+
+
+async def test_a_flood_of_refusals_is_counted_and_not_written_one_by_one(service: Any) -> None:
+    async def flood(n_requests: int) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            for _ in range(n_requests):
+                tasks.create_task(service.client.post(UNKNOWN, json={"actor": ""}))
+
+    await flood(N_AT_ONCE + 17)
+    told = await entries(service, limit=1000)
+    service.clock.s += SECONDS_EACH
+    await flood(3)
+    later = await entries(service, limit=1000)
+
+    assert len(told) == N_AT_ONCE
+    assert len(later) == N_AT_ONCE + 1
+    assert later[0]["after"] == {"status": 422, "n_refused_more": 17}
+
+
+async def test_pages_lead_from_the_newest_to_the_oldest(service: Any) -> None:
+    for _ in range(5):
+        await service.client.post(UNKNOWN, json={"actor": ""})
+    numbers, before = [], None
+    while True:
+        wanted = {"limit": 2} if before is None else {"limit": 2, "before": before}
+        page = await service.json(AUDIT, **wanted)
+        numbers += [entry["number"] for entry in page["entries"]]
+        before = page["next_before"]
+        if before is None:
+            break
+    assert numbers == [5, 4, 3, 2, 1]
+
+
+async def test_entries_are_chosen_by_actor_action_object_and_time(service: Any) -> None:
+    await service.client.post(UNKNOWN, json={"actor": ""})
+    [told] = await entries(service)
+    for wanted in (
+        {"actor": ""},
+        {"action": "request.refused"},
+        {"object": f"POST {UNKNOWN}"},
+        {"start": told["time"]},
+        {"end": "2999-01-01T00:00:00Z"},
+    ):
+        assert await entries(service, **wanted) == [told], wanted
+    for other in (
+        {"actor": "nobody"},
+        {"action": "' OR 1=1 --"},
+        {"object": "\x00"},
+        {"end": told["time"]},
+    ):
+        assert await entries(service, **other) == [], other
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"limit": 1001},
+        {"before": 0},
+        {"before": 2**63},
+        {"start": "2026-01-01T00:00:00"},
+        {"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"},
+        {"actor": "x" * 301},
+        {"aktor": "x"},
+    ],
+)
+async def test_wrong_parameters_are_refused(service: Any, wrong: dict[str, object]) -> None:
+    await service.problem(AUDIT, 422, **wrong)
