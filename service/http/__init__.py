@@ -1,0 +1,1 @@
+"""The HTTP server's defence: deadlines, sizes, counts, hosts, headers."""

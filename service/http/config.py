@@ -1,0 +1,47 @@
+"""Configuration of the HTTP server, with what its connections share."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, cast
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from service.http.connections import Connections
+from service.http.guard import guarded
+from service.settings.http_limits import HttpLimitSettings
+
+STOP_S = 2
+"""What clients get to finish in before their connections are closed."""
+
+
+class GuardedConfig(uvicorn.Config):
+    """Uvicorn's configuration and the open connections.
+
+    Parameters
+    ----------
+    hosts
+        Names by which the service may be asked for, besides those of loopback and the settings.
+    now_s
+        Steady time in seconds, for the deadlines.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        limits: HttpLimitSettings,
+        hosts: Iterable[str],
+        now_s: Callable[[], float],
+        **options: Any,
+    ) -> None:
+        super().__init__(
+            cast(Any, guarded(app, limits, hosts)),  # Starlette and uvicorn name its type apart
+            http="service.http.protocol:GuardedProtocol",
+            ws="none",
+            log_level="warning",
+            access_log=False,
+            lifespan="off",
+            timeout_keep_alive=round(limits.keep_alive_s),
+            timeout_graceful_shutdown=STOP_S,
+            **options,
+        )
+        self.connections = Connections(limits, now_s)

@@ -1,0 +1,21 @@
+"""Everything that stands before the application, in its order."""
+
+from collections.abc import Iterable
+
+from starlette.types import ASGIApp
+
+from service.http.answers import BoundedAnswers
+from service.http.bodies import WholeBodies
+from service.http.hosts import KnownHosts
+from service.http.security_headers import SecurityHeaders
+from service.settings.http_limits import HttpLimitSettings
+
+
+def guarded(app: ASGIApp, limits: HttpLimitSettings, hosts: Iterable[str] = ()) -> ASGIApp:
+    """Put the defence before an application.
+
+    Bodies come before the count of requests, so that slow senders use up nobody's place.
+    """
+    answers = BoundedAnswers(app, limits)
+    bodies = WholeBodies(answers, limits)
+    return SecurityHeaders(KnownHosts(bodies, (*limits.hosts, *hosts)))

@@ -1,0 +1,44 @@
+"""Only requests that ask for this service by a name it has.
+
+A page of another site can let its own name point to 127.0.0.1 (DNS rebinding) and then reads the
+answers as its own; the Host header still carries its name.
+"""
+
+from collections.abc import Iterable
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.http.refusals import NO_HOST, WRONG_HOST
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+
+class KnownHosts:
+    """ASGI middleware that refuses requests for anybody else.
+
+    Parameters
+    ----------
+    hosts
+        Names and addresses, without port, besides those of loopback.
+    """
+
+    def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
+        self._app = app
+        self._known = {host.lower().strip("[]").rstrip(".") for host in (*LOOPBACK, *hosts)}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on if it is for this service."""
+        asked = [value for name, value in scope["headers"] if name == b"host"]
+        if len(asked) != 1 or not asked[0]:
+            await NO_HOST.send(scope, send)
+        elif _name(asked[0].decode("latin-1")) not in self._known:
+            await WRONG_HOST.send(scope, send)
+        else:
+            await self._app(scope, receive, send)
+
+
+def _name(host: str) -> str:
+    """A Host header without its port."""
+    if host.startswith("["):
+        return host[1:].partition("]")[0].lower()
+    return host.partition(":")[0].rstrip(".").lower()

@@ -1,0 +1,70 @@
+"""What is refused before the application sees it: a problem document (RFC 9457) for each status."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+
+from starlette.types import Scope, Send
+
+MEDIA_TYPE = b"application/problem+json"
+
+Headers = Sequence[tuple[bytes, bytes]]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A status with the words that always go with it; nothing of the request is repeated."""
+
+    status: int
+    title: str
+    detail: str
+    retry_after_s: int | None = None
+
+    def body(self, instance: str = "") -> bytes:
+        """The problem document."""
+        problem = {
+            "type": "about:blank",
+            "title": self.title,
+            "status": self.status,
+            "detail": self.detail,
+            "instance": instance,
+            "errors": [],
+        }
+        return json.dumps(problem).encode()
+
+    def headers(self, n_bytes: int) -> list[tuple[bytes, bytes]]:
+        """What goes with a document of this length."""
+        headers = [(b"content-type", MEDIA_TYPE), (b"content-length", b"%d" % n_bytes)]
+        if self.retry_after_s is not None:
+            headers.append((b"retry-after", b"%d" % self.retry_after_s))
+        return headers
+
+    def on_the_wire(self, more: Headers) -> bytes:
+        """The whole answer, for a connection that is closed after it."""
+        body = self.body()
+        line = b"HTTP/1.1 %d %s\r\n" % (self.status, HTTPStatus(self.status).phrase.encode())
+        headers = [*self.headers(len(body)), *more, (b"connection", b"close")]
+        return line + b"".join(b"%s: %s\r\n" % header for header in headers) + b"\r\n" + body
+
+    async def send(self, scope: Scope, send: Send) -> None:
+        """Answer a request with it."""
+        # what a path may hold beyond ASCII is escaped by JSON
+        body = self.body(scope["path"])
+        headers = self.headers(len(body))
+        await send({"type": "http.response.start", "status": self.status, "headers": headers})
+        await send({"type": "http.response.body", "body": body, "more_body": False})
+
+
+NOT_HTTP = Refusal(400, "Not a request", "this is not HTTP/1.1 as it is written down")
+NO_HOST = Refusal(400, "No host", "a request must say exactly once which host it asks for")
+NOT_UTF8 = Refusal(400, "Not UTF-8", "the body is not valid UTF-8")
+TOO_DEEP = Refusal(400, "Nested too deep", "the body is nested deeper than anything asked for here")
+TOO_SLOW = Refusal(408, "Too slow", "the request did not come completely within its time")
+BODY_TOO_LARGE = Refusal(413, "Body too large", "the body is larger than anything asked for here")
+TARGET_TOO_LONG = Refusal(414, "Address too long", "path and query are longer than allowed")
+WRONG_HOST = Refusal(421, "Wrong host", "this service is not known by the name that was asked for")
+HEAD_TOO_LARGE = Refusal(431, "Headers too large", "line and headers are longer than allowed")
+BUSY = Refusal(503, "Busy", "too many requests at the same time; try again", retry_after_s=1)
+FULL = Refusal(503, "Busy", "too many connections at the same time; try again", retry_after_s=5)
+NO_ANSWER = Refusal(503, "No answer in time", "the answer took too long; ask for less", 5)

@@ -1,0 +1,46 @@
+"""The HTTP server: watches its connections while it runs, and leaves none when it stops."""
+
+import asyncio
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import uvicorn
+
+from service.http.config import STOP_S, GuardedConfig
+from service.http.connections import Connections
+
+SWEEP_TICKS = 5
+"""Connections are looked at every so many of uvicorn's ticks of 0.1 s."""
+
+
+class GuardedServer(uvicorn.Server):
+    """Uvicorn without its own signal handling: the program stops all its parts together."""
+
+    @property
+    def open(self) -> Connections:
+        """The open connections."""
+        if not isinstance(self.config, GuardedConfig):
+            raise TypeError("a guarded server needs a guarded configuration")
+        return self.config.connections
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals alone."""
+        yield
+
+    async def on_tick(self, counter: int) -> bool:
+        """Look at all connections now and then."""
+        if counter % SWEEP_TICKS == 0:
+            self.open.sweep()
+        return await super().on_tick(counter)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close everything in time; who does not read his answer is not waited for to the end."""
+        # before uvicorn cancels the tasks, which would log a traceback for each
+        patience = asyncio.get_running_loop().call_later(0.75 * STOP_S, self.open.abort_all)
+        try:
+            await super().shutdown(sockets)
+        finally:
+            patience.cancel()
+            self.open.abort_all()

@@ -1,0 +1,103 @@
+"""What is no proper request ends in a 4xx with constant words, without reaching the application."""
+
+import json
+
+import pytest
+
+KNOWN_HOST = "Host: localhost\r\n"
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 400),
+        (b"GET / HTTP/9.9\r\nHost: localhost\r\n\r\n", 400),
+        (b"GET /\xff\xfe HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
+        (b"CONNECT localhost:22 HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
+        (b"GET / HTTP/1.1\r\n\r\n", 400),
+        (b"GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n", 400),
+        (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", 421),
+        (b"GET / HTTP/1.1\r\nHost: localhost.evil.example:80\r\n\r\n", 421),
+        (b"GET / HTTP/1.1\r\nHost: localhost@evil.example\r\n\r\n", 421),
+        (b"GET /" + b"a" * 9000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n", 414),
+        (b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * 17_000 + b"\r\n\r\n", 431),
+        (b"GET / HTTP/1.1\r\nHost: localhost\r\n" + b"X: a\r\n" * 4000 + b"\r\n", 431),
+        (b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * 300_000, 431),
+        (b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n", 400),
+        (
+            b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
+            400,
+        ),
+        (
+            b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 3\r\n"
+            b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+            400,
+        ),
+        (b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nz\r\n", 400),
+        (
+            b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n"
+            b"0\r\nTrailer: x\r\n\r\n",
+            400,
+        ),
+        (b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 209715200\r\n\r\n", 413),
+        (b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9" + b"9" * 18 + b"\r\n\r\n", 413),
+    ],
+)
+async def test_a_bad_request_is_refused(start, request_: bytes, status: int, caplog) -> None:
+    running = await start()
+    client = await running.client()
+
+    await client.send(request_)
+
+    assert await client.status() == status
+    problem = json.loads(client.body)
+    assert problem["status"] == status
+    assert b"content-type: application/problem+json" in client.head
+    assert b"x-content-type-options: nosniff" in client.head
+    assert running.app.n_asked == 0
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1:8080", "[::1]:80", "LOCALHOST.:1", "Own"])
+async def test_the_service_is_known_by_its_own_names(start, host: str) -> None:
+    running = await start(hosts=["own"])
+    client = await running.client()
+
+    await client.send(f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+
+    assert await client.status() == 200
+
+
+async def test_a_long_header_in_small_pieces_is_refused(start) -> None:
+    running = await start()
+    client = await running.client()
+    await client.send(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: ")
+    for _ in range(100):
+        await client.send(b"a" * 1000)
+        if running.server.open.limits and len(running.server.open) == 0:
+            break
+
+    assert await client.status() == 431
+
+
+async def test_many_requests_ahead_are_answered_in_order_and_no_further(start) -> None:
+    running = await start()
+    client = await running.client()
+    await client.send(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" * 5000)
+
+    statuses = []
+    while status := await client.status():
+        statuses.append(status)
+
+    assert set(statuses) == {200}
+    assert len(statuses) == 9
+    assert running.app.n_asked == 9
+
+
+async def test_an_upgrade_is_answered_as_a_plain_request(start, caplog) -> None:
+    running = await start()
+    client = await running.ask("/", head="Connection: Upgrade\r\nUpgrade: h2c\r\n")
+
+    assert await client.status() == 200
+    assert await client.is_closed()
+    assert not caplog.records

@@ -1,0 +1,109 @@
+"""Bodies: of a bounded size, complete, UTF-8, and not nested for ever."""
+
+import tracemalloc
+
+import pytest
+
+from service.http.json_depth import is_deeper_than
+
+MIB = 1024 * 1024
+
+
+async def post(running, body: bytes):
+    client = await running.ask("/", "POST", f"Content-Length: {len(body)}\r\n")
+    await client.send(body)
+    return client
+
+
+async def test_a_body_arrives_whole(start) -> None:
+    running = await start()
+    client = await running.ask("/", "POST", "Transfer-Encoding: chunked\r\n")
+    for _ in range(3):
+        await client.send(b"4\r\nabcd\r\n")
+    await client.send(b"0\r\n\r\n")
+
+    assert await client.status() == 200
+    assert client.body == b"12 bytes"
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (b'{"a": "\xff\xfe"}', 400),
+        (b'{"a": "\xed\xa0\x80"}', 400),
+        (b"[" * 30_000 + b"]" * 30_000, 400),
+        (b'{"a":' * 17 + b"1" + b"}" * 17, 400),
+        (b"[" * 16 + b"]" * 16, 200),
+        (b"[" * 100_000 + b"]" * 100_000, 413),
+        (b"a" * 64 * 1024, 200),
+        (b"a" * (64 * 1024 + 1), 413),
+    ],
+)
+async def test_a_bad_body_is_refused(start, body: bytes, status: int) -> None:
+    running = await start()
+
+    client = await post(running, body)
+
+    assert await client.status() == status
+    assert running.app.n_asked == (status == 200)
+
+
+@pytest.mark.parametrize("is_chunked", [False, True])
+async def test_two_hundred_mebibytes_cost_no_memory(start, is_chunked: bool) -> None:
+    running = await start()
+    head = "Transfer-Encoding: chunked\r\n" if is_chunked else f"Content-Length: {200 * MIB}\r\n"
+    piece = b"%x\r\n%s\r\n" % (MIB, b"a" * MIB) if is_chunked else b"a" * MIB
+    client = await running.ask("/", "POST", head)
+    tracemalloc.start()
+    try:
+        for _ in range(200):
+            await client.send(piece)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    assert await client.status() == 413
+    assert peak < 10 * MIB
+    assert running.app.n_asked == 0
+
+
+async def test_chunks_without_end_are_cut_off(start) -> None:
+    running = await start()
+    client = await running.ask("/", "POST", "Transfer-Encoding: chunked\r\n")
+    await client.send(b"10000\r\n" + b"a" * 65536 + b"\r\n1\r\na\r\n")
+    assert await client.status() == 413
+
+    running.pass_time(4.1)
+
+    assert await client.is_closed()
+
+
+async def test_chunk_extensions_without_end_are_cut_off(start) -> None:
+    running = await start()
+    client = await running.ask("/", "POST", "Transfer-Encoding: chunked\r\n")
+    await client.send(b"1;a=" + b"b" * 300_000)
+
+    assert await client.status() == 400
+    assert await client.is_closed()
+
+
+@pytest.mark.parametrize(
+    ("text", "depth"),
+    [
+        (b"", 0),
+        (b"1", 0),
+        (b'"[[[["', 0),
+        (b'["\\"[[["]', 1),
+        (b'{"a": [1, {"b": []}], "c": []}', 4),
+        (b"[[]", 2),
+        (b'[ "[[[[[[', 1),
+        (b"]]]][[[", 0),
+    ],
+)
+def test_depth_is_counted_outside_of_strings(text: bytes, depth: int) -> None:
+    assert not is_deeper_than(max(depth, 0), text)
+    assert depth == 0 or is_deeper_than(depth - 1, text)
+
+
+def test_text_made_to_be_slow_is_read_once() -> None:
+    assert not is_deeper_than(1, b'"' + b'\\"' * 500_000 + b"\\")
