@@ -133,8 +133,16 @@ def store(tmp_path: Path) -> Iterator[SqliteStore]:
     opened.close()
 
 
+@pytest.fixture(scope="session")
+def documents() -> list[dict[str, Any]]:
+    """The description of the API, once it was made: it is the same for every test, and costly."""
+    return []
+
+
 @pytest.fixture
-async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> AsyncIterator[Service]:
+async def service(
+    plant: PlantFile, store: SqliteStore, tmp_path: Path, documents: list[dict[str, Any]]
+) -> AsyncIterator[Service]:
     """A service that has just started: nothing is connected, nothing stored."""
     clock = SetClock()
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
@@ -172,7 +180,9 @@ async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> Async
     app = create_app(context)
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
+        app.openapi_schema = documents[0] if documents else None
         document = app.openapi()
+        documents[:] = [document]
         yield Service(
             live,
             store,
