@@ -1,12 +1,16 @@
 """Durations are counted where they belong."""
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 import pytest
 
+from acquisition.clock import Clock
+from core.blocks import SampleBlock
 from service.metrics.acquired import MAX_REASONS, bounded
 from service.metrics.durations import Durations
-from service.metrics.polls import PollClock
+from service.metrics.polls import PollClock, TimedSource
 from service.metrics.timings import Timings
 
 
@@ -106,3 +110,29 @@ def test_however_many_reasons_there_are_labels_stay_few() -> None:
 
     assert len(counts) == MAX_REASONS + 1
     assert sum(counts.values()) == 1005
+
+
+async def test_a_source_that_is_connected_again_begins_anew(clock: SetClock) -> None:
+    class Device:
+        def __init__(self, own: Clock) -> None:
+            self._own = own
+
+        @asynccontextmanager
+        async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+            yield self._deliver()
+
+        async def _deliver(self) -> AsyncIterator[SampleBlock]:
+            for _ in range(3):
+                await self._own.sleep(1.0)
+                clock.s += 0.25
+            return
+            yield
+
+    source = TimedSource(Device, clock)
+    for _ in range(2):
+        async with source.connect() as blocks:
+            assert [block async for block in blocks] == []
+        clock.s += 3600.0
+
+    assert source.polls.seen().n_up_to[-1] == 4
+    assert source.polls.seen().sum_s == pytest.approx(4 * 0.25)

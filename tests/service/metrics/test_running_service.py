@@ -38,6 +38,8 @@ async def test_a_device_that_does_not_answer_is_told_without_numbers_that_nobody
     for name in ("ingest_lag_seconds", "data_age_seconds"):
         assert await running.value(f"padwatch_{name}", unit="U1") is not None
         assert await running.value(f"padwatch_{name}", unit="U2") is None
+    lag_s = await running.value("padwatch_ingest_lag_seconds", unit="U1")
+    assert -3600.0 < lag_s < 3600.0  # seconds, of samples that were made just now
     assert await running.value("padwatch_bearings", unit="U2", quality="bad") == 3.0
     assert await running.value("padwatch_samples_offered_total", unit="U2") == 0.0
 
