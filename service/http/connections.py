@@ -9,6 +9,9 @@ from service.settings.http_limits import HttpLimitSettings
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
 """Answers that wait for slow readers, all together; beyond it the largest are given up."""
 
+MAX_PAUSE_S = 1.0
+"""The server looks at its connections more often; when it could not, no client is to blame."""
+
 
 class Connection(Protocol):
     """One connection, as far as counting and deadlines need it."""
@@ -18,6 +21,9 @@ class Connection(Protocol):
 
     def check(self, now_s: float) -> None:
         """Close it if a deadline has passed."""
+
+    def excuse(self, seconds: float) -> None:
+        """Do not count a time in which nobody was listened to."""
 
     def waits_since(self) -> tuple[bool, float] | None:
         """When nothing of it is worked on: whether it ever asked, and since when it waits."""
@@ -45,6 +51,7 @@ class Connections:
         self.limits, self.now_s = limits, now_s
         self._of_peer: defaultdict[str, set[Connection]] = defaultdict(set)
         self._n_open = self.n_accepted = 0
+        self._swept_s = now_s()
 
     def __len__(self) -> int:
         return self._n_open
@@ -75,7 +82,10 @@ class Connections:
     def sweep(self) -> None:
         """Close what has passed a deadline; called again and again."""
         now_s = self.now_s()
+        stalled_s = max(0.0, now_s - self._swept_s - MAX_PAUSE_S)
+        self._swept_s = now_s
         for connection in self.all():
+            connection.excuse(stalled_s)
             connection.check(now_s)
         self._relieve()
 

@@ -165,6 +165,12 @@ class GuardedProtocol(HttpToolsProtocol):
         elif now_s - self._since_s > self._patience_s():
             self._end(TOO_SLOW if self._phase is not Phase.NOTHING and self._n_wire else None)
 
+    def excuse(self, seconds: float) -> None:
+        """Do not count a time in which nobody was listened to."""
+        self._since_s += seconds
+        if self._unsent_since_s is not None:
+            self._unsent_since_s += seconds
+
     def waits_since(self) -> tuple[bool, float] | None:
         """Whether it ever asked, and since when it waits; None while it is answered."""
         is_answered = self._phase is Phase.NOTHING and self._is_answering()

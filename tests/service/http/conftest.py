@@ -107,8 +107,10 @@ class Running:
     def pass_time(self, seconds: float) -> None:
         """Let time pass for the server; it looks at its connections by itself too."""
         self.server.open.sweep()
-        self.now_s += seconds
-        self.server.open.sweep()
+        until_s = self.now_s + seconds
+        while self.now_s < until_s:
+            self.now_s = min(self.now_s + 0.5, until_s)
+            self.server.open.sweep()
 
 
 Start = Callable[..., Awaitable[Running]]

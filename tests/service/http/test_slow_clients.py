@@ -58,6 +58,18 @@ async def test_a_body_that_never_ends_is_given_up(start) -> None:
     assert running.app.n_asked == 0
 
 
+async def test_a_service_that_stalls_blames_no_client(start) -> None:
+    running = await start()
+    client = await running.client()
+
+    running.pass_time(2.0)
+    running.now_s += 60.0
+    running.server.open.sweep()
+    await client.send(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+
+    assert await client.status() == 200
+
+
 async def test_one_who_does_not_read_his_answer_is_closed(start) -> None:
     running = await start()
     client = await running.ask("/large")
