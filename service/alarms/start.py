@@ -63,7 +63,9 @@ async def alarm_engine(
         )
         for unit in plant.unit
     }
-    service = ServiceAlarms(units, service_rules_of(plant.alarms), look)
+    # how a replay is served depends on the host, and is nothing that the recording tells
+    seen = look if origin is Origin.LIVE else None
+    service = ServiceAlarms(units, service_rules_of(plant.alarms), seen)
     chatter = chatter_rule_of(plant.alarms)
     listener = captures.take if captures else None
     engine = AlarmEngine(units, put, clock, listener, service, chatter)
