@@ -12,7 +12,7 @@ from service.api.alarm_rate_views import alarm_rates_model, counted
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
-from service.api.times import ns_from_datetime, rfc3339
+from service.api.times import ns_from_datetime, require_order
 from service.store.port import AlarmQuery
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400
@@ -66,9 +66,7 @@ def alarm_rate_router(context: Context) -> APIRouter:
 
 
 def _check_span(start_ns: int, end_ns: int) -> None:
-    if start_ns >= end_ns:
-        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
-        raise ProblemError(422, "Wrong parameter", detail, "start")
+    require_order(start_ns, end_ns)
     if end_ns - start_ns > MAX_DAYS * DAY_NS:
         days = (end_ns - start_ns) / DAY_NS
         detail = f"{days:g} days are asked for, {MAX_DAYS} are counted at once"

@@ -36,7 +36,7 @@ from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.same_host import require_same_host
-from service.api.times import ns_from_datetime, rfc3339
+from service.api.times import ns_from_datetime, require_order
 from service.store.port import AlarmQuery
 
 MAX_EVENTS = 1000
@@ -189,9 +189,7 @@ def event_query(
     everything = AlarmQuery()
     start_ns = ns_from_datetime(start, "start") if start else everything.start_ns
     end_ns = ns_from_datetime(end, "end") if end else everything.end_ns
-    if start_ns >= end_ns:
-        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
-        raise ProblemError(422, "Wrong parameter", detail, "start")
+    require_order(start_ns, end_ns)
     return AlarmQuery(
         before=everything.before if before is None else before,
         limit=limit,

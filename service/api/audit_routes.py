@@ -9,8 +9,8 @@ from fastapi import APIRouter, Depends, Query
 from service.api.audit_models import AuditEntryModel, AuditModel
 from service.api.bearing_routes import Moment
 from service.api.context import Context
-from service.api.problems import ProblemError, described_problems
-from service.api.times import ns_from_datetime, rfc3339
+from service.api.problems import described_problems
+from service.api.times import ns_from_datetime, require_order, rfc3339
 from service.audit.entry import MAX_NAME, AuditEntry
 from service.store.audit_port import AuditQuery
 
@@ -74,9 +74,7 @@ def audit_query(
     everything = AuditQuery()
     start_ns = ns_from_datetime(start, "start") if start else everything.start_ns
     end_ns = ns_from_datetime(end, "end") if end else everything.end_ns
-    if start_ns >= end_ns:
-        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
-        raise ProblemError(422, "Wrong parameter", detail, "start")
+    require_order(start_ns, end_ns)
     return AuditQuery(
         before=everything.before if before is None else before,
         limit=limit,

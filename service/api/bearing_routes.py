@@ -16,7 +16,7 @@ from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.models import LatestModel
 from service.api.problems import ProblemError, problem_responses
 from service.api.series_models import GapModel, OrbitModel, SpectrumModel
-from service.api.times import ns_from_datetime, rfc3339, written_as_date
+from service.api.times import ns_from_datetime, require_order, rfc3339, written_as_date
 from service.api.views import (
     budget_model,
     latest_model,
@@ -44,9 +44,7 @@ def _bound(words: str, example: float) -> Any:
 def time_range(start: Start, end: End) -> tuple[int, int]:
     """Check a range of time."""
     start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
-    if start_ns >= end_ns:
-        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
-        raise ProblemError(422, "Wrong parameter", detail, "start")
+    require_order(start_ns, end_ns)
     return start_ns, end_ns
 
 

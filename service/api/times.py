@@ -41,3 +41,16 @@ def ns_from_datetime(moment: datetime, parameter: str) -> int:
         raise ProblemError(422, "Wrong parameter", detail, parameter)
     elapsed = min(max(moment, FIRST), LAST) - EPOCH
     return (elapsed.days * 86_400 + elapsed.seconds) * NS_PER_S + elapsed.microseconds * 1000
+
+
+def require_order(start_ns: int, end_ns: int) -> None:
+    """Refuse a range of time that holds nothing.
+
+    Raises
+    ------
+    ProblemError
+        If it does not begin before it ends.
+    """
+    if start_ns >= end_ns:
+        detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
+        raise ProblemError(422, "Wrong parameter", detail, "start")
