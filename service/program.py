@@ -3,12 +3,9 @@
 import asyncio
 import signal
 import socket
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-
-import uvicorn
 
 from acquisition.clock import Clock
 from service.alarms.health import health_of
@@ -21,7 +18,9 @@ from service.delivery.deliveries import Deliveries
 from service.delivery.facts import Around
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
-from service.heartbeats import UNHEARD, Heartbeats, Pulse
+from service.heartbeats import Heartbeats
+from service.http.listening import url_of
+from service.http.server import GuardedServer
 from service.live import LiveView
 from service.metrics.timed import polls_of, timed
 from service.metrics.timings import Timings
@@ -39,58 +38,12 @@ from service.wiring.audit import ServiceTrail
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of, router_of
 from service.wiring.evidence import evidence_desk, evidence_of, watch
+from service.wiring.http import server_of
 from service.wiring.sources import vector_rows
 from service.wiring.stores import open_store
 
 STALE_HOPS = 2.5
 """A result older than this many refreshes is no longer current."""
-
-STOP_S = 2
-"""What slow clients get to finish in before their connections are closed."""
-
-
-class PortInUseError(Exception):
-    """The HTTP port cannot be listened on; the message says which and why."""
-
-
-class HttpServer(uvicorn.Server):
-    """Uvicorn without its own signal handling: the program stops all its parts together."""
-
-    def __init__(self, config: uvicorn.Config) -> None:
-        super().__init__(config)
-        self._pulse: Pulse = UNHEARD
-
-    async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
-        """Serve until it is told to stop."""
-        self._pulse = pulse
-        await self.serve([listener])
-
-    async def on_tick(self, counter: int) -> bool:
-        """Beat ten times a second."""
-        self._pulse.beat()
-        return await super().on_tick(counter)
-
-    @contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """Leave the signals alone."""
-        yield
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """Take the HTTP port before anything else is started.
-
-    Raises
-    ------
-    PortInUseError
-        If it cannot be had.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    try:
-        return socket.create_server((host, port), family=family)
-    except OSError as error:
-        # what Python adds in brackets repeats the address
-        why = (error.strerror or str(error)).partition(" (")[0]
-        raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
 @dataclass(frozen=True)
@@ -214,14 +167,7 @@ async def _run(
         loops=beats.look,
         refusals=audit.refusals,
     )
-    config = uvicorn.Config(
-        create_app(context),
-        log_level="warning",
-        access_log=False,
-        lifespan="off",
-        timeout_graceful_shutdown=STOP_S,
-    )
-    server = HttpServer(config)
+    server = server_of(create_app(context), plant, clock)
     stopped = _stop_on_signals()
     try:
         async with asyncio.TaskGroup() as tasks:
@@ -280,7 +226,7 @@ def _stop_on_signals() -> asyncio.Event:
 
 
 async def _announce(
-    server: uvicorn.Server,
+    server: GuardedServer,
     listener: socket.socket,
     announce: Callable[[str], None],
     supervision: Supervision,
@@ -288,5 +234,4 @@ async def _announce(
     while not server.started:
         await asyncio.sleep(0.01)
     supervision.ready()
-    host, port = listener.getsockname()[:2]
-    announce(f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/")
+    announce(url_of(listener))

@@ -16,8 +16,9 @@ from service.cli.daq import SpeedOption
 from service.cli.daq_process import daq_process
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import announce
+from service.http.listening import PortInUseError, listen
 from service.origin import Origin
-from service.program import Performance, PortInUseError, listen, run_service
+from service.program import Performance, run_service
 from service.replay import PlayedOut, replay_folder, replayed_plant
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

@@ -10,8 +10,9 @@ import uvloop
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.http.listening import PortInUseError, listen
 from service.notify import ServiceManager
-from service.program import Performance, PortInUseError, listen, run_service
+from service.program import Performance, run_service
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.wiring.sources import live_units

@@ -18,4 +18,4 @@ def guarded(app: ASGIApp, limits: HttpLimitSettings, hosts: Iterable[str] = ()) 
     """
     answers = BoundedAnswers(app, limits)
     bodies = WholeBodies(answers, limits)
-    return SecurityHeaders(KnownHosts(bodies, (*limits.hosts, *hosts)))
+    return SecurityHeaders(KnownHosts(bodies, hosts))

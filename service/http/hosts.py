@@ -19,7 +19,8 @@ class KnownHosts:
     Parameters
     ----------
     hosts
-        Names and addresses, without port, besides those of loopback.
+        Names and addresses, without port, besides those of loopback and the address that a client
+        came to: a page of another site has a name.
     """
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
@@ -31,10 +32,14 @@ class KnownHosts:
         asked = [value for name, value in scope["headers"] if name == b"host"]
         if len(asked) != 1 or not asked[0]:
             await NO_HOST.send(scope, send)
-        elif _name(asked[0].decode("latin-1")) not in self._known:
-            await WRONG_HOST.send(scope, send)
-        else:
+        elif self._is_known(_name(asked[0].decode("latin-1")), scope):
             await self._app(scope, receive, send)
+        else:
+            await WRONG_HOST.send(scope, send)
+
+    def _is_known(self, name: str, scope: Scope) -> bool:
+        address, _ = scope.get("server") or ("", None)
+        return name in self._known or (bool(name) and name == address.removeprefix("::ffff:"))
 
 
 def _name(host: str) -> str:

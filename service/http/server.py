@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import uvicorn
 
+from service.heartbeats import UNHEARD, Pulse
 from service.http.config import STOP_S, GuardedConfig
 from service.http.connections import Connections
 
@@ -16,6 +17,15 @@ SWEEP_TICKS = 5
 
 class GuardedServer(uvicorn.Server):
     """Uvicorn without its own signal handling: the program stops all its parts together."""
+
+    def __init__(self, config: GuardedConfig) -> None:
+        super().__init__(config)
+        self._pulse: Pulse = UNHEARD
+
+    async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
+        """Serve until it is told to stop."""
+        self._pulse = pulse
+        await self.serve([listener])
 
     @property
     def open(self) -> Connections:
@@ -30,7 +40,8 @@ class GuardedServer(uvicorn.Server):
         yield
 
     async def on_tick(self, counter: int) -> bool:
-        """Look at all connections now and then."""
+        """Beat ten times a second, and look at all connections now and then."""
+        self._pulse.beat()
         if counter % SWEEP_TICKS == 0:
             self.open.sweep()
         return await super().on_tick(counter)

@@ -16,10 +16,6 @@ HostName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9:][A-Za-z0-9.:-
 class HttpLimitSettings(Settings):
     """Limits of the HTTP server; a client that never finishes is closed within head_s + body_s."""
 
-    hosts: Annotated[tuple[HostName, ...], Field(max_length=32)] = ()
-    """Names that requests may ask for besides loopback's and the configured address; needed behind
-    a proxy that hands the name on. Example: ["padwatch.plant.example"]."""
-
     head_s: DeadlineS = 4.0
     """Within this time, s, a request's line and headers must have come, from its first byte or from
     the connection."""

@@ -11,6 +11,7 @@ from service.settings.base import MisfitError, Settings, refuse_twice
 from service.settings.delivery import DeliverySettings
 from service.settings.evidence import EvidenceSettings
 from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.http_limits import HostName, HttpLimitSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
@@ -40,6 +41,14 @@ class ServiceSettings(Settings):
 
     data_folder: Annotated[str, StringConstraints(min_length=1)] = "var"
     """Folder of the database, relative to where padwatch is started."""
+
+    hosts: Annotated[tuple[HostName, ...], Field(max_length=32)] = ()
+    """Names that requests may ask for besides loopback's, the configured address and that of the
+    dashboard in messages; needed behind a proxy that hands the name on; example:
+    ["padwatch.plant.example"]."""
+
+    limits: HttpLimitSettings = HttpLimitSettings()
+    """What one client may cost."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -117,12 +117,12 @@ Start = Callable[..., Awaitable[Running]]
 
 
 @asynccontextmanager
-async def running(limits: HttpLimitSettings) -> AsyncIterator[Running]:
+async def running(limits: HttpLimitSettings, hosts: list[str]) -> AsyncIterator[Running]:
     app = Application()
     async with AsyncExitStack() as clients:
         listener = socket.create_server(("127.0.0.1", 0))
         state = Running(app, None, listener.getsockname()[1], clients)  # type: ignore[arg-type]
-        config = GuardedConfig(app, limits, (), lambda: state.now_s)
+        config = GuardedConfig(app, limits, hosts, lambda: state.now_s)
         state.server = GuardedServer(config)
         serving = asyncio.create_task(state.server.serve([listener]))
         while not state.server.started:
@@ -141,8 +141,8 @@ async def start() -> AsyncIterator[Start]:
     """Starts a server with its own limits."""
     async with AsyncExitStack() as stack:
 
-        async def begin(**limits: object) -> Running:
+        async def begin(hosts: list[str] | None = None, **limits: object) -> Running:
             settings = HttpLimitSettings.model_validate(limits)
-            return await stack.enter_async_context(running(settings))
+            return await stack.enter_async_context(running(settings, hosts or []))
 
         yield begin

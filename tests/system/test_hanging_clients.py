@@ -1,0 +1,39 @@
+"""The real service stops when it is told to, and serves, whatever its clients do."""
+
+import asyncio
+import signal
+from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack
+from pathlib import Path
+from typing import Any
+
+Start = Callable[..., Awaitable[Any]]
+
+HANGING = (
+    b"",
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nX-Slow: ",
+    b"POST /api/v1/alarms HTTP/1.1\r\nHost: localhost\r\nContent-Length: 60000\r\n\r\n[",
+    b"GET /static/plotly.min.js HTTP/1.1\r\nHost: localhost\r\n\r\n" * 8,
+)
+"""Silent, never ending their headers or their body, never reading megabytes."""
+
+
+async def test_the_service_serves_and_stops_among_hanging_clients(
+    start: Start, tmp_path: Path, demo_file: Path
+) -> None:
+    plant = tmp_path / "plant.toml"
+    demo = demo_file.read_text(encoding="utf-8").replace("var/demo", str(tmp_path))
+    plant.write_text(demo.replace("port = 0", "port = 1"), encoding="utf-8")
+    service = await start("run", str(plant), "--port", "0")
+    url = await service.wait_for_url()
+    host, _, port = url.removeprefix("http://").partition(":")
+    async with AsyncExitStack() as stack:
+        for n in range(80):
+            _, writer = await asyncio.open_connection(host, int(port), limit=1024)
+            stack.callback(writer.close)
+            writer.write(HANGING[n % len(HANGING)])
+        assert (await service.get("/livez"))["status"] == "ok"
+
+        assert await service.end(signal.SIGTERM) == 0
+
+    assert "Traceback" not in service.errors
