@@ -1,5 +1,6 @@
 /** Alarms in words for people, and how each of them looks. */
 
+import { amplitudeUnit, shownAmplitude } from "./amplitudes.js";
 import { formatFixed, formatTime } from "./format.js";
 import { reasonWords } from "./words.js";
 
@@ -130,12 +131,17 @@ export function levelMark({ level, is_active: active }) {
   return level === "danger" ? ["bad", "Danger"] : ["uncertain", "Alert"];
 }
 
-/** `163.2 µm 0-pk, limit 150.0`; nothing where there are no numbers. */
+/** Kinds of alarms whose value is the amplitude of a line; those of broad-band vibration are not. */
+const LINE_AMPLITUDE = /^order1_(change_)?(shaft|bearing)_[xy]$/;
+
+/** `163.2 µm pk, limit 150.0`; nothing where there are no numbers. */
 export function valueWords({ kind, value, limit, value_unit: unit }) {
   if (value === null) return "";
   if (kind?.startsWith("stiffness_")) return filmWords(value, limit);
-  const digits = (number) => formatFixed(number, DECIMALS[unit] ?? 2);
-  return `${digits(value)} ${unit ?? ""}${limit === null ? "" : `, limit ${digits(limit)}`}`;
+  const isLine = LINE_AMPLITUDE.test(kind);
+  const digits = (number) => formatFixed(isLine ? shownAmplitude(number) : number, DECIMALS[unit] ?? 2);
+  const shownUnit = isLine ? amplitudeUnit() : (unit ?? "");
+  return `${digits(value)} ${shownUnit}${limit === null ? "" : `, limit ${digits(limit)}`}`;
 }
 
 /** A change of stiffness, which the API gives in ln: `−11.4 %, limit −3.9 %`. */

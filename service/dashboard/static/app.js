@@ -1,17 +1,16 @@
 /** The page as a whole: polls the overview, follows the address, redraws every second. */
 
 import { countWords } from "./alarm_words.js";
+import { onAmplitudes } from "./amplitudes.js";
 import { NotReachable, ask } from "./api.js";
 import { formatAge, formatTime, formatZone } from "./format.js";
 import { setAttribute, setText } from "./dom.js";
 import { SILENCE, failedNow, heardNow, moment, viewAt } from "./live.js";
 import { poll } from "./poll.js";
 import { ALARMS_ADDRESS, routeOf } from "./route.js";
+import { NO_PAGE, PAGES } from "./pages.js";
 import { mark } from "./parts/mark.js";
-import { alarmsPage } from "./pages/alarms.js";
-import { bearingPage } from "./pages/bearing.js";
-import { filmPage } from "./pages/film.js";
-import { overviewPage } from "./pages/overview.js";
+import { navigation } from "./parts/navigation.js";
 
 const OVERVIEW_PERIOD_S = 2;
 const REDRAW_PERIOD_MS = 1000;
@@ -21,6 +20,8 @@ const banner = document.getElementById("banner");
 const alarmLink = document.getElementById("alarms");
 const alarms = mark();
 alarmLink.append(alarms.node);
+const ways = navigation(PAGES);
+document.getElementById("bar").append(ways.button, ways.node);
 let live = SILENCE;
 let page = null;
 
@@ -67,13 +68,14 @@ function failureAge(view) {
 }
 
 function openPage() {
-  const onAlarms = location.hash === ALARMS_ADDRESS;
-  const route = routeOf(location.hash);
+  const { page: wanted, segments } = routeOf(location.hash, PAGES) ?? { page: NO_PAGE, segments: [] };
   page?.close();
   main.replaceChildren();
-  if (onAlarms) page = alarmsPage(main);
-  else page = route ? (route.isFilm ? filmPage : bearingPage)(main, route.unit, route.bearing) : overviewPage(main);
-  setAttribute(alarmLink, "aria-current", onAlarms ? "page" : null);
+  page = wanted.open(main, ...segments);
+  document.title = `padwatch: ${typeof wanted.title === "function" ? wanted.title(...segments) : wanted.title}`;
+  setAttribute(alarmLink, "aria-current", wanted.pattern === ALARMS_ADDRESS ? "page" : null);
+  ways.show(wanted);
+  ways.close();
   window.scrollTo(0, 0);
   draw();
 }
@@ -83,6 +85,7 @@ document.querySelector(".skip").addEventListener("click", (click) => {
   main.focus();
 });
 window.addEventListener("hashchange", openPage);
+onAmplitudes(openPage);
 openPage();
 poll(askOverview, () => OVERVIEW_PERIOD_S);
 setInterval(draw, REDRAW_PERIOD_MS);

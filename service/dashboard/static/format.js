@@ -1,9 +1,16 @@
 /** How a number is written, everywhere on the page: decimals, units, ages and times. */
 
+import { amplitudeFactor, amplitudeUnit } from "./amplitudes.js";
+
+/** Amplitudes of lines, shown zero-to-peak or peak-to-peak as the reader chose. */
+const AMPLITUDE = /_um_pk$/;
+
 const KINDS = [
   { name: /_n_per_m$/, scale: 1e9, decimals: 3, unit: "GN/m" },
   { name: /_n_s_per_m$/, scale: 1e6, decimals: 2, unit: "MN·s/m" },
-  { name: /_um_pk$/, scale: 1, decimals: 2, unit: "µm 0-pk" },
+  { name: /^overall_shaft_um_pk$/, scale: 1, decimals: 2, unit: "µm 0-pk" },
+  { name: /_um_pp$/, scale: 1, decimals: 2, unit: "µm pk-pk" },
+  { name: AMPLITUDE, scale: 1, decimals: 2, unit: "" },
   { name: /_um$/, scale: 1, decimals: 2, unit: "µm" },
   { name: /_rpm$/, scale: 1, decimals: 2, unit: "r/min" },
   { name: /_mw$/, scale: 1, decimals: 1, unit: "MW" },
@@ -20,7 +27,7 @@ const KINDS = [
 export function kindOf(quantity) {
   const kind = KINDS.find((candidate) => candidate.name.test(quantity));
   if (!kind) throw new Error(`no number format for the quantity ${quantity}`);
-  return kind;
+  return kind.name === AMPLITUDE ? { ...kind, scale: 1 / amplitudeFactor(), unit: amplitudeUnit() } : kind;
 }
 
 /** Fixed decimals, a true minus sign, and no minus before a rounded zero. */

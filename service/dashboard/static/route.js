@@ -1,4 +1,4 @@
-/** Addresses within the page: `#/`, `#/alarms`, `#/units/U1/bearings/UJB` and `…/UJB/film`. */
+/** Addresses within the page: `#/`, `#/alarms`, `#/units/U1/bearings/UJB`, `#/trends?span=3600`. */
 
 export const ALARMS_ADDRESS = "#/alarms";
 
@@ -12,10 +12,32 @@ export function filmAddress(unit, bearing) {
   return `${bearingAddress(unit, bearing)}/film`;
 }
 
-/** The unit and bearing an address names, and whether it is about the film; null for the overview. */
-export function routeOf(hash) {
-  const [, unit, bearing, film] = /^#\/units\/([^/]+)\/bearings\/([^/]+)(\/film)?$/.exec(hash) ?? [];
-  return bearing ? { unit: decoded(unit), bearing: decoded(bearing), isFilm: film !== undefined } : null;
+/**
+ * The first of some pages whose pattern an address fits, with the segments that the pattern leaves open.
+ *
+ * A pattern such as `#/units/:unit/bearings/:bearing` names open segments after a colon. What follows
+ * a question mark belongs to the page. Null if no page has such an address.
+ */
+export function routeOf(hash, pages) {
+  const parts = segmentsOf(hash || "#/");
+  for (const page of pages) {
+    const segments = openSegments(segmentsOf(page.pattern), parts);
+    if (segments) return { page, segments };
+  }
+  return null;
+}
+
+/** What a page keeps in its address behind the question mark. */
+export function queryOf(hash) {
+  return new URLSearchParams(hash.split("?")[1] ?? "");
+}
+
+const segmentsOf = (address) => address.split("?")[0].replace(/\/$/, "").split("/").slice(1);
+
+function openSegments(pattern, parts) {
+  if (pattern.length !== parts.length) return null;
+  if (!pattern.every((segment, n) => (segment.startsWith(":") ? parts[n] !== "" : segment === parts[n]))) return null;
+  return parts.filter((_, n) => pattern[n].startsWith(":")).map(decoded);
 }
 
 function decoded(segment) {

@@ -1,7 +1,7 @@
 /** The baseline as a map: eccentricity × oil temperature, colour = stiffness, support visible. */
 
 import { formatFixed } from "../format.js";
-import { FAINT, INK, axis, baseLayout } from "./style.js";
+import { FAINT, INK, PLOT, axis, baseLayout } from "./style.js";
 
 const SCALE = "Cividis"; // even to the eye, also without red or green
 const GN = 1e9;
@@ -101,7 +101,7 @@ export function mapLayout(cells, current, revision) {
     xaxis: axis("Eccentricity ratio", { range: ends("eccentricity_low", "eccentricity_high"), zeroline: false }),
     yaxis: axis("Oil temperature, °C", { range: ends("oil_temperature_low_c", "oil_temperature_high_c"), zeroline: false }),
     coloraxis: { colorscale: SCALE, colorbar: { title: { text: "GN/m" }, thickness: 12, outlinewidth: 0 } },
-    shapes: current ? [outline(current, "#ffffff", 5), outline(current, INK, 2.5)] : [],
+    shapes: current ? [outline(current, PLOT, 5), outline(current, INK, 2.5)] : [],
     hovermode: "closest",
     margin: { l: 56, r: 8, t: 8, b: 40 },
   });

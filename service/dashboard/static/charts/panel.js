@@ -3,8 +3,9 @@
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { mark } from "../parts/mark.js";
+import { onTheme } from "../theme.js";
 import { plotly } from "./plotly.js";
-import { CONFIG } from "./style.js";
+import { CONFIG, coloured } from "./style.js";
 
 /** Returns `{ node, show(traces, layout, caption), explain(sentence), trouble(sentence), draw(ageS, currentWords) }`. */
 export function panel(title, name, ...controls) {
@@ -23,6 +24,16 @@ export function panel(title, name, ...controls) {
     foot,
   );
   let trouble = null;
+  let shown = null;
+
+  async function redraw(library) {
+    await library.react(chart, coloured(shown.traces), coloured(shown.layout), CONFIG);
+  }
+
+  const stop = onTheme(async () => {
+    if (!node.isConnected) stop();
+    else if (shown !== null) await redraw(await plotly());
+  });
   return {
     node,
     async show(traces, layout, words) {
@@ -32,12 +43,13 @@ export function panel(title, name, ...controls) {
       chart.setAttribute("aria-label", `${title}. ${words}`);
       setText(caption, words);
       trouble = null;
-      await library.react(chart, traces, layout, CONFIG);
+      shown = { traces, layout };
+      await redraw(library);
     },
     explain(words) {
       reveal(chart, sentence, foot, false);
       setText(sentence, words);
-      trouble = null;
+      [trouble, shown] = [null, null];
     },
     /** The newest question failed: a chart already drawn stays, and says that it is old. */
     trouble(words) {

@@ -1,5 +1,6 @@
 /** Amplitude against frequency: shaft above, bearing below, 1× and vortex marked. */
 
+import { amplitudeFactor, amplitudeUnit, shownAmplitude } from "../amplitudes.js";
 import { formatFixed } from "../format.js";
 import { INK, X_COLOUR, Y_COLOUR, axis, baseLayout } from "./style.js";
 
@@ -20,7 +21,7 @@ const present = (spectrum) => CHANNELS.filter(([id]) => spectrum.channels[id]?.a
 export function spectrumTraces(spectrum) {
   return present(spectrum).map(([id, name, colour, dash, yaxis]) => ({
     x: spectrum.frequency_hz,
-    y: spectrum.channels[id].amplitude,
+    y: spectrum.channels[id].amplitude.map(shownAmplitude),
     type: "scatter",
     mode: "lines",
     name: name.replace(/.* /, ""),
@@ -28,18 +29,18 @@ export function spectrumTraces(spectrum) {
     showlegend: yaxis === "y" || !present(spectrum).some(([other]) => other === id.replace("bearing", "shaft")),
     yaxis,
     line: { color: colour, width: 1.4, dash },
-    hovertemplate: `${name}: %{y:.2f} µm at %{x:.3f} Hz<extra></extra>`,
+    hovertemplate: `${name}: %{y:.2f} ${amplitudeUnit()} at %{x:.3f} Hz<extra></extra>`,
   }));
 }
 
 export function spectrumLayout(spectrum, toHz) {
   const lines = Object.entries(spectrum.lines).filter(([, hz]) => hz !== null);
-  const range = (ids) => [0, 1.15 * largest(spectrum, ids, toHz)];
+  const range = (ids) => [0, 1.15 * amplitudeFactor() * largest(spectrum, ids, toHz)];
   return baseLayout(`spectrum ${toHz}`, {
     grid: { rows: 2, columns: 1 },
     xaxis: axis("Frequency, Hz", { range: [0, toHz], anchor: "y2" }),
-    yaxis: axis("shaft, µm 0-pk", { domain: [0.54, 1], range: range(["shaft_x", "shaft_y"]) }),
-    yaxis2: axis("bearing, µm 0-pk", { domain: [0, 0.46], range: range(["bearing_x", "bearing_y"]) }),
+    yaxis: axis(`shaft, ${amplitudeUnit()}`, { domain: [0.54, 1], range: range(["shaft_x", "shaft_y"]) }),
+    yaxis2: axis(`bearing, ${amplitudeUnit()}`, { domain: [0, 0.46], range: range(["bearing_x", "bearing_y"]) }),
     shapes: lines.map(([, hz]) => marker(hz)),
     annotations: lines.map(([name, hz]) => label(LINE_WORDS[name] ?? name, hz)),
     hovermode: "closest",

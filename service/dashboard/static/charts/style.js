@@ -1,26 +1,45 @@
-/** The quiet look all charts share: greys, x solid and dark, y dashed and brown. */
+/**
+ * The quiet look all charts share: greys, x solid and dark, y dashed and brown.
+ *
+ * Colours are named here as custom properties of base.css; `coloured` puts in what they are just now,
+ * light or dark. `panel` does so itself whenever it draws, and again when light turns dark.
+ */
 
-const INK = "#22282c";
-const GRID = "#d3d3cf";
+import { colourOf } from "../theme.js";
 
-export const X_COLOUR = "#1d4a73";
-export const Y_COLOUR = "#8a5a13";
-export const X_BAND = "rgba(29, 74, 115, 0.18)";
-export const Y_BAND = "rgba(138, 90, 19, 0.18)";
-export const DOUBT_COLOUR = "#b07a00";
-export const FAINT = "#8b9094";
-export { INK };
+export const INK = "var(--ink)";
+export const X_COLOUR = "var(--chart-x)";
+export const Y_COLOUR = "var(--chart-y)";
+export const X_BAND = "var(--chart-x-band)";
+export const Y_BAND = "var(--chart-y-band)";
+export const DOUBT_COLOUR = "var(--chart-doubt)";
+export const FAINT = "var(--chart-faint)";
+export const PLOT = "var(--plot)";
+const GRID = "var(--chart-grid)";
+
+/** Lines of a chart that compares more than two, in this order; each needs a dash or a marker of its own too. */
+export const SERIES = Array.from({ length: 8 }, (_, n) => `var(--series-${n + 1})`);
+
+const NAMED = /^var\((--[a-z0-9-]+)\)$/;
+
+/** Traces or a layout with the present colours in place of their names; columns of numbers stay as they are. */
+export function coloured(value) {
+  if (typeof value === "string") return NAMED.test(value) ? colourOf(NAMED.exec(value)[1]) : value;
+  if (Array.isArray(value)) return typeof value[0] === "number" ? value : value.map(coloured);
+  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value) || value instanceof Date) return value;
+  return Object.fromEntries(Object.entries(value).map(([name, one]) => [name, coloured(one)]));
+}
 
 /** Layout common to all; `uirevision` keeps a zoom across redraws until it changes. */
 export function baseLayout(uirevision, changes = {}) {
   return {
     uirevision,
     paper_bgcolor: "rgba(0,0,0,0)",
-    plot_bgcolor: "#fafaf8",
+    plot_bgcolor: PLOT,
     font: { family: "system-ui, sans-serif", size: 12, color: INK },
     margin: { l: 56, r: 12, t: 8, b: 40 },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", itemwidth: 44 },
-    hoverlabel: { bgcolor: "#ffffff", font: { color: INK } },
+    hoverlabel: { bgcolor: PLOT, bordercolor: FAINT, font: { color: INK } },
     dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
     ...changes,
   };
@@ -32,7 +51,7 @@ export function axis(title, changes = {}) {
     title: { text: title, standoff: 6 },
     gridcolor: GRID,
     linecolor: FAINT,
-    zerolinecolor: "#b5b5b0",
+    zerolinecolor: "var(--chart-zero)",
     ticks: "outside",
     tickcolor: FAINT,
     ...changes,

@@ -20,7 +20,6 @@ const N_EVENTS = "50";
 
 /** Returns `{ draw(view), close() }`. */
 export function alarmsPage(main) {
-  document.title = "padwatch: alarms";
   const state = mark();
   const actor = actorField();
   const again = () => [lists, histories].forEach((each) => each.again());

@@ -15,7 +15,6 @@ import { windowFacts } from "./window_facts.js";
 
 /** Returns `{ draw(view), close() }`. */
 export function bearingPage(main, unitId, bearingId) {
-  document.title = `padwatch: ${unitId} ${bearingId}`;
   const missing = element("p", { class: "sentence" });
   const content = element("div", { class: "bearing", hidden: "" });
   main.append(missing, content);

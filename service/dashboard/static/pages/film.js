@@ -14,7 +14,6 @@ const PERIOD_S = 10;
 
 /** Returns `{ draw(view), close() }`. */
 export function filmPage(main, unitId, bearingId) {
-  document.title = `padwatch: film of ${unitId} ${bearingId}`;
   const path = ["units", unitId, "bearings", bearingId];
   const head = headPart(unitId, bearingId);
   const actor = actorField("before you change a baseline");

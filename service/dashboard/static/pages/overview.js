@@ -7,7 +7,6 @@ import { unitCard } from "./unit_card.js";
 
 /** Returns `{ draw(view), close() }`. */
 export function overviewPage(main) {
-  document.title = "padwatch: overview";
   const summary = element("p", { class: "summary" });
   const cards = element("div", { class: "units" });
   main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, cards);

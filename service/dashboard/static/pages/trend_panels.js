@@ -1,5 +1,6 @@
 /** Stiffness and amplitude against time, over a span and at an order that the reader chooses. */
 
+import { amplitudeUnit } from "../amplitudes.js";
 import { NotReachable, ask } from "../api.js";
 import { panel } from "../charts/panel.js";
 import { doubtTrace, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
@@ -62,7 +63,7 @@ export function trendPanels(path) {
       trends = await askTrends(path, lines.flat(), span.value(), view.serviceTimeMs, signal);
       const asked = { trends, refreshS: view.refreshS, span, scale: scale.value(), latest };
       await showTrends(stiffness, asked, lines[0], "GN/m");
-      await showTrends(amplitude, asked, lines[1], "µm 0-pk");
+      await showTrends(amplitude, asked, lines[1], amplitudeUnit());
     } catch (failure) {
       if (signal.aborted) return;
       const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;

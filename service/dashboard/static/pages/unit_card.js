@@ -1,5 +1,6 @@
 /** One generating unit on the overview: its state, and a row for each bearing. */
 
+import { amplitudeUnit } from "../amplitudes.js";
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { filmBrief } from "../parts/film_brief.js";
@@ -13,10 +14,10 @@ const NO_SPREAD = () => null;
 const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "", NO_SPREAD) });
 const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "", null) });
 
-const COLUMNS = [
+const columns = () => [
   { head: "Stiffness ± 95 %", unit: "GN/m, preferred estimator", view: preferredView },
-  PAIR("Shaft 1×", "µm 0-pk", ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"]),
-  PAIR("Bearing 1×", "µm 0-pk", ["order1_bearing_x_um_pk", "order1_bearing_y_um_pk"], ["x", "y"]),
+  PAIR("Shaft 1×", amplitudeUnit(), ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"]),
+  PAIR("Bearing 1×", amplitudeUnit(), ["order1_bearing_x_um_pk", "order1_bearing_y_um_pk"], ["x", "y"]),
   PAIR("k_eff 1×", "GN/m, eq. (5)", ["order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"], ["xx", "yy"]),
   PAIR("k_eff vortex", "GN/m, eq. (5)", ["vortex_k_eff_xx_n_per_m", "vortex_k_eff_yy_n_per_m"], ["xx", "yy"]),
   SINGLE("Eccentricity", "ratio", "eccentricity_ratio"),
@@ -31,10 +32,11 @@ const NOBODY = { readings: {}, speed_source: null };
 export function unitCard(unit) {
   const running = runningView();
   const source = sourceView();
-  const rows = unit.bearings.map((latest) => bearingRow(unit.id, latest.bearing));
+  const shown = columns();
+  const rows = unit.bearings.map((latest) => bearingRow(unit.id, latest.bearing, shown));
   const head = element("div", { class: "unit-head" }, element("h2", {}, unit.name), running.node, source.node);
   return {
-    node: element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, rows)),
+    node: element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, shown, rows)),
     draw(now) {
       running.draw(now);
       source.draw(now.source);
@@ -43,8 +45,8 @@ export function unitCard(unit) {
   };
 }
 
-function table(unit, rows) {
-  const heads = COLUMNS.map(({ head, unit: unitOf }) =>
+function table(unit, shown, rows) {
+  const heads = shown.map(({ head, unit: unitOf }) =>
     element("th", { scope: "col", role: "columnheader" }, head, element("small", {}, unitOf)),
   );
   const first = element("th", { scope: "col", role: "columnheader" }, "Bearing");
@@ -59,14 +61,14 @@ function table(unit, rows) {
   );
 }
 
-function bearingRow(unit, bearing) {
-  const cells = COLUMNS.map((column) => column.view());
+function bearingRow(unit, bearing, shown) {
+  const cells = shown.map((column) => column.view());
   const quality = mark();
   const film = filmBrief();
   const age = element("span", { class: "data-age" });
   const link = element("a", { href: bearingAddress(unit, bearing) }, bearing);
   const boxes = cells.map((cell, index) =>
-    element("td", { role: "cell", "data-head": `${COLUMNS[index].head}, ${COLUMNS[index].unit}` }, cell.node),
+    element("td", { role: "cell", "data-head": `${shown[index].head}, ${shown[index].unit}` }, cell.node),
   );
   const node = element(
     "tr",

@@ -1,0 +1,24 @@
+/**
+ * Every page: a new one is a file in `pages/` and a line here.
+ *
+ * `pattern` is its address, with open segments after a colon. `title` follows "padwatch: " in the
+ * browser's tab; it is a text or is made from the segments. `nav` is its entry in the navigation,
+ * in the order of this list; pages without stay reachable by links only. `open(main, ...segments)`
+ * fills the empty `main` and returns `{ draw(view), close() }`.
+ */
+
+import { alarmsPage } from "./pages/alarms.js";
+import { bearingPage } from "./pages/bearing.js";
+import { filmPage } from "./pages/film.js";
+import { overviewPage } from "./pages/overview.js";
+import { unknownPage } from "./pages/unknown.js";
+
+export const PAGES = [
+  { pattern: "#/", title: "overview", nav: "Plant", open: overviewPage },
+  { pattern: "#/alarms", title: "alarms", nav: "Alarms", open: alarmsPage },
+  { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },
+  { pattern: "#/units/:unit/bearings/:bearing/film", title: (unit, bearing) => `film of ${unit} ${bearing}`, open: filmPage },
+];
+
+/** What an address leads to that none of the pages has. */
+export const NO_PAGE = { title: "no such page", open: unknownPage };

@@ -1,0 +1,38 @@
+/** The way to every page, and how this browser shows them; behind a button where the screen is narrow. */
+
+import { AMPLITUDES, amplitudes, chooseAmplitudes } from "../amplitudes.js";
+import { element, setAttribute } from "../dom.js";
+import { THEMES, chooseTheme, theme } from "../theme.js";
+
+/** Returns `{ button, node, show(page), close() }`; `show` marks where we are, `close` folds the menu up. */
+export function navigation(pages) {
+  const links = pages.filter((page) => page.nav).map((page) => [page, element("a", { href: page.pattern }, page.nav)]);
+  const list = element("ul", {}, ...links.map(([, link]) => element("li", {}, link)));
+  const look = select("Look", THEMES, theme(), chooseTheme);
+  const amplitude = select("Amplitudes", AMPLITUDES, amplitudes(), chooseAmplitudes);
+  const node = element("div", { id: "menu", class: "menu" }, element("nav", { "aria-label": "Pages" }, list), look, amplitude);
+  const button = element("button", { type: "button", class: "menu-button", "aria-expanded": "false", "aria-controls": "menu" }, "Menu");
+  const unfold = (open) => setAttribute(button, "aria-expanded", String(open));
+  button.addEventListener("click", () => unfold(button.getAttribute("aria-expanded") !== "true"));
+  node.addEventListener("keydown", (key) => {
+    if (key.key !== "Escape" || button.getAttribute("aria-expanded") !== "true") return;
+    unfold(false);
+    button.focus();
+  });
+  return {
+    button,
+    node,
+    show(here) {
+      for (const [page, link] of links) setAttribute(link, "aria-current", page === here ? "page" : null);
+    },
+    close: () => unfold(false),
+  };
+}
+
+function select(label, options, chosen, choose) {
+  const choices = options.map(([value, words]) => element("option", { value }, words));
+  const control = element("select", {}, ...choices);
+  control.value = chosen;
+  control.addEventListener("change", () => choose(control.value));
+  return element("label", { class: "setting" }, `${label} `, control);
+}
