@@ -13,6 +13,7 @@ from service.settings.evidence import EvidenceSettings
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.http_limits import HostName, HttpLimitSettings
 from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.spectra import SpectraSettings
 from service.settings.units import UnitSettings
 
 MIN_SEGMENT_TURNS = 8
@@ -180,6 +181,9 @@ class PlantFile(Settings):
 
     evidence: EvidenceSettings = EvidenceSettings()
     """What is kept of alarms beside their samples."""
+
+    spectra: SpectraSettings = SpectraSettings()
+    """Spectra that are kept over time."""
 
     delivery: DeliverySettings = DeliverySettings()
     """Receivers of messages about alarms, besides the dashboard."""

@@ -16,6 +16,7 @@ from service.store.audit_port import AuditStore
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.outbox_port import Outbox
+from service.store.spectra_port import SpectraStore
 from service.store.value_range import ValueRange
 from service.store.vector_reference_port import VectorReferenceStore
 
@@ -143,6 +144,11 @@ class Store(Protocol):
     @property
     def films(self) -> FilmStore:
         """Readings and baselines of films."""
+        ...
+
+    @property
+    def spectra(self) -> SpectraStore:
+        """Spectra over time, kept as assessments are appended."""
         ...
 
     @property

@@ -8,6 +8,7 @@ from service.store.audit_schema import AUDIT_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.port import StoreError
+from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.vector_references import VECTOR_REFERENCE_TABLES
 
 APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
@@ -133,6 +134,7 @@ MIGRATIONS = (
     VECTOR_REFERENCE_TABLES,
     AUDIT_TABLES,
     ACCESS_TABLES,
+    SPECTRA_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -4,8 +4,10 @@ from pathlib import Path
 
 from service.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.spectra import SpectraSettings
 from service.store.outbox_port import Address, nobody
 from service.store.port import Store
+from service.store.spectra_port import SpectraLimits, TierLimits
 from service.store.sqlite import SqliteStore
 
 DATABASE = "padwatch.sqlite3"
@@ -29,4 +31,13 @@ def open_store(plant: PlantFile, origin: Origin = Origin.LIVE, address: Address 
     StoreError
         If it cannot be used, or holds results of the other origin.
     """
-    return SqliteStore(database_path(plant), origin, address)
+    return SqliteStore(database_path(plant), origin, address, spectra_limits(plant.spectra))
+
+
+def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
+    """How many spectra are kept."""
+    return SpectraLimits(
+        TierLimits(settings.dense_every_s, settings.n_dense),
+        TierLimits(settings.sparse_every_s, settings.n_sparse),
+        settings.n_lines,
+    )
