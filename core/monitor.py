@@ -4,14 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from core.account import Gap, SampleAccount
-from core.adoption import bearings_with_new_references, require_same_machine
 from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.bearing_results import BearingResults
 from core.blocks import SampleBlock
 from core.machine import Bearing, Unit
+from core.monitored_unit import MonitoredUnit
 from core.position_results import measured_growth
-from core.probe_axes import Growth
 from core.quality import worst
 from core.ring import Ring
 from core.segments import Segment, SegmentTransform
@@ -31,7 +29,7 @@ JUDGED = (
 """The readings whose worst quality is the quality of the assessment."""
 
 
-class UnitMonitor:
+class UnitMonitor(MonitoredUnit):
     """Watches one unit. All state of its analysis is here and nowhere else.
 
     What comes from the samples depends on them and their indices alone, not on how they were cut
@@ -40,44 +38,12 @@ class UnitMonitor:
     """
 
     def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
-        self.unit = unit
+        super().__init__(unit, Ring(len(unit.channels), 2 * settings.segment_samples))
         self._settings = settings
-        self._ring = Ring(len(unit.channels), 2 * settings.segment_samples)
         self._transform = SegmentTransform(unit, settings)
         self._next_start: int | None = None
         self._first_start = 0
         self._n_voided = 0
-        self._gaps: list[Gap] = []
-        self._growth: dict[str, Growth] = {}
-
-    @property
-    def account(self) -> SampleAccount:
-        """Where every sample went that the unit's device offered."""
-        return self._ring.account
-
-    def adopt(self, unit: Unit) -> None:
-        """Take a new description of the same unit, from the next assessment on.
-
-        Parameters
-        ----------
-        unit
-            The bearings' references, clearances and brackets may differ; what the segments that
-            are being averaged were made with may not.
-
-        Raises
-        ------
-        ValueError
-            If it does; the message says where, and gives both.
-        """
-        require_same_machine(self.unit, unit)
-        for bearing in bearings_with_new_references(self.unit, unit):
-            self._growth.pop(bearing, None)  # it counts from a reference
-        self.unit = unit
-
-    def drain_gaps(self) -> list[Gap]:
-        """Hand over the gaps found since the last call, to be recorded."""
-        gaps, self._gaps = self._gaps, []
-        return gaps
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
         """Take a block in and return what has been learnt by it.
@@ -97,10 +63,7 @@ class UnitMonitor:
             If the block is not of this unit, or has another sampling rate or number of channels;
             the message gives both.
         """
-        if block.unit != self.unit.id:
-            raise ValueError(f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}")
-        if block.rate_hz != self.unit.rate_hz:
-            raise ValueError(f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
+        self._require_own(block)
         assessments: list[Assessment] = []
         for piece in _pieces(block, self._settings.segment_samples):
             self._write(piece)
@@ -109,9 +72,7 @@ class UnitMonitor:
 
     def _write(self, block: SampleBlock) -> None:
         epoch = self._ring.epoch
-        gap = self._ring.write(block)
-        if gap is not None:
-            self._gaps.append(gap)
+        self._write_to_ring(block)
         restarted = self._ring.epoch != epoch
         if restarted:
             self._transform.clear()

@@ -5,15 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from core.account import Gap, SampleAccount
-from core.adoption import bearings_with_new_references, require_same_machine
 from core.assessment import Assessment, AveragingWindow
 from core.blocks import SampleBlock
 from core.cross_spectrum import CrossSpectrum
 from core.machine import Bearing, Unit
 from core.monitor import JUDGED
+from core.monitored_unit import MonitoredUnit
 from core.position_results import measured_growth
-from core.probe_axes import Growth
 from core.quality import worst
 from core.ring import Ring
 from core.runout import RunoutVerdict, runout_verdict
@@ -24,7 +22,7 @@ from core.vector_rows import VectorRow
 from core.vector_settings import VectorSettings
 
 
-class VectorMonitor:
+class VectorMonitor(MonitoredUnit):
     """Watches a unit by the vectors of its rack. All state of its analysis is here.
 
     Results depend on the polls and their indices alone, not on how they were cut into blocks.
@@ -53,39 +51,14 @@ class VectorMonitor:
         settings: AnalysisSettings,
         averaging: VectorSettings | None = None,
     ) -> None:
-        self.unit = unit
+        # the ring is for the index rules and the account; polls are kept here
+        super().__init__(unit, Ring(len(rows), 1))
         self._settings = settings
         self._averaging = averaging or VectorSettings()
         self._reader = PollReader(unit, rows, settings)
-        self._ring = Ring(len(rows), 1)  # for the index rules and the account; polls are kept here
         self._polls: deque[Poll] = deque()
         self._first_index: int | None = None
         self._n_hops = -1
-        self._gaps: list[Gap] = []
-        self._growth: dict[str, Growth] = {}
-
-    @property
-    def account(self) -> SampleAccount:
-        """Where every poll went."""
-        return self._ring.account
-
-    def adopt(self, unit: Unit) -> None:
-        """Take a new description of the same unit, from the next assessment on.
-
-        Raises
-        ------
-        ValueError
-            If more than references, clearances and brackets differ; says where, and gives both.
-        """
-        require_same_machine(self.unit, unit)
-        for bearing in bearings_with_new_references(self.unit, unit):
-            self._growth.pop(bearing, None)  # it counts from a reference
-        self.unit = unit
-
-    def drain_gaps(self) -> list[Gap]:
-        """Hand over the gaps found since the last call, to be recorded."""
-        gaps, self._gaps = self._gaps, []
-        return gaps
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
         """Take a block in and return what has been learnt by it.
@@ -104,14 +77,9 @@ class VectorMonitor:
         ValueError
             If the block is not of this unit, or has another rate or number of rows.
         """
-        if block.unit != self.unit.id:
-            raise ValueError(f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}")
-        if block.rate_hz != self.unit.rate_hz:
-            raise ValueError(f"polls at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
+        self._require_own(block)
         epoch, taken_up_to = self._ring.epoch, self._ring.stop_index
-        gap = self._ring.write(block)
-        if gap is not None:
-            self._gaps.append(gap)
+        self._write_to_ring(block)
         if block.epoch != epoch:
             self._begin(block.first_index)
             taken_up_to = 0

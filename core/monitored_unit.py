@@ -1,0 +1,65 @@
+"""What every monitor keeps of its unit: its description, its samples' account, its gaps."""
+
+from core.account import Gap, SampleAccount
+from core.adoption import bearings_with_new_references, require_same_machine
+from core.blocks import SampleBlock
+from core.machine import Unit
+from core.probe_axes import Growth
+from core.ring import Ring
+
+
+class MonitoredUnit:
+    """A unit that is watched.
+
+    Parameters
+    ----------
+    ring
+        Takes the unit's blocks, by the rules of their indices.
+    """
+
+    def __init__(self, unit: Unit, ring: Ring) -> None:
+        self.unit = unit
+        self._ring = ring
+        self._gaps: list[Gap] = []
+        self._growth: dict[str, Growth] = {}
+
+    @property
+    def account(self) -> SampleAccount:
+        """Where every sample went that the unit's device offered."""
+        return self._ring.account
+
+    def adopt(self, unit: Unit) -> None:
+        """Take a new description of the same unit, from the next assessment on.
+
+        Parameters
+        ----------
+        unit
+            The bearings' references, clearances and brackets may differ; what the results that
+            are being averaged were made with may not.
+
+        Raises
+        ------
+        ValueError
+            If it does; the message says where, and gives both.
+        """
+        require_same_machine(self.unit, unit)
+        for bearing in bearings_with_new_references(self.unit, unit):
+            self._growth.pop(bearing, None)  # it counts from a reference
+        self.unit = unit
+
+    def drain_gaps(self) -> list[Gap]:
+        """Hand over the gaps found since the last call, to be recorded."""
+        gaps, self._gaps = self._gaps, []
+        return gaps
+
+    def _require_own(self, block: SampleBlock) -> None:
+        """Refuse a block of another unit or another rate, with a ValueError that gives both."""
+        if block.unit != self.unit.id:
+            raise ValueError(f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}")
+        if block.rate_hz != self.unit.rate_hz:
+            raise ValueError(f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
+
+    def _write_to_ring(self, block: SampleBlock) -> None:
+        gap = self._ring.write(block)
+        if gap is not None:
+            self._gaps.append(gap)
