@@ -3,6 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -68,6 +69,8 @@ class Recorder:
         self._waits_since_s = 0.0
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
+        # its own: the others may all be busy answering
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="recorder")
 
     @property
     def n_waiting(self) -> int:
@@ -133,7 +136,8 @@ class Recorder:
         gaps = [gap for findings in batch for gap in findings.gaps]
         films = [told for findings in batch for told in findings.films]
         try:
-            await asyncio.to_thread(self._append, assessments, gaps, alarms, films)
+            loop = asyncio.get_running_loop()
+            await loop.run_in_executor(self._thread, self._append, assessments, gaps, alarms, films)
         except StoreError as error:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))

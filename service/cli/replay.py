@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-import uvloop
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from service.cli.daq import SpeedOption
 from service.cli.daq_process import daq_process
+from service.cli.ending import run_to_its_end
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import announce
 from service.http.listening import PortInUseError, listen
@@ -94,4 +94,4 @@ def _performance(
 
 def _run(performance: Performance, port: int) -> None:
     with listen(performance.plant.service.host, port) as listener:
-        uvloop.run(run_service(performance, listener, SystemClock(), announce))
+        run_to_its_end(run_service(performance, listener, SystemClock(), announce))

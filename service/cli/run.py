@@ -5,10 +5,10 @@ from typing import Annotated
 
 import structlog
 import typer
-import uvloop
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
+from service.cli.ending import run_to_its_end
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.http.listening import PortInUseError, listen
 from service.notify import ServiceManager
@@ -38,7 +38,7 @@ def run_plant(plant: PlantFile, port: int) -> None:
             clock = SystemClock()
             performance = Performance(plant, live_units(plant, clock))
             manager = ServiceManager(os.environ)
-            uvloop.run(run_service(performance, listener, clock, announce, manager))
+            run_to_its_end(run_service(performance, listener, clock, announce, manager))
     except (PortInUseError, StoreError, AcquisitionError) as error:
         fail(f"padwatch: {error}")
 

@@ -6,6 +6,7 @@ from typing import Any, cast
 import uvicorn
 from starlette.types import ASGIApp
 
+from service.http.answers import BoundedAnswers
 from service.http.connections import Connections
 from service.http.guard import guarded
 from service.settings.http_limits import HttpLimitSettings
@@ -15,7 +16,7 @@ STOP_S = 2
 
 
 class GuardedConfig(uvicorn.Config):
-    """Uvicorn's configuration and the open connections.
+    """Uvicorn's configuration, the open connections and the answers that are worked on.
 
     Parameters
     ----------
@@ -33,8 +34,11 @@ class GuardedConfig(uvicorn.Config):
         now_s: Callable[[], float],
         **options: Any,
     ) -> None:
+        self.answers = BoundedAnswers(app, limits)
         super().__init__(
-            cast(Any, guarded(app, limits, hosts)),  # Starlette and uvicorn name its type apart
+            cast(
+                Any, guarded(self.answers, limits, hosts)
+            ),  # Starlette and uvicorn name its type apart
             http="service.http.protocol:GuardedProtocol",
             ws="none",
             log_level="warning",

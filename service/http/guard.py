@@ -11,11 +11,10 @@ from service.http.security_headers import SecurityHeaders
 from service.settings.http_limits import HttpLimitSettings
 
 
-def guarded(app: ASGIApp, limits: HttpLimitSettings, hosts: Iterable[str] = ()) -> ASGIApp:
-    """Put the defence before an application.
+def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:
+    """Put the rest of the defence before an application whose answers are bounded.
 
     Bodies come before the count of requests, so that slow senders use up nobody's place.
     """
-    answers = BoundedAnswers(app, limits)
     bodies = WholeBodies(answers, limits)
     return SecurityHeaders(KnownHosts(bodies, hosts))

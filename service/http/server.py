@@ -20,6 +20,7 @@ class GuardedServer(uvicorn.Server):
 
     def __init__(self, config: GuardedConfig) -> None:
         super().__init__(config)
+        self._guarded = config
         self._pulse: Pulse = UNHEARD
 
     async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
@@ -30,9 +31,7 @@ class GuardedServer(uvicorn.Server):
     @property
     def open(self) -> Connections:
         """The open connections."""
-        if not isinstance(self.config, GuardedConfig):
-            raise TypeError("a guarded server needs a guarded configuration")
-        return self.config.connections
+        return self._guarded.connections
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -49,9 +48,13 @@ class GuardedServer(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Close everything in time; who does not read his answer is not waited for to the end."""
         # before uvicorn cancels the tasks, which would log a traceback for each
-        patience = asyncio.get_running_loop().call_later(0.75 * STOP_S, self.open.abort_all)
+        patience = asyncio.get_running_loop().call_later(0.75 * STOP_S, self._give_up)
         try:
             await super().shutdown(sockets)
         finally:
             patience.cancel()
             self.open.abort_all()
+
+    def _give_up(self) -> None:
+        self._guarded.answers.give_up()
+        self.open.abort_all()

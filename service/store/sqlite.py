@@ -12,6 +12,7 @@ from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
+from service.asker import ASKER
 from service.audit.head import head_path
 from service.origin import Origin
 from service.store.access import SqliteAccess
@@ -44,6 +45,9 @@ from service.store.spectra_port import SpectraLimits
 from service.store.vector_references import SqliteVectorReferences
 
 BUSY_TIMEOUT_S = 5.0
+LOOK_AFTER_STEPS = 20_000
+"""Steps of the database's machine, some tens of microseconds, after which a read looks whether
+anybody still waits for it."""
 
 INSERT_ASSESSMENT = """
     INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
@@ -256,6 +260,9 @@ class SqliteStore:
             self._renamed_errors(),
             closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader,
         ):
+            asker = ASKER.get()
+            if asker is not None:
+                reader.set_progress_handler(lambda: asker.has_gone, LOOK_AFTER_STEPS)
             yield reader
 
     @contextmanager

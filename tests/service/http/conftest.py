@@ -80,6 +80,7 @@ class Running:
     port: int
     clients: AsyncExitStack
     now_s: float = 0.0
+    serving: asyncio.Future[None] = field(default_factory=asyncio.Future)
 
     async def client(self) -> Client:
         n_before = self.server.open.n_accepted
@@ -124,7 +125,7 @@ async def running(limits: HttpLimitSettings, hosts: list[str]) -> AsyncIterator[
         state = Running(app, None, listener.getsockname()[1], clients)  # type: ignore[arg-type]
         config = GuardedConfig(app, limits, hosts, lambda: state.now_s)
         state.server = GuardedServer(config)
-        serving = asyncio.create_task(state.server.serve([listener]))
+        state.serving = asyncio.create_task(state.server.serve([listener]))
         while not state.server.started:
             await asyncio.sleep(0)
         try:
@@ -133,7 +134,7 @@ async def running(limits: HttpLimitSettings, hosts: list[str]) -> AsyncIterator[
         finally:
             app.goes_on.set()
             state.server.should_exit = True
-            await serving
+            await state.serving
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """A client that never finishes does not stay, and takes nobody's place while it is there."""
 
-import asyncio
-
 import pytest
 
 LARGE_MIB = 64
@@ -184,7 +182,7 @@ async def test_an_answer_that_does_not_come_is_given_up(start) -> None:
     assert b"took too long" in client.body
 
 
-@pytest.mark.parametrize("what", ["silent", "head", "body", "unread"])
+@pytest.mark.parametrize("what", ["silent", "head", "body", "unread", "unanswered"])
 async def test_the_server_stops_whatever_clients_do(start, what: str, caplog) -> None:
     running = await start()
     client = await running.client()
@@ -193,14 +191,17 @@ async def test_the_server_stops_whatever_clients_do(start, what: str, caplog) ->
         "head": b"GET / HTTP/1.1\r\nHo",
         "body": b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\n1",
         "unread": b"GET /large HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        "unanswered": b"GET /slow HTTP/1.1\r\nHost: localhost\r\n\r\n",
     }[what]
     await client.send(said)
     if what == "unread":
         connection = running.connection()
         await running.until(lambda: connection.n_unsent() > 0)
+    if what == "unanswered":
+        await running.until(lambda: running.app.n_asked == 1)
 
     running.server.should_exit = True
-    await running.until(lambda: len(running.server.open) == 0)
-    await asyncio.sleep(0)
+    await running.serving
 
+    assert len(running.server.open) == 0
     assert not any(record.exc_info for record in caplog.records)

@@ -1,0 +1,37 @@
+"""An end that does not wait for threads which still work for nobody."""
+
+import asyncio
+import os
+import sys
+from collections.abc import Coroutine
+from threading import Timer
+from typing import Any
+
+import structlog
+import uvloop
+
+LEAVE_S = 1.0
+"""What threads get to finish in after the program has ended."""
+
+log = structlog.get_logger()
+
+
+def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
+    """Run a program that leaves nothing unwritten when it returns.
+
+    The event loop would wait without limit for threads that have begun to read or compute what
+    nobody is there for any more; no thread can be stopped from outside, but the process can.
+    """
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        runner.run(program)
+        leaving = Timer(LEAVE_S, _leave)
+        leaving.daemon = True
+        leaving.start()
+    leaving.cancel()
+
+
+def _leave() -> None:
+    log.warning("threads that still work for nobody are left behind")
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
