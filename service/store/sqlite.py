@@ -39,9 +39,9 @@ from service.store.port import (
 )
 from service.store.references import insert_reference, select_history, select_in_force
 from service.store.schema import migrate
-from service.store.trends import select_readings, storable
 from service.store.spectra import SqliteSpectra, insert_spectra
 from service.store.spectra_port import SpectraLimits
+from service.store.trends import select_readings, storable
 from service.store.vector_references import SqliteVectorReferences
 
 BUSY_TIMEOUT_S = 5.0
@@ -68,12 +68,12 @@ class SqliteStore:
         What it is to hold; a file that holds the other is refused.
     address
         Who is to be told of events of alarms.
+    spectra
+        How many spectra are kept.
 
     Raises
     ------
     StoreError
-    spectra
-        How many spectra are kept.
         If the file cannot be opened, is not padwatch's, is damaged, or is newer than this program.
     """
 
@@ -85,18 +85,18 @@ class SqliteStore:
         spectra: SpectraLimits | None = None,
     ) -> None:
         self._path, self._origin, self._address = path, origin, address
+        self._spectra_limits = spectra or SpectraLimits()
         self._lock = Lock()
         self.outbox = SqliteOutbox(self._writing, self._reader)
         self._chain = AuditChain(head_path(path))
         self.audit = SqliteAudit(self._writing, self._reader, self._chain)
-        self._spectra_limits = spectra or SpectraLimits()
         self.films = SqliteFilms(self._writing, self._reader, self._series_id, self._chain)
         self.order1_references = SqliteVectorReferences(self._writing, self._reader, self._chain)
+        self.spectra = SqliteSpectra(self._reader)
         self.access = SqliteAccess(self._writing, self._reader, self._chain)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
-        self.spectra = SqliteSpectra(self._reader)
             self._writer = sqlite3.connect(
                 path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
             )
@@ -128,11 +128,11 @@ class SqliteStore:
         with self._lock, self._renamed_errors(), self._transaction():
             rows = [self._row(assessment) for assessment in assessments]
             self._writer.executemany(INSERT_ASSESSMENT, rows)
+            insert_spectra(self._writer, assessments, self._series_id, self._spectra_limits)
             self._writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
             insert_alarms(self._writer, alarms, self._chain.add, self._address)
             insert_film_news(self._writer, films, self._series_id)
 
-            insert_spectra(self._writer, assessments, self._series_id, self._spectra_limits)
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
         with self._reader() as reader:
