@@ -31,6 +31,7 @@ from service.api.reference_routes import reference_router
 from service.api.source_routes import source_router
 from service.api.trend_routes import trend_router
 from service.audit.refusals import Refusals
+from service.dashboard.edition import EditionHeader
 from service.dashboard.routes import dashboard_router
 from service.metrics.routes import metrics_router
 
@@ -54,6 +55,7 @@ def create_app(context: Context) -> FastAPI:
         responses=any_other_problem(),
     )
     app.add_middleware(OriginHeader, origin=context.origin)
+    app.add_middleware(EditionHeader)
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
     app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
     install_problem_handlers(app)

@@ -1,5 +1,7 @@
 /** Questions to the padwatch service, with every way they can fail told apart. */
 
+import { noteEdition } from "./edition.js";
+
 const TIMEOUT_MS = 8000;
 
 /** The service does not answer at all. */
@@ -7,38 +9,69 @@ export class NotReachable extends Error {}
 
 /** The service answered that it cannot give this; the message is a sentence for people. */
 export class Refused extends Error {
-  constructor(status, sentence) {
+  constructor(status, sentence, retryAfterS = null) {
     super(sentence);
     this.status = status;
+    this.retryAfterS = retryAfterS;
   }
 }
 
-/** Fetch JSON from `/api/v1`; `path` is a list of segments, `query` a list of pairs. */
+/** Answers by address with their entity tags, the one asked for longest ago first. */
+const answers = new Map();
+const N_ANSWERS = 32;
+
+/**
+ * Fetch JSON from `/api/v1`; `path` is a list of segments, `query` a list of pairs.
+ *
+ * While nothing is new the service does not send the answer again, and the very same object is
+ * returned: whoever counts ages in it must count them from when that object first came.
+ */
 export async function ask(path, query = [], signal = undefined) {
   const search = new URLSearchParams(query).toString();
-  return given(await answer(search ? `${urlOf(path)}?${search}` : urlOf(path), signal));
+  const url = search ? `${urlOf(path)}?${search}` : urlOf(path);
+  const known = answers.get(url);
+  const headers = known ? { ...JSON_ONLY, "If-None-Match": known.tag } : JSON_ONLY;
+  const response = await answer(url, signal, { headers });
+  const body = known && response.status === 304 ? known.body : await given(response);
+  keep(url, response.headers.get("ETag") ?? known?.tag, body);
+  return body;
 }
 
-/** Ask `/api/v1` to do something; `body` is sent as JSON. */
-export async function tell(path, body) {
-  const headers = { Accept: "application/json", "Content-Type": "application/json" };
-  return given(await answer(urlOf(path), undefined, { method: "POST", headers, body: JSON.stringify(body) }));
+/** Ask `/api/v1` to do something; `body` is sent as JSON. Null where there is nothing to answer. */
+export async function tell(path, body, method = "POST") {
+  const headers = { ...JSON_ONLY, "Content-Type": "application/json" };
+  const response = await answer(urlOf(path), undefined, { method, headers, body: JSON.stringify(body) });
+  return response.status === 204 ? null : given(response);
 }
+
+/** Forget every answer: the next reader may be somebody else. */
+export const forget = () => answers.clear();
+
+const JSON_ONLY = { Accept: "application/json" };
 
 const urlOf = (path) => `/api/v1/${path.map(encodeURIComponent).join("/")}`;
 
+function keep(url, tag, body) {
+  answers.delete(url);
+  if (tag) answers.set(url, { tag, body });
+  if (answers.size > N_ANSWERS) answers.delete(answers.keys().next().value);
+}
+
 async function given(response) {
   const body = await decoded(response);
-  if (!response.ok) throw new Refused(response.status, sentenceOf(response, body));
+  if (!response.ok) throw refusal(response, body);
   if (body === null) throw new NotReachable("The answer does not come from padwatch.");
   return body;
 }
 
-async function answer(url, signal, how = { headers: { Accept: "application/json" } }) {
+async function answer(url, signal, how) {
   const limit = AbortSignal.timeout(TIMEOUT_MS);
   const either = signal ? AbortSignal.any([signal, limit]) : limit;
   try {
-    return await fetch(url, { ...how, signal: either, cache: "no-store" });
+    // no-store: the browser's own cache has no say, `answers` above has
+    const response = await fetch(url, { ...how, signal: either, cache: "no-store" });
+    noteEdition(response.headers);
+    return response;
   } catch (failure) {
     if (signal?.aborted) throw failure;
     throw new NotReachable(limit.aborted ? `No answer within ${TIMEOUT_MS / 1000} s.` : "No connection.");
@@ -54,7 +87,10 @@ async function decoded(response) {
   }
 }
 
-function sentenceOf(response, body) {
-  const words = body?.detail || body?.title || `The service answered with status ${response.status}`;
-  return words.charAt(0).toUpperCase() + words.slice(1).replace(/\.?$/, ".");
+function refusal(response, body) {
+  const { status } = response;
+  const words = body?.detail || body?.title || `The service answered with status ${status}`;
+  const sentence = words.charAt(0).toUpperCase() + words.slice(1).replace(/\.?$/, ".");
+  const seconds = Number.parseInt(response.headers.get("Retry-After"), 10);
+  return new Refused(status, sentence, Number.isNaN(seconds) ? null : seconds);
 }

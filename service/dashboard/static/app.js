@@ -3,6 +3,7 @@
 import { countWords } from "./alarm_words.js";
 import { onAmplitudes } from "./amplitudes.js";
 import { NotReachable, ask } from "./api.js";
+import { onUpgrade } from "./edition.js";
 import { formatAge, formatTime, formatZone } from "./format.js";
 import { setAttribute, setText } from "./dom.js";
 import { SILENCE, failedNow, heardNow, moment, viewAt } from "./live.js";
@@ -27,7 +28,7 @@ let page = null;
 
 async function askOverview(signal) {
   try {
-    live = heardNow(await ask(["overview"], [], signal), moment());
+    live = heardNow(live, await ask(["overview"], [], signal), moment());
   } catch (failure) {
     if (signal.aborted) return;
     live = failedNow(live, failureWords(failure), moment());
@@ -84,6 +85,8 @@ document.querySelector(".skip").addEventListener("click", (click) => {
   click.preventDefault();
   main.focus();
 });
+document.getElementById("reload").addEventListener("click", () => location.reload());
+onUpgrade(() => (document.getElementById("upgrade").hidden = false));
 window.addEventListener("hashchange", openPage);
 onAmplitudes(openPage);
 openPage();

@@ -8,8 +8,8 @@ const NOT_REACHABLE = { level: "bad", reason: "service_not_reachable" };
 /** What a bearing is without a current answer, beside its readings. */
 const NOTHING_KNOWN = { quality: NOT_REACHABLE, speed_source: null, estimators: { xx: null, yy: null } };
 
-/** Nothing has been heard yet. */
-export const SILENCE = { overview: null, heard: null, failure: null, failedSince: null };
+/** Nothing has been heard yet. `heard`: the last answer; `dated`: when what it holds first came. */
+export const SILENCE = { overview: null, heard: null, dated: null, failure: null, failedSince: null };
 
 /** Two clocks, since a steady one may stand still while a laptop sleeps. */
 export function moment() {
@@ -21,9 +21,10 @@ export function secondsBetween(earlier, later) {
   return Math.max(later.steadyMs - earlier.steadyMs, later.wallMs - earlier.wallMs, 0) / 1000;
 }
 
-/** The state after a good answer. */
-export function heardNow(overview, now) {
-  return { overview, heard: now, failure: null, failedSince: null };
+/** The state after a good answer; one that is the same as before keeps its date, so that ages go on. */
+export function heardNow(live, overview, now) {
+  const dated = overview === live.overview ? live.dated : now;
+  return { overview, heard: now, dated, failure: null, failedSince: null };
 }
 
 /** The state after a question that failed; the last answer stays, and ages. */
@@ -35,6 +36,7 @@ export function failedNow(live, sentence, now) {
 export function viewAt(live, now) {
   const silenceS = live.heard ? secondsBetween(live.heard, now) : null;
   const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
+  const sinceS = live.dated ? secondsBetween(live.dated, now) : null;
   return {
     current,
     silenceS,
@@ -46,23 +48,23 @@ export function viewAt(live, now) {
     captureError: live.overview?.captures.error ?? null,
     alarms: current ? live.overview.alarms : null,
     refreshS: live.overview?.refresh_s ?? null,
-    serviceTimeMs: live.overview ? Date.parse(live.overview.time) + silenceS * 1000 : null,
-    units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, silenceS, current)),
+    serviceTimeMs: live.overview ? Date.parse(live.overview.time) + sinceS * 1000 : null,
+    units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, sinceS, current)),
   };
 }
 
-function agedUnit(unit, silenceS, current) {
-  const source = { ...unit.source, data_age_s: aged(unit.source.data_age_s, silenceS) };
+function agedUnit(unit, sinceS, current) {
+  const source = { ...unit.source, data_age_s: aged(unit.source.data_age_s, sinceS) };
   return {
     ...unit,
     source: current ? source : { ...source, state: "unknown", reason: null, since: null },
-    bearings: unit.bearings.map((latest) => agedLatest(latest, silenceS, current)),
+    bearings: unit.bearings.map((latest) => agedLatest(latest, sinceS, current)),
     films: current ? unit.films : unit.films.map(withheldFilm),
   };
 }
 
-function agedLatest(latest, silenceS, current) {
-  const shown = { ...latest, age_s: aged(latest.age_s, silenceS) };
+function agedLatest(latest, sinceS, current) {
+  const shown = { ...latest, age_s: aged(latest.age_s, sinceS) };
   return current ? shown : { ...shown, ...NOTHING_KNOWN, readings: withheld(latest.readings) };
 }
 
@@ -78,6 +80,6 @@ function withheld(readings) {
   );
 }
 
-function aged(ageS, silenceS) {
-  return ageS === null ? null : ageS + silenceS;
+function aged(ageS, sinceS) {
+  return ageS === null ? null : ageS + sinceS;
 }
