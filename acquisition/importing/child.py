@@ -4,7 +4,6 @@ Whatever a hostile file does to a reader happens here, with bounded memory and t
 writing anything; what comes out are messages of :mod:`acquisition.importing.stream`.
 """
 
-import resource
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,16 +15,16 @@ from acquisition.errors import ConfigError
 from acquisition.importing.job import Format, ImportJob
 from acquisition.importing.rows import Table, raw_blocks
 from acquisition.importing.stream import block_message, frames_message, send
+from acquisition.reading_process import confine
 
 MEMORY_BYTES = 2 * 2**30
 CPU_S = 3600
 _LOG_BYTES = 1_000_000
-"""Most that it may write to a file: its own last words, and no unpacked archives."""
 
 
 def main() -> None:
     """Read one file."""
-    _limit()
+    confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
     job = TypeAdapter(ImportJob).validate_json(sys.stdin.buffer.read())
     out = sys.stdout.buffer
     try:
@@ -35,13 +34,6 @@ def main() -> None:
     except MemoryError:
         send(out, {"kind": "error", "message": f"needs more than {MEMORY_BYTES >> 30} GiB to read"})
     out.flush()
-
-
-def _limit() -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (_LOG_BYTES, _LOG_BYTES))
 
 
 def _read(path: Path, job: ImportJob, out: BinaryIO) -> None:

@@ -2,11 +2,7 @@
 
 import os
 import select
-import signal
 import stat
-import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +14,7 @@ from acquisition.importing.frames import FrameBatch
 from acquisition.importing.job import ImportJob
 from acquisition.importing.stream import Message, block_of, frames_of, receive
 from acquisition.raw import RawBlock
+from acquisition.reading_process import ReadingProcess, printable, reading_process
 
 SILENCE_S = 300.0
 """Longest that a file may be worked on without a block coming out."""
@@ -83,7 +80,7 @@ class Reading:
         kind = message[0].get("kind")
         if kind == "error":
             words = " ".join(str(message[0].get("message")).split())
-            raise ConfigError(f"{self._path}: {_printable(words)}")
+            raise ConfigError(f"{self._path}: {printable(words)}")
         if kind not in kinds:
             raise ConfigError(f"{self._path}: an answer out of turn from the reading process")
         return message
@@ -103,49 +100,33 @@ def reading(path: Path, job: ImportJob) -> Iterator[Reading]:
             raise ConfigError(f"{path}: not a regular file")
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from error
-    with tempfile.TemporaryFile() as log:
-        command = [sys.executable, "-m", "acquisition.importing.child", str(path.absolute())]
-        process = subprocess.Popen(  # noqa: S603  our own module
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            env=os.environ | _ENVIRONMENT | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        )
-        try:
-            child = _Process(process, log.fileno())
-            child.start(TypeAdapter(ImportJob).dump_json(job))
-            yield Reading(child, path, job)
-        finally:
-            process.kill()
-            process.wait()
-            for pipe in (process.stdin, process.stdout):
-                if pipe is not None:
-                    pipe.close()
+    with reading_process("acquisition.importing.child", path, _ENVIRONMENT) as process:
+        child = _Process(process)
+        child.start(TypeAdapter(ImportJob).dump_json(job))
+        yield Reading(child, path, job)
 
 
 class _Process:
     """The pipe from the reading process."""
 
-    def __init__(self, process: "subprocess.Popen[bytes]", log: int) -> None:
-        self._process, self._log = process, log
+    def __init__(self, process: ReadingProcess) -> None:
+        self._process = process
         self._held = bytearray()
         self._is_silent = False
 
     def start(self, job: bytes) -> None:
-        if self._process.stdin is not None:
-            try:
-                self._process.stdin.write(job)
-                self._process.stdin.close()
-            except BrokenPipeError:
-                return  # its last words say why
+        try:
+            self._process.job.write(job)
+            self._process.job.close()
+        except BrokenPipeError:
+            return  # its last words say why
 
     def read(self, n_bytes: int) -> bytes:
         """Just so many bytes; raises EOFError if the process ends or falls silent before."""
-        out = self._process.stdout
-        while len(self._held) < n_bytes and out is not None:
+        out = self._process.found.fileno()
+        while len(self._held) < n_bytes:
             self._is_silent = not select.select([out], [], [], SILENCE_S)[0]
-            more = b"" if self._is_silent else os.read(out.fileno(), _CHUNK)
+            more = b"" if self._is_silent else os.read(out, _CHUNK)
             if not more:
                 raise EOFError
             self._held += more
@@ -157,14 +138,4 @@ class _Process:
         """Why it ended, in one line."""
         if self._is_silent:
             return f"nothing came out of it for {SILENCE_S:g} s"
-        code = self._process.wait()
-        if code < 0:
-            return f"reading it was ended by {signal.Signals(-code).name}"
-        size = os.lseek(self._log, 0, os.SEEK_END)
-        text = os.pread(self._log, 4000, max(0, size - 4000)).decode("utf-8", "replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return _printable(lines[-1] if lines else f"reading it ended with code {code}")
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else "�" for c in text)[:300]
+        return self._process.last_words()

@@ -4,7 +4,6 @@ Whatever a hostile file does to a reader happens here, with bounded memory and t
 writing anything.
 """
 
-import resource
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, BinaryIO
 
 import pyarrow as pa
 
+from acquisition.reading_process import confine
 from service.back_test.csv_rows import csv_batches
 from service.back_test.file_columns import MAX_ROWS, ReadingsError
 from service.back_test.parquet_rows import MAGIC, parquet_batches
@@ -26,7 +26,7 @@ _LOG_BYTES = 100_000
 
 def main() -> None:
     """Read one file."""
-    _limit()
+    confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
     try:
         with Path(sys.argv[1]).open("rb") as stream:
             _send(_batches(stream), sys.stdout.buffer)
@@ -59,13 +59,6 @@ def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:
 def _end(words: str) -> None:
     sys.stderr.write(words[:2000])
     sys.exit(WRONG_FILE)
-
-
-def _limit() -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (_LOG_BYTES, _LOG_BYTES))
 
 
 if __name__ == "__main__":

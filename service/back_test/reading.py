@@ -1,17 +1,13 @@
 """A file of readings into one history per bearing."""
 
-import os
-import signal
 import stat
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import pyarrow as pa
 
+from acquisition.reading_process import ReadingProcess, reading_process
 from core.history_rows import BearingRows, Place, histories_from_columns
 from service.back_test.child import WRONG_FILE
 from service.back_test.coded import Gathered
@@ -55,33 +51,20 @@ def read_histories(
 
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
-    with tempfile.TemporaryFile() as log:
-        command = [sys.executable, "-m", "service.back_test.child", str(path.absolute())]
-        process = subprocess.Popen(  # noqa: S603  our own module
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            env=os.environ | _ENVIRONMENT | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        )
+    with reading_process("service.back_test.child", path, _ENVIRONMENT) as process:
         try:
-            return _gathered(process, log, word, advanced)
-        finally:
-            process.kill()
-            process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
+            gathered = _gathered(process, word, advanced)
+        except (pa.ArrowException, OSError):
+            raise ReadingsError(_why(process)) from None
+        if process.exit_code() != 0:
+            raise ReadingsError(_why(process))
+        return gathered.columns()
 
 
-def _gathered(
-    process: "subprocess.Popen[bytes]",
-    log: IO[bytes],
-    word: str,
-    advanced: Callable[[int], object],
-) -> Mapping[str, Any]:
+def _gathered(process: ReadingProcess, word: str, advanced: Callable[[int], object]) -> Gathered:
+    reader = pa.ipc.open_stream(process.found)
+    gathered, before = Gathered(reader.schema, word), 0
     try:
-        reader = pa.ipc.open_stream(process.stdout)
-        gathered, before = Gathered(reader.schema, word), 0
         while True:
             batch, metadata = reader.read_next_batch_with_custom_metadata()
             gathered.add(batch)
@@ -89,26 +72,9 @@ def _gathered(
             advanced(n_bytes - before)
             before = n_bytes
     except StopIteration:
-        pass
-    except (pa.ArrowException, OSError):
-        raise ReadingsError(_last_words(process, log)) from None
-    if process.wait() != 0:
-        raise ReadingsError(_last_words(process, log))
-    return gathered.columns()
+        return gathered
 
 
-def _last_words(process: "subprocess.Popen[bytes]", log: IO[bytes]) -> str:
-    code = process.wait()
-    log.seek(0)
-    said = _printable(log.read(2000).decode(errors="replace"))
-    if code == WRONG_FILE:
-        return " ".join(said)
-    if code < 0:
-        return f"not readable: the reading process ended by {signal.Signals(-code).name}"
-    return f"not readable: {said[-1][:200] if said else 'no reason given'}"
-
-
-def _printable(text: str) -> list[str]:
-    """Lines as a terminal may have them: names in a file may be anything."""
-    lines = text.strip().splitlines()
-    return ["".join(c if c.isprintable() else "?" for c in line) for line in lines]
+def _why(process: ReadingProcess) -> str:
+    words = process.last_words()
+    return words if process.exit_code() == WRONG_FILE else f"not readable: {words}"
