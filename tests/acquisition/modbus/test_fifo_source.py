@@ -9,13 +9,10 @@ import pytest
 
 from acquisition.daq.fifo_device import FifoDevice
 from acquisition.daq.tcp_server import ModbusTcpServer
-from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.counted_samples import CountedSamples
-from acquisition.modbus.fifo_assembly import ChannelAssembly, place_records
+from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.transport import TcpTransport
-from acquisition.registers.cells import MapError
-from acquisition.registers.fifo_layout import FifoKind, FifoLayout, FifoPiece
+from acquisition.registers.fifo_layout import FifoKind, FifoLayout
 from core.blocks import SampleBlock
 
 STEP = 50
@@ -280,31 +277,6 @@ async def test_a_reading_that_holds_no_whole_records_is_refused(plant) -> None:
                 await anext(stream)
 
 
-def test_a_counter_that_counts_nothing_is_refused() -> None:
-    samples = CountedSamples(600.0, removes=True, epoch=1)
-    counters = np.array([5000, 40_000, 12, 33_333])
-    with pytest.raises(FrameError, match="does not count"):
-        place_records(FifoPiece(counters, np.zeros((2, 4), dtype=np.int16)), samples, 0.0)
-
-
-def test_channels_that_count_differently_are_not_put_side_by_side() -> None:
-    assembly = ChannelAssembly(2, CountedSamples(600.0, removes=True, epoch=1))
-    pieces = [
-        FifoPiece(first + np.arange(4), np.zeros((1, 4), dtype=np.int16)) for first in (5000, 0)
-    ]
-    with pytest.raises(FrameError, match="counts -5004 samples apart"):
-        assembly.place(pieces, 0.0)
-
-
-def test_a_channel_that_gives_nothing_holds_the_others_back_in_bounded_memory() -> None:
-    assembly = ChannelAssembly(2, CountedSamples(600.0, removes=True, epoch=1))
-    nothing = FifoPiece(np.arange(0), np.zeros((1, 0), dtype=np.int16))
-    for n in range(1000):
-        piece = FifoPiece(30 * n + np.arange(30), np.zeros((1, 30), dtype=np.int16))
-        assert assembly.place([piece, nothing], n * 0.05) == []
-    assert max(map(len, assembly._waiting)) <= 1100
-
-
 def test_a_source_needs_a_queue_of_its_channels(counts_calibration, stepped_clock) -> None:
     settings = FifoSettings(transport=TcpTransport(host="127.0.0.1"))
     three = FifoLayout(addresses=(1000,), n_channels=3)
@@ -318,28 +290,3 @@ async def test_a_queue_that_is_not_there_can_never_work(plant) -> None:
         with pytest.raises(ConfigError, match="illegal address"):
             async with p.source.connect() as stream:
                 await anext(stream)
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"addresses": (0,), "n_channels": 31}, "32 registers; a FIFO read has at most 31"),
-        ({"addresses": (0, 1), "n_channels": 2}, "must be 1, got 2"),
-        ({"addresses": (0,), "n_channels": 2, "kind": FifoKind.PER_CHANNEL}, "must be 2, got 1"),
-        ({"addresses": (5, 5), "n_channels": 2, "kind": FifoKind.PER_CHANNEL}, "names a queue"),
-        ({"addresses": (70_000,), "n_channels": 2}, "0 to 65535"),
-        ({"addresses": (0,), "n_channels": 2, "has_counter": False, "removes": False}, "are new"),
-        (
-            {
-                "addresses": (0, 1),
-                "n_channels": 2,
-                "has_counter": False,
-                "kind": FifoKind.PER_CHANNEL,
-            },
-            "belong together",
-        ),
-    ],
-)
-def test_a_queue_that_cannot_be_followed_is_refused_at_once(settings, said: str) -> None:
-    with pytest.raises(MapError, match=said):
-        FifoLayout(**settings)

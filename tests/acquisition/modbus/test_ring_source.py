@@ -7,7 +7,6 @@ from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.errors import LinkError
 from acquisition.modbus.profile import RingHeader, encode_header
 from acquisition.modbus.slot import encode_slot
 from core.blocks import Rejection
@@ -198,87 +197,6 @@ async def test_counters_wrap_without_a_trace(counting_feed, source_at, read_unti
     np.testing.assert_array_equal(samples_of(blocks), np.arange(650))
 
 
-async def test_a_restarted_device_starts_a_new_epoch_from_its_first_sample(
-    device, server, source_at, read_until
-):
-    async with source_at(server.port).connect() as stream:
-        before = await anext(stream)
-        device.produce(2)
-        await read_until(stream, 150)
-        device.restart()
-        device.produce(2)
-        after = await read_until(stream, 150)
-    assert after[0].epoch != before.epoch
-    assert after[0].first_index == 0
-    np.testing.assert_array_equal(samples_of(after), np.arange(150, 300))
-
-
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
-async def test_a_new_epoch_is_read_from_its_start_though_its_newest_slot_is_lost(
-    device, server, source_at, read_until
-):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(7)
-        await read_until(stream, 400)
-        device.restart()
-        device.produce(2)
-        device.produce(1, faults.dropped)
-        [first, second, third] = await read_until(stream, 150)
-        device.produce(1)
-        block = await anext(stream)
-    assert (first.first_index, second.first_index, third.first_index) == (0, 50, 100)
-    assert (block.first_index, block.epoch) == (200, first.epoch)
-
-
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
-async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
-    device, server, source_at
-):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(1)
-        await anext(stream)
-        address = device.layout.slot_address(1)
-        left_behind = device.memory.read(address, device.layout.slot_registers)
-        device.restart()
-        device.produce(1, faults.dropped)
-        device.memory.write(address, left_behind)
-        device.produce(1)
-        blocks = [await anext(stream), await anext(stream)]
-    assert [block.first_index for block in blocks] == [0, 100]
-    np.testing.assert_array_equal(blocks[1].samples[0], np.arange(200, 250))
-
-
-async def test_a_restart_that_the_device_does_not_tell_is_a_new_epoch_all_the_same(
-    device, server, source_at, read_until
-):
-    async with source_at(server.port).connect() as stream:
-        before = await anext(stream)
-        device.produce(200)
-        await read_until(stream, 201 * 50)
-        device.restart(next_epoch=False)
-        device.produce(2)
-        after = await read_until(stream, 150)
-    assert after[0].epoch != before.epoch
-    assert after[0].first_index == 0
-
-
-async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
-    counting_feed, source_at, read_until, version
-):
-    settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000, version=version)
-    device = RingDevice(counting_feed(n_channels=3), settings=settings)
-    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
-        before = await anext(stream)
-        device.first_sequence = 0
-        device.restart(next_epoch=False)
-        device.produce(2)
-        after = await read_until(stream, 150)
-    assert after[0].epoch != before.epoch
-    assert (after[0].first_index, after[0].rejected) == (50, (Rejection("inconsistent_index", 50),))
-
-
 async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(
     counting_feed, source_at, version
 ):
@@ -335,33 +253,3 @@ async def test_slow_values_belong_to_their_samples_whenever_the_reader_looks(
         blocks = await read_until(stream, 200)
     assert [block.slow["slow0"].value for block in blocks] == [46.0, 47.0, 48.0]
     assert all(block.slow["slow1"].value is None for block in blocks)
-
-
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
-async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_new(
-    device, server, source_at
-):
-    source = source_at(server.port)
-    old_header = device.memory.read(0, 16)
-    device.restart()
-    async with source.connect() as stream:
-        device.produce(3)
-        blocks = [await anext(stream)]
-        new_header = device.memory.read(0, 16)
-        n_looks = 0
-
-        def show_old_header_once(address, _):
-            nonlocal n_looks
-            if address == 0:
-                n_looks += 1
-                device.memory.write(0, old_header if n_looks == 1 else new_header)
-
-        device.memory.before_read = show_old_header_once
-        with pytest.raises(LinkError, match="epoch or layout change"):
-            await anext(stream)
-    device.memory.before_read = None
-    device.produce(1)
-    async with source.connect() as stream:
-        blocks.append(await anext(stream))
-    assert blocks[1].first_index == blocks[0].stop_index
-    assert blocks[1].epoch == blocks[0].epoch
