@@ -91,12 +91,22 @@ export function pendingSentence({ change, verdict }, { alert }) {
 }
 
 function changeWords(change, limits) {
-  const spread = Math.max(change.high_95 - change.percent, change.percent - change.low_95);
   const hours = `${formatFixed(change.time_scale_h, 0)} running hours`;
-  return `${signedPercent(change.percent)} ± ${formatFixed(spread, 1)} % over ${hours}; limit ${limitWords(limits)}`;
+  return `${percentWords(change)} over ${hours}; limit ${limitWords(limits)}`;
 }
 
-const limitWords = ({ alert, danger }) => `${trimmed(100 * alert)} %, danger ${trimmed(100 * danger)} %`;
+function percentWords(change) {
+  const spread = Math.max(change.high_95 - change.percent, change.percent - change.low_95);
+  return `${signedPercent(change.percent)} ± ${formatFixed(spread, 1)} %`;
+}
+
+/** `−19.2 % ± 2.8 %`; nothing while it is not judged. */
+export function changeBrief({ change, verdict }) {
+  return change === null || !JUDGED.includes(verdict) ? "" : percentWords(change);
+}
+
+/** `4 %, danger 15 %` */
+export const limitWords = ({ alert, danger }) => `${trimmed(100 * alert)} %, danger ${trimmed(100 * danger)} %`;
 const trimmed = (number) => String(Number(number.toFixed(2)));
 
 /** `Cause: film, since the shaft moves as …`. */

@@ -12,6 +12,7 @@ const KINDS = [
   { name: /_um_pp$/, scale: 1, decimals: 2, unit: "µm pk-pk" },
   { name: AMPLITUDE, scale: 1, decimals: 2, unit: "" },
   { name: /_um$/, scale: 1, decimals: 2, unit: "µm" },
+  { name: /_mm_s_rms$/, scale: 1, decimals: 2, unit: "mm/s rms" },
   { name: /_rpm$/, scale: 1, decimals: 2, unit: "r/min" },
   { name: /_mw$/, scale: 1, decimals: 1, unit: "MW" },
   { name: /_c$/, scale: 1, decimals: 1, unit: "°C" },

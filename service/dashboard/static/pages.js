@@ -11,11 +11,15 @@ import { alarmsPage } from "./pages/alarms.js";
 import { bearingPage } from "./pages/bearing.js";
 import { filmPage } from "./pages/film.js";
 import { overviewPage } from "./pages/overview.js";
+import { sourcesPage } from "./pages/sources.js";
+import { unitPage } from "./pages/unit.js";
 import { unknownPage } from "./pages/unknown.js";
 
 export const PAGES = [
   { pattern: "#/", title: "overview", nav: "Plant", open: overviewPage },
   { pattern: "#/alarms", title: "alarms", nav: "Alarms", open: alarmsPage },
+  { pattern: "#/sources", title: "source health", nav: "Sources", open: sourcesPage },
+  { pattern: "#/units/:unit", title: (unit) => unit, open: unitPage },
   { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },
   { pattern: "#/units/:unit/bearings/:bearing/film", title: (unit, bearing) => `film of ${unit} ${bearing}`, open: filmPage },
 ];

@@ -1,6 +1,13 @@
 /** Addresses within the page: `#/`, `#/alarms`, `#/units/U1/bearings/UJB`, `#/trends?span=3600`. */
 
 export const ALARMS_ADDRESS = "#/alarms";
+export const SOURCES_ADDRESS = "#/sources";
+export const RECORDINGS_ADDRESS = "#/recordings";
+
+/** Address of a unit's page. */
+export function unitAddress(unit) {
+  return `#/units/${encodeURIComponent(unit)}`;
+}
 
 /** Address of a bearing's page. */
 export function bearingAddress(unit, bearing) {

@@ -5,17 +5,19 @@ import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { filmBrief } from "../parts/film_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
-import { pairView, readingOf, readingView } from "../parts/reading.js";
+import { pairView, readingView } from "../parts/reading.js";
+import { runningView } from "../parts/running.js";
 import { sourceView } from "../parts/source.js";
-import { bearingAddress } from "../route.js";
-import { preferredOrigin, qualityOf, speedOrigin } from "../words.js";
+import { stiffnessBrief } from "../parts/stiffness_brief.js";
+import { bearingAddress, unitAddress } from "../route.js";
+import { qualityOf } from "../words.js";
 
 const NO_SPREAD = () => null;
 const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "", NO_SPREAD) });
 const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "", null) });
 
 const columns = () => [
-  { head: "Stiffness ± 95 %", unit: "GN/m, preferred estimator", view: preferredView },
+  { head: "Stiffness ± 95 %", unit: "GN/m, preferred estimator", view: stiffnessBrief },
   PAIR("Shaft 1×", amplitudeUnit(), ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"]),
   PAIR("Bearing 1×", amplitudeUnit(), ["order1_bearing_x_um_pk", "order1_bearing_y_um_pk"], ["x", "y"]),
   PAIR("k_eff 1×", "GN/m, eq. (5)", ["order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"], ["xx", "yy"]),
@@ -26,20 +28,19 @@ const columns = () => [
 
 const [FILM, FILM_UNIT] = ["Film", "against its baseline"];
 
-const NOBODY = { readings: {}, speed_source: null };
-
-/** Returns `{ node, draw(unit) }`. */
-export function unitCard(unit) {
+/** Returns `{ node, draw(unit) }`; `alarm` is the unit's mark of open alarms. */
+export function unitCard(unit, alarm) {
   const running = runningView();
   const source = sourceView();
   const shown = columns();
   const rows = unit.bearings.map((latest) => bearingRow(unit.id, latest.bearing, shown));
-  const head = element("div", { class: "unit-head" }, element("h2", {}, unit.name), running.node, source.node);
+  const head = element("div", { class: "unit-head" }, element("h2", {}, element("a", { href: unitAddress(unit.id) }, unit.name)), running.node, alarm.node, source.node);
   return {
     node: element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, shown, rows)),
     draw(now) {
       running.draw(now);
       source.draw(now.source);
+      alarm.draw();
       rows.forEach((row, index) => row.draw(now.bearings[index], now.films[index]));
     },
   };
@@ -86,37 +87,6 @@ function bearingRow(unit, bearing, shown) {
       for (const cell of cells) cell.draw(latest, whole.reason);
       drawQuality(quality, whole);
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
-    },
-  };
-}
-
-/** The stiffness that alarms and trends use, and the estimator it comes from. */
-function preferredView() {
-  const pair = pairView(["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"], ["xx", "yy"], "");
-  const from = element("span", { class: "from" });
-  return {
-    node: element("div", { class: "preferred" }, pair.node, from),
-    draw(latest, saidReason) {
-      pair.draw(latest, saidReason);
-      setText(from, preferredOrigin(latest));
-    },
-  };
-}
-
-/** Speed and power of the unit: the same for all its bearings, so the first that has them speaks. */
-function runningView() {
-  const speed = readingView("speed_rpm", "Speed");
-  const from = element("span", { class: "from" });
-  const power = readingView("power_mw", "Power");
-  return {
-    node: element("div", { class: "running" }, speed.node, from, power.node),
-    draw(unit) {
-      const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NOBODY;
-      const latest = knowing("speed_rpm");
-      speed.draw(latest, latest.quality?.reason);
-      const origin = speedOrigin(latest);
-      setText(from, origin && `(${origin})`);
-      power.draw(knowing("power_mw"), latest.quality?.reason);
     },
   };
 }

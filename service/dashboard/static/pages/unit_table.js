@@ -1,0 +1,131 @@
+/** The bearings of a unit side by side: a column for each bearing, a row for each question. */
+
+import { amplitudeUnit } from "../amplitudes.js";
+import { element, setText } from "../dom.js";
+import { changeBrief, limitWords, verdictMark, whyUnjudged } from "../film_words.js";
+import { formatAge } from "../format.js";
+import { centrePicture } from "../parts/centre_picture.js";
+import { drawQuality, mark } from "../parts/mark.js";
+import { pairView, readingView } from "../parts/reading.js";
+import { stiffnessBrief } from "../parts/stiffness_brief.js";
+import { bearingAddress, filmAddress } from "../route.js";
+import { qualityOf, reasonSentence } from "../words.js";
+
+const NO_SPREAD = () => null;
+const pair = (names, labels, unit) => () => readingCell(pairView(names, labels, unit, NO_SPREAD));
+
+/** Each row: its head, its unit, and a view that draws `(latest, film, brief)`. */
+const rows = () => [
+  ["Film", "against its baseline", filmCell],
+  ["Film stiffness", "GN/m ± 95 %", () => readingCell(stiffnessBrief())],
+  ["Shaft vibration, 1×", amplitudeUnit(), pair(["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"], "")],
+  ["Shaft vibration, broad-band", "µm pk-pk", pair(["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"], "")],
+  ["Bearing velocity, broad-band", "mm/s rms", pair(["overall_bearing_x_mm_s_rms", "overall_bearing_y_mm_s_rms"], ["x", "y"], "")],
+  ["Shaft centre", "in the clearance circle", centreCell],
+  ["Oil temperature", "", () => readingCell(readingView("oil_temperature_c", "", undefined, null))],
+  ["Quality", "and data age", qualityCell],
+  ["Open", "", null],
+];
+
+/** Returns `{ node, draw(unit, view, films) }`. */
+export function unitTable(unit) {
+  const bearings = unit.bearings.map(({ bearing }) => bearing);
+  const drawn = rows().map((row) => tableRow(unit.id, bearings, row));
+  const heads = bearings.map((bearing) =>
+    element("th", { scope: "col", role: "columnheader" }, element("a", { href: bearingAddress(unit.id, bearing) }, bearing)),
+  );
+  const corner = element("td", { role: "cell" });
+  const table = element(
+    "table",
+    { role: "table", "aria-label": `Bearings of ${unit.name} side by side` },
+    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, corner, ...heads)),
+    element("tbody", { role: "rowgroup" }, ...drawn.map((row) => row.node)),
+  );
+  return {
+    node: element("section", { class: "panel side-by-side" }, table),
+    draw(now, view, films) {
+      bearings.forEach((bearing, n) => {
+        const film = view.current ? films.get(bearing) : null;
+        for (const row of drawn) row.cells[n]?.draw(now.bearings[n], film ?? null, now.films[n]);
+      });
+    },
+  };
+}
+
+function tableRow(unit, bearings, [head, words, view]) {
+  const cells = bearings.map((bearing) => (view ? view() : { node: links(unit, bearing), draw() {} }));
+  const boxes = cells.map((cell, n) => element("td", { role: "cell", "data-head": bearings[n], "data-bearing": bearings[n] }, cell.node));
+  const title = element("th", { scope: "row", role: "rowheader" }, head, element("small", {}, words));
+  return { cells, node: element("tr", { role: "row" }, title, ...boxes) };
+}
+
+/** A reading's view as a cell: what the quality at the foot says is not shouted in every row. */
+function readingCell(view) {
+  return { node: view.node, draw: (latest) => view.draw(latest, qualityOf(latest).reason) };
+}
+
+/** The verdict in x and y with the change behind it, and the limits of the change. */
+function filmCell() {
+  const none = element("span", { class: "from" });
+  const limits = element("span", { class: "from" });
+  const lines = ["x", "y"].map(filmLine);
+  return {
+    node: element("div", { class: "film-lines" }, none, ...lines.map((line) => line.node), limits),
+    draw(latest, film, brief) {
+      setText(none, brief.why_not ? `Not watched: ${brief.why_not}` : "");
+      setText(limits, film?.is_watched ? `limit ${limitWords(film.limits)}` : "");
+      for (const line of lines) line.draw(brief[line.direction], film?.[line.direction] ?? null);
+    },
+  };
+}
+
+function filmLine(direction) {
+  const verdict = mark();
+  const change = element("span", { class: "change" });
+  const said = element("span", { class: "from" });
+  const node = element("div", { class: "film-line", "data-direction": direction }, verdict.node, change, said);
+  return {
+    node,
+    direction,
+    draw(brief, found) {
+      node.hidden = brief === null;
+      if (brief === null) return;
+      const [look, words] = verdictMark(brief);
+      verdict.draw(look, `${direction} ${words.charAt(0).toLowerCase()}${words.slice(1)}`);
+      setText(change, found ? changeBrief(found) : "");
+      setText(said, found ? whyUnjudged(found) : "");
+    },
+  };
+}
+
+function centreCell() {
+  const picture = centrePicture();
+  const numbers = pairView(["eccentricity_ratio", "attitude_angle_deg"], ["ratio", "angle"], undefined, NO_SPREAD);
+  return {
+    node: element("div", { class: "centre-cell" }, picture.node, numbers.node),
+    draw(latest) {
+      picture.draw(latest);
+      numbers.draw(latest, qualityOf(latest).reason);
+    },
+  };
+}
+
+function qualityCell() {
+  const quality = mark();
+  const why = element("span", { class: "from" });
+  const age = element("span", { class: "data-age" });
+  return {
+    node: element("div", { class: "quality" }, quality.node, why, age),
+    draw(latest) {
+      const whole = qualityOf(latest);
+      drawQuality(quality, whole);
+      setText(why, whole.level === "good" ? "" : reasonSentence(whole.reason));
+      setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
+    },
+  };
+}
+
+function links(unit, bearing) {
+  const ways = [["Numbers and charts", bearingAddress(unit, bearing)], ["Film and baseline", filmAddress(unit, bearing)]];
+  return element("ul", { class: "ways" }, ...ways.map(([words, href]) => element("li", {}, element("a", { href }, words))));
+}
