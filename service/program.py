@@ -29,6 +29,7 @@ from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
+from service.rolling import Rolling
 from service.runner import BUS_CAPACITY, Runner, WatchedUnit
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
@@ -132,6 +133,7 @@ async def _run(
     runner = Runner(units, live, recorder, clock, alarms, films, bus, beats)
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
+    rolling = Rolling(store.rollups, clock)
     audit = ServiceTrail(plant, performance.origin, store.audit, clock)
     await audit.begin()
     context = Context(
@@ -177,6 +179,7 @@ async def _run(
             capturing = tasks.create_task(beats.tend("captures", captures.run), name="captures")
             witnessing = tasks.create_task(beats.tend("evidence", evidence.run), name="evidence")
             learning = tasks.create_task(_learn(films, performance.origin, beats), name="learn")
+            gathering = tasks.create_task(beats.tend("gather", rolling.run), name="gather")
             delivering = tasks.create_task(deliveries.run(beats), name="deliver")
             serving = tasks.create_task(
                 beats.tend("serve", partial(server.run_on, listener)), name="serve"
@@ -191,7 +194,7 @@ async def _run(
             supervision.stopping()
             server.should_exit = True
             helping = (capturing, witnessing, learning, delivering, announcing, supervising)
-            for task in (running, looking, watching, *helping):
+            for task in (running, looking, watching, gathering, *helping):
                 task.cancel()
             await asyncio.wait([serving])
     finally:

@@ -16,6 +16,7 @@ from service.store.audit_port import AuditStore
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.outbox_port import Outbox
+from service.store.rollups.port import RollupStore
 from service.store.spectra_port import SpectraStore
 from service.store.value_range import ValueRange
 from service.store.vector_reference_port import VectorReferenceStore
@@ -154,6 +155,11 @@ class Store(Protocol):
     @property
     def audit(self) -> AuditStore:
         """Who did what to what."""
+        ...
+
+    @property
+    def rollups(self) -> RollupStore:
+        """Trends gathered beforehand."""
         ...
 
     @property

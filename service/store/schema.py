@@ -8,6 +8,7 @@ from service.store.audit_schema import AUDIT_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.port import StoreError
+from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.vector_references import VECTOR_REFERENCE_TABLES
 
@@ -135,6 +136,7 @@ MIGRATIONS = (
     AUDIT_TABLES,
     ACCESS_TABLES,
     SPECTRA_TABLES,
+    ROLLUP_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
 

@@ -20,7 +20,6 @@ from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import SqliteAudit
 from service.store.audit_chain import AuditChain, begin_head, has_trail
 from service.store.audit_deeds import reference_deed
-from service.store.buckets import bucket_width_ns, bucketed, page, single_points
 from service.store.codec import Layout, columns_of, remember_layout
 from service.store.film_readings import insert_film_news
 from service.store.films import SqliteFilms
@@ -38,10 +37,12 @@ from service.store.port import (
     UnitGap,
 )
 from service.store.references import insert_reference, select_history, select_in_force
+from service.store.rollups.reading import read_trend
+from service.store.rollups.sqlite import SqliteRollups
 from service.store.schema import migrate
 from service.store.spectra import SqliteSpectra, insert_spectra
 from service.store.spectra_port import SpectraLimits
-from service.store.trends import select_readings, storable
+from service.store.trends import storable
 from service.store.vector_references import SqliteVectorReferences
 
 BUSY_TIMEOUT_S = 5.0
@@ -94,6 +95,7 @@ class SqliteStore:
         self.order1_references = SqliteVectorReferences(self._writing, self._reader, self._chain)
         self.spectra = SqliteSpectra(self._reader)
         self.access = SqliteAccess(self._writing, self._reader, self._chain)
+        self.rollups = SqliteRollups(self._writing, self._reader)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -136,13 +138,7 @@ class SqliteStore:
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
         with self._reader() as reader:
-            readings = select_readings(reader, query)
-        if query.is_page:
-            return page(readings, query.max_points, query.hole_ns)
-        if readings.time_ns.size <= query.max_points:
-            return single_points(readings, query.hole_ns)
-        start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)
-        return bucketed(readings, bucket_width_ns(start_ns, end_ns, query.max_points))
+            return read_trend(reader, query)
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
         """Read the recorded gaps whose end lies in a range of time, oldest first."""

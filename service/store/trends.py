@@ -1,19 +1,23 @@
-"""The readings that a trend is made of, out of the rows of assessments."""
+"""Single readings out of the rows of assessments."""
 
 import sqlite3
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from core.quality import Level
-from service.store.buckets import Readings
 from service.store.codec import Layout
 from service.store.port import QueryTooLargeError, TrendQuery
+from service.store.summaries import Summaries
 
 MAX_ROWS = 1_000_000
-"""Most readings that one query may touch: about 300 MB of rows and a few seconds."""
+"""Most readings that one query may touch: a few seconds."""
 
-MATCHING = """
-    FROM assessment
+ROWS_AT_ONCE = 4000
+"""Whole rows in memory; of the others only the columns asked for."""
+
+SELECT_ROWS = """
+    SELECT time_ns, layout, reading_values, reading_qualities FROM assessment
     WHERE series = (SELECT id FROM series WHERE unit = :unit AND bearing = :bearing)
     AND time_ns >= :start_ns AND time_ns < :end_ns
     AND (:eccentricity_low IS NULL OR eccentricity_ratio >= :eccentricity_low)
@@ -21,35 +25,63 @@ MATCHING = """
     AND (:oil_low IS NULL OR oil_temperature_c >= :oil_low)
     AND (:oil_high IS NULL OR oil_temperature_c <= :oil_high)
     AND (:states = '' OR instr(:states, ',' || operating_state || ',') > 0)
+    ORDER BY time_ns LIMIT :most
 """
-COUNT_ROWS = "SELECT count(*)" + MATCHING
-SELECT_ROWS = (
-    "SELECT time_ns, layout, reading_values, reading_qualities"
-    + MATCHING
-    + "ORDER BY time_ns LIMIT :most"
-)
+
+Span = tuple[int, int]
+"""From the first time, up to but not including the second, ns."""
+
+Row = tuple[int, int, bytes, bytes]
+"""Time, layout, values and qualities of a reading."""
 
 
-def select_readings(reader: sqlite3.Connection, query: TrendQuery) -> Readings:
-    """Readings of one bearing, oldest first; of a page one more than it holds.
+def select_page(reader: sqlite3.Connection, query: TrendQuery) -> Summaries:
+    """The first readings of one bearing, oldest first, and one more than a page holds."""
+    rows = reader.execute(SELECT_ROWS, arguments(query) | {"most": query.max_points + 1})
+    return decoded_rows(rows.fetchall(), select_layouts(reader), query.quantities)
+
+
+def select_readings(
+    reader: sqlite3.Connection, query: TrendQuery, spans: Iterable[Span]
+) -> Summaries:
+    """Readings of one bearing in some spans of time, oldest first.
 
     Raises
     ------
     QueryTooLargeError
         If they are more than `MAX_ROWS`.
     """
-    arguments = _arguments(query)
-    n_rows = 0 if query.is_page else int(reader.execute(COUNT_ROWS, arguments).fetchone()[0])
-    if n_rows > MAX_ROWS:
-        raise QueryTooLargeError(
-            f"{n_rows} readings in this range, at most {MAX_ROWS} are read at once"
-        )
-    rows = reader.execute(SELECT_ROWS, arguments).fetchall()
-    layouts = {
+    layouts = select_layouts(reader)
+    parts = [decoded_rows([], layouts, query.quantities)]
+    for rows in _chunks(reader, query, spans):
+        parts.append(decoded_rows(rows, layouts, query.quantities))
+    return Summaries.together(parts)
+
+
+def _chunks(
+    reader: sqlite3.Connection, query: TrendQuery, spans: Iterable[Span]
+) -> Iterator[list[Row]]:
+    left = MAX_ROWS
+    for start_ns, end_ns in spans:
+        asked = {"start_ns": storable(start_ns), "end_ns": storable(end_ns), "most": left + 1}
+        found = reader.execute(SELECT_ROWS, arguments(query) | asked)
+        while rows := found.fetchmany(ROWS_AT_ONCE):
+            left -= len(rows)
+            if left < 0:
+                raise QueryTooLargeError(
+                    f"more than {MAX_ROWS} single readings would have to be read: ask for a"
+                    " shorter time, for fewer points, or for bounds of eccentricity and oil"
+                    " temperature at whole cells"
+                )
+            yield rows
+
+
+def select_layouts(reader: sqlite3.Connection) -> dict[int, Layout]:
+    """Every layout by its number."""
+    return {
         id_: Layout.loads(quantities, reasons)
         for id_, quantities, reasons in reader.execute("SELECT * FROM layout")
     }
-    return _decoded(rows, layouts, query.quantities)
 
 
 def storable(time_ns: int) -> int:
@@ -57,7 +89,8 @@ def storable(time_ns: int) -> int:
     return max(0, min(time_ns, 2**63 - 1))
 
 
-def _arguments(query: TrendQuery) -> dict[str, object]:
+def arguments(query: TrendQuery) -> dict[str, object]:
+    """What a query asks for, as parameters of statements."""
     return {
         "unit": query.unit,
         "bearing": query.bearing,
@@ -67,25 +100,22 @@ def _arguments(query: TrendQuery) -> dict[str, object]:
         "eccentricity_high": query.eccentricity_ratio.high,
         "oil_low": query.oil_temperature_c.low,
         "oil_high": query.oil_temperature_c.high,
-        "most": query.max_points + 1 if query.is_page else -1,
         "states": "".join(f",{int(state)}," for state in query.states),
     }
 
 
-def _decoded(
-    rows: list[tuple[int, int, bytes, bytes]],
-    layouts: dict[int, Layout],
-    quantities: tuple[str, ...],
-) -> Readings:
+def decoded_rows(rows: list[Row], layouts: dict[int, Layout], names: tuple[str, ...]) -> Summaries:
+    """Some columns of rows; what a row does not know is bad."""
     time_ns = np.array([row[0] for row in rows], dtype=np.int64)
     layout_of_row = np.array([row[1] for row in rows], dtype=np.int64)
-    value = {name: np.full(len(rows), np.nan) for name in quantities}
-    level = {name: np.full(len(rows), Level.BAD, dtype=np.uint8) for name in quantities}
+    value = np.full((len(rows), len(names)), np.nan)
+    level = np.full((len(rows), len(names)), Level.BAD, dtype=np.uint8)
     for id_ in np.unique(layout_of_row).tolist():
         layout, where = layouts[id_], np.flatnonzero(layout_of_row == id_)
         numbers, levels = layout.decode([rows[i][2] for i in where], [rows[i][3] for i in where])
-        for name in set(quantities) & set(layout.quantities):
-            column = layout.quantities.index(name)
-            value[name][where] = numbers[:, column]
-            level[name][where] = levels[:, column]
-    return Readings(time_ns, value, level)
+        place = {name: column for column, name in enumerate(layout.quantities)}
+        known = np.array([column for column, name in enumerate(names) if name in place], np.int64)
+        theirs = [place[names[column]] for column in known]
+        value[np.ix_(where, known)] = numbers[:, theirs]
+        level[np.ix_(where, known)] = levels[:, theirs]
+    return Summaries.of(names, time_ns, value, level)

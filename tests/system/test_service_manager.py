@@ -8,7 +8,17 @@ from typing import Any
 
 import pytest
 
-LOOPS = {"analyse", "record", "references", "alarms", "captures", "evidence", "learn", "serve"}
+LOOPS = {
+    "analyse",
+    "record",
+    "references",
+    "alarms",
+    "captures",
+    "evidence",
+    "learn",
+    "gather",
+    "serve",
+}
 STATUS = "STATUS=0 of 2 units connected"
 
 

@@ -9,10 +9,10 @@ from core.quality import Level
 from service.store.buckets import (
     DAY_NS,
     NICE_WIDTHS_NS,
-    Readings,
     bucket_width_ns,
     bucketed,
 )
+from service.store.summaries import Summaries
 
 T0 = 1_767_225_600_000_000_000
 SECOND_NS = 1_000_000_000
@@ -20,12 +20,15 @@ SECOND_NS = 1_000_000_000
 VALUES = st.one_of(st.none(), st.floats(-1e100, 1e100), st.sampled_from([0.1, 0.7e9]))
 
 
-def readings_of(points: list[tuple[int, float | None, Level]]) -> Readings:
+def readings_of(points: list[tuple[int, float | None, Level]]) -> Summaries:
     points = sorted(points, key=lambda point: point[0])
-    return Readings(
+    value = [[np.nan if v is None else v] for _, v, _ in points]
+    level = [[level] for _, _, level in points]
+    return Summaries.of(
+        ("q",),
         np.array([T0 + t * SECOND_NS // 10 for t, _, _ in points], dtype=np.int64),
-        {"q": np.array([np.nan if v is None else v for _, v, _ in points], dtype=np.float64)},
-        {"q": np.array([level for _, _, level in points], dtype=np.uint8)},
+        np.array(value, dtype=np.float64).reshape(-1, 1),
+        np.array(level, dtype=np.uint8).reshape(-1, 1),
     )
 
 
@@ -58,7 +61,7 @@ def test_buckets_lose_no_reading_no_extreme_and_no_doubt(
     )
     for i, start_ns in enumerate(trend.time_ns):
         inside = (readings.time_ns >= start_ns) & (readings.time_ns < start_ns + width_ns)
-        numbers = readings.value["q"][inside]
+        numbers = readings.mean[inside, 0]
         usable = numbers[np.isfinite(numbers)]
         assert series.count[i] == usable.size
         if usable.size:
@@ -69,7 +72,7 @@ def test_buckets_lose_no_reading_no_extreme_and_no_doubt(
             assert mean == pytest.approx(usable.mean(), rel=1e-9, abs=1e-9 * abs(usable).max())
         else:
             assert series.minimum[i] is series.mean[i] is series.maximum[i] is None
-        levels = readings.level["q"][inside]
+        levels = readings.level[inside, 0]
         assert series.worst_level[i] == (Level(levels.max()) if levels.size else None)
 
 

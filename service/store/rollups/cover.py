@@ -1,0 +1,146 @@
+"""A range of time covered with as few roll-ups as will do, and single readings for the rest."""
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from service.store.port import TrendQuery
+from service.store.rollups.cells import Cells, Conditions
+from service.store.rollups.rolling import select_mark
+from service.store.rollups.rows import ANYTHING, select_cells
+from service.store.rollups.widths import HOUR_NS
+from service.store.summaries import IntArray, Summaries
+from service.store.trends import Span, arguments
+
+REDONE = """
+    SELECT start_ns FROM rollup_redo
+    WHERE series = ? AND start_ns >= ? AND start_ns < ? ORDER BY start_ns
+"""
+
+
+@dataclass
+class Cover:
+    """What a query is answered from.
+
+    Parameters
+    ----------
+    summaries
+        Roll-ups, of which every reading is wanted.
+    spans
+        Where single readings are to be read instead.
+    rolled_spans
+        From when to when the roll-ups go.
+    n_rolled
+        Readings in them, usable or not.
+    """
+
+    summaries: list[Summaries] = field(default_factory=list)
+    spans: list[Span] = field(default_factory=list)
+    rolled_spans: list[Span] = field(default_factory=list)
+    n_rolled: int = 0
+
+
+def covered(
+    reader: sqlite3.Connection, query: TrendQuery, whole: Span, widths_ns: Sequence[int]
+) -> Cover:
+    """Cover a range of time.
+
+    Parameters
+    ----------
+    widths_ns
+        Of the roll-ups that fit the buckets asked for, finest first.
+    """
+    found = reader.execute(
+        "SELECT id FROM series WHERE unit = ? AND bearing = ?", (query.unit, query.bearing)
+    ).fetchone()
+    if found is None:
+        return Cover()
+    covering = _Covering(reader, query, int(found[0]))
+    covering.take(whole, widths_ns)
+    covering.cover.spans.sort()
+    return covering.cover
+
+
+class _Covering:
+    def __init__(self, reader: sqlite3.Connection, query: TrendQuery, series: int) -> None:
+        self._reader, self._series = reader, series
+        self._names = query.quantities
+        self._mark_ns = select_mark(reader, series)
+        conditions = arguments(query)
+        self._asked = {name: conditions[name] for name in ANYTHING}
+        self.cover = Cover()
+
+    def take(self, span: Span, widths_ns: Sequence[int]) -> None:
+        """Cover a span; what does not fit the widest roll-ups goes to finer ones, then to rows."""
+        if span[0] >= span[1]:
+            return
+        if not widths_ns:
+            self.cover.spans.append(span)
+            return
+        width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
+        inner = (-(-span[0] // width_ns) * width_ns, self._gathered_until(span[1], width_ns))
+        if inner[0] >= inner[1]:
+            self.take(span, finer_ns)
+            return
+        self.take((span[0], inner[0]), finer_ns)
+        self._take_inner(inner, width_ns, finer_ns)
+        self.take((inner[1], span[1]), finer_ns)
+
+    def _gathered_until(self, end_ns: int, width_ns: int) -> int:
+        return min(end_ns, self._mark_ns) // width_ns * width_ns
+
+    def _take_inner(self, inner: Span, width_ns: int, finer_ns: Sequence[int]) -> None:
+        redone = self._redone(inner)
+        self.cover.spans += [_within(inner, (hour, hour + HOUR_NS)) for hour in redone]
+        cells = select_cells(self._reader, self._series, width_ns, inner, self._names, self._asked)
+        if cells is None:
+            return
+        time_ns = cells.summaries.time_ns
+        is_redone = np.isin(time_ns // HOUR_NS * HOUR_NS, redone)
+        is_cut = np.isin(time_ns, time_ns[self._cut(cells.conditions)])
+        self._use(cells, ~is_redone & ~is_cut, width_ns)
+        for cut in _runs(np.unique(time_ns[is_cut & ~is_redone]), width_ns):
+            self.take(cut, finer_ns)
+
+    def _redone(self, inner: Span) -> list[int]:
+        first_ns = inner[0] // HOUR_NS * HOUR_NS
+        return [row[0] for row in self._reader.execute(REDONE, (self._series, first_ns, inner[1]))]
+
+    def _use(self, cells: Cells, rows: npt.NDArray[np.bool_], width_ns: int) -> None:
+        if rows.any():
+            chosen = cells.summaries.at(rows)
+            self.cover.summaries.append(chosen)
+            self.cover.n_rolled += int(cells.conditions.n_readings[rows].sum())
+            self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)
+
+    def _cut(self, conditions: Conditions) -> npt.NDArray[np.bool_]:
+        """Cells of which some readings may be wanted and others not."""
+        asked = self._asked
+        sides = (
+            (asked["eccentricity_low"], conditions.eccentricity_low, -1.0),
+            (asked["eccentricity_high"], conditions.eccentricity_high, 1.0),
+            (asked["oil_low"], conditions.oil_low_c, -1.0),
+            (asked["oil_high"], conditions.oil_high_c, 1.0),
+        )
+        is_cut = np.zeros(conditions.state.size, dtype=np.bool_)
+        for bound, extreme, sign in sides:
+            if isinstance(bound, int | float):
+                is_cut |= sign * extreme > sign * bound
+        return is_cut
+
+
+def _within(span: Span, other: Span) -> Span:
+    return max(span[0], other[0]), min(span[1], other[1])
+
+
+def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
+    """Spans of neighbours, out of their starts."""
+    breaks = np.flatnonzero(np.diff(time_ns) > width_ns)
+    if time_ns.size:
+        firsts = np.concatenate([time_ns[:1], time_ns[breaks + 1]]).tolist()
+        lasts = np.concatenate([time_ns[breaks], time_ns[-1:]]).tolist()
+        for first_ns, last_ns in zip(firsts, lasts, strict=True):
+            yield first_ns, last_ns + width_ns

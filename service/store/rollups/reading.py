@@ -1,0 +1,37 @@
+"""Trends out of roll-ups and rows: as buckets, or as single readings where they are few."""
+
+import sqlite3
+
+from service.store.buckets import bucket_width_ns, bucketed, page, single_points
+from service.store.port import Trend, TrendQuery
+from service.store.rollups.cover import Cover, covered
+from service.store.rollups.widths import WIDTHS_NS
+from service.store.summaries import Summaries
+from service.store.trends import select_page, select_readings, storable
+
+
+def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
+    """Read trends of one bearing, gathered into buckets if they are many.
+
+    Raises
+    ------
+    QueryTooLargeError
+        If more single readings would have to be read than can be.
+    """
+    if query.is_page:
+        return page(select_page(reader, query), query.max_points, query.hole_ns)
+    whole = (storable(query.start_ns), storable(query.end_ns))
+    width_ns = bucket_width_ns(*whole, query.max_points)
+    fitting_ns = [width for width in WIDTHS_NS if width_ns % width == 0]
+    reader.execute("BEGIN")  # one state of the database for all that is read
+    cover = covered(reader, query, whole, fitting_ns)
+    singles = select_readings(reader, query, cover.spans)
+    if cover.n_rolled + singles.time_ns.size > query.max_points:
+        return bucketed(Summaries.together([*cover.summaries, singles]), width_ns)
+    if cover.n_rolled:
+        singles = select_readings(reader, query, _all_spans(cover))
+    return single_points(singles, query.hole_ns)
+
+
+def _all_spans(cover: Cover) -> list[tuple[int, int]]:
+    return sorted([*cover.spans, *cover.rolled_spans])
