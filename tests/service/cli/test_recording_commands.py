@@ -26,7 +26,7 @@ from service.wiring.recordings import recording_of, recording_source, recording_
 from service.wiring.simulations import simulated_feed as feed_of
 
 COMMAND = [sys.executable, "-m", "service.cli.main"]
-ENVIRONMENT = {"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}
+ENVIRONMENT = {"PYTHONFAULTHANDLER": "1", "PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}
 
 SMALL = "[analysis]\nsegment_samples = 4096\nn_segments = 4\n\n[service]"
 
@@ -211,7 +211,7 @@ def test_a_recording_of_something_else_is_refused_naming_both(
     text = plant_path.read_text()
     plant_path.write_text(text.replace(old, new))
     result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.returncode, result.stdout) == (1, "")
+    assert (result.returncode, result.stdout) == (1, ""), result.stderr
     assert words in result.stderr
     assert result.stderr.count("\n") == 1
 
@@ -219,7 +219,7 @@ def test_a_recording_of_something_else_is_refused_naming_both(
 def test_a_damaged_recording_is_one_line_and_exit_1(plant_path: Path, recording: Path) -> None:
     (recording / "samples.parquet").write_bytes(b"PAR1")
     result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.returncode, result.stdout) == (1, "")
+    assert (result.returncode, result.stdout) == (1, ""), result.stderr
     assert result.stderr.startswith(f"padwatch reanalyse: {recording}/samples.parquet: 4 bytes, ")
 
 
@@ -229,5 +229,5 @@ def test_a_recording_too_short_for_a_segment_says_so(
     with recording_writer(plant.unit[0], tmp_path / "short", "a test") as writer:
         writer.write(feed_of(plant.unit[0], SystemClock()).advance(4095))
     result = padwatch("reanalyse", tmp_path / "short", "--plant", plant_path)
-    assert (result.returncode, result.stdout) == (1, "")
+    assert (result.returncode, result.stdout) == (1, ""), result.stderr
     assert "no segment of 4096 samples without a gap" in result.stderr
