@@ -33,7 +33,7 @@ def position_results(
         _gap(unit, segments, bearing.opposite_x, bearing.opposite_gap_x),
         _gap(unit, segments, bearing.opposite_y, bearing.opposite_gap_y),
     )
-    x, y = (_axis(bearing, near, far, axis) for axis in (0, 1))
+    x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
     centre = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth)
     readings = {
         "gap_x_um": near[0],
@@ -66,9 +66,16 @@ def mean_slow(segments: Sequence[Segment], channel: str | None) -> Reading:
     return mean_reading([segment.slow[channel] for segment in segments])
 
 
-def _axis(
+def probe_axis(
     bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
 ) -> ProbeAxis:
+    """The probes of an axis (0 is x) with their references.
+
+    Parameters
+    ----------
+    near, far
+        Mean gaps (x, y), µm; of the probes on the positive axes, and of those across the shaft.
+    """
     has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
     if not has_far or bearing.opposite_reference_um is None:
         return ProbeAxis(near[axis], bearing.gap_reference_um[axis])

@@ -21,6 +21,7 @@ from service.api.health_routes import health_router
 from service.api.order1_reference_routes import order1_reference_router
 from service.api.origin_header import OriginHeader
 from service.api.plant_routes import plant_router
+from service.api.motion_routes import motion_router, recorded_motion_router
 from service.api.problems import (
     any_other_problem,
     install_problem_handlers,
@@ -33,6 +34,7 @@ from service.api.trend_routes import trend_router
 from service.audit.refusals import Refusals
 from service.dashboard.edition import EditionHeader
 from service.dashboard.routes import dashboard_router
+from service.api.spectra_routes import spectra_router
 from service.metrics.routes import metrics_router
 
 DESCRIPTION = """
@@ -75,6 +77,8 @@ def create_app(context: Context) -> FastAPI:
         baseline_action_router(context),
         alarm_router(context),
         alarm_rate_router(context),
+        spectra_router(context),
+        motion_router(context),
         order1_reference_router(context),
         operation_router(context),
         evidence_router(context),
@@ -86,5 +90,6 @@ def create_app(context: Context) -> FastAPI:
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:
         app.include_router(metrics_router(context.metrics))
+        recorded_motion_router(context),
     app.include_router(dashboard_router())
     return app

@@ -59,7 +59,7 @@ def recording_router(context: Context) -> APIRouter:
         """The newest recordings of samples around alarms, and what is still being written."""
         if unit is not None:
             context.unit(unit)
-        found = await worked(lambda: _shelf(context).newest(limit, unit))
+        found = await worked(lambda: shelf_of(context).newest(limit, unit))
         running = sorted(context.captures.being_made)
         return RecordingsModel(
             recordings=[recording_model(kept) for kept in found],
@@ -75,14 +75,14 @@ def recording_router(context: Context) -> APIRouter:
     )
     async def one_recording(recording: RecordingId) -> Response:
         """Channels, holes, refused samples and files of a recording, after checking all of it."""
-        shelf = _shelf(context)
+        shelf = shelf_of(context)
         kept = await worked(lambda: shelf.one(recording))
         if kept is None:
-            raise _unknown(recording)
+            raise unknown_recording(recording)
         try:
             return await rendered(lambda: recording_info(shelf, kept))
         except ConfigError as error:
-            raise _damaged(recording, error) from error
+            raise damaged_recording(recording, error) from error
 
     @router.get(
         "/{recording}/files.zip",
@@ -95,7 +95,7 @@ def recording_router(context: Context) -> APIRouter:
 
         Its checksums are in its manifest.
         """
-        make = _shelf(context).zip_pieces
+        make = shelf_of(context).zip_pieces
         return await _download(context, recording, make, "application/zip", "zip")
 
     @router.get(
@@ -110,7 +110,7 @@ def recording_router(context: Context) -> APIRouter:
         Like the files of `padwatch recording export`: where samples are missing there are no rows,
         and where a channel was bad, its cells say nan.
         """
-        make = _shelf(context).csv_pieces
+        make = shelf_of(context).csv_pieces
         return await _download(context, recording, make, "text/csv", "csv")
 
     return router
@@ -119,15 +119,15 @@ def recording_router(context: Context) -> APIRouter:
 async def _download(
     context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
 ) -> StreamingResponse:
-    desk, shelf = _desk(context), _shelf(context)
+    desk, shelf = _desk(context), shelf_of(context)
     if await worked(lambda: shelf.one(recording)) is None:
-        raise _unknown(recording)
+        raise unknown_recording(recording)
     try:
         pieces = await desk.download(make(recording))
     except TooManyDownloadsError as error:
         raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
-        raise _damaged(recording, error) from error
+        raise damaged_recording(recording, error) from error
     headers = {
         "Content-Disposition": f'attachment; filename="{recording}.{suffix}"',
         "X-Content-Type-Options": "nosniff",
@@ -141,15 +141,18 @@ def _desk(context: Context) -> EvidenceDesk:
     return context.evidence
 
 
-def _shelf(context: Context) -> Shelf:
+def shelf_of(context: Context) -> Shelf:
+    """Where finished recordings are, or answer 404."""
     return Shelf(_desk(context).archive.folders.captures)
 
 
-def _unknown(recording: str) -> ProblemError:
+def unknown_recording(recording: str) -> ProblemError:
+    """There is none of that name."""
     return ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
 
 
-def _damaged(recording: str, error: Exception) -> ProblemError:
+def damaged_recording(recording: str, error: Exception) -> ProblemError:
+    """It is damaged on the disk, which is logged."""
     log.error("a recording cannot be read", recording=recording, reason=str(error))
     return ProblemError(500, "Damaged", f"recording {recording} cannot be read from the disk")
 

@@ -6,6 +6,8 @@ from pydantic import Field
 
 from service.api.models import ApiModel, LevelName, Time
 
+PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]
+
 
 class TrendSeriesModel(ApiModel):
     """One quantity; a value for each time."""

@@ -19,6 +19,7 @@ from service.api.models import (
 from service.api.plant_models import DeviceClockModel, SourceModel
 from service.api.series_models import (
     OrbitModel,
+    PlaceName,
     SpectrumChannelModel,
     SpectrumModel,
 )
@@ -31,7 +32,7 @@ LEVEL_NAMES: dict[Level, LevelName] = {
     Level.BAD: "bad",
 }
 
-PLACES = {
+PLACES: dict[PlaceName, int] = {
     "shaft_x": SHAFT_X,
     "shaft_y": SHAFT_Y,
     "bearing_x": BEARING_X,

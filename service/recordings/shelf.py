@@ -68,6 +68,19 @@ class Shelf:
         folder = self._folder(name)
         return None if folder is None else _kept(folder)
 
+    def opened(self, name: str) -> Recording:
+        """A recording that has been checked from end to end.
+
+        Raises
+        ------
+        ConfigError
+            If it is damaged, or not there.
+        """
+        folder = self._folder(name)
+        if folder is None:
+            raise ConfigError(f"{name}: no such recording")
+        return open_recording(folder)
+
     def summary(self, name: str) -> RecordingSummary:
         """What happened in a recording, after it has been checked from end to end.
 
@@ -76,7 +89,7 @@ class Shelf:
         ConfigError
             If it is damaged, or not there.
         """
-        return summary_of(self._opened(name))
+        return summary_of(self.opened(name))
 
     def zip_pieces(self, name: str) -> Generator[bytes, None, None]:
         """Its files as one ZIP file, piece by piece.
@@ -98,19 +111,13 @@ class Shelf:
         ConfigError
             If it is damaged, or not there.
         """
-        recording, sink = self._opened(name), Sink()
+        recording, sink = self.opened(name), Sink()
         exporter = CsvExporter(sink, recording.manifest)
         for rows in export_rows(recording):
             exporter.write(rows)
             yield from sink.taken()
         exporter.close()
         yield from sink.taken()
-
-    def _opened(self, name: str) -> Recording:
-        folder = self._folder(name)
-        if folder is None:
-            raise ConfigError(f"{name}: no such recording")
-        return open_recording(folder)
 
     def _folder(self, name: str) -> Path | None:
         """By looking through what is there, so that no name leads out of the folder."""
