@@ -2,29 +2,44 @@
 
 import { element, setText } from "../dom.js";
 import { mark } from "../parts/mark.js";
+import { unitAlarmMarks } from "../parts/unit_alarm_mark.js";
 import { lookOf, qualityOf } from "../words.js";
 import { unitCard } from "./unit_card.js";
+import { tileLegend, unitTile } from "./unit_tile.js";
+
+/** With more units than these, each is a tile: numbers that matter, all on one screen. */
+const N_CARDS = 4;
 
 /** Returns `{ draw(view), close() }`. */
 export function overviewPage(main) {
   const summary = element("p", { class: "summary" });
-  const cards = element("div", { class: "units" });
-  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, cards);
+  const legend = element("p", { class: "help" });
+  const units = element("div");
+  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, legend, units);
   const tally = tallyView(summary);
+  const alarms = unitAlarmMarks();
   let shape = null;
   let drawn = [];
+
+  function build(view) {
+    const isLarge = view.units.length > N_CARDS;
+    const viewOf = isLarge ? unitTile : unitCard;
+    drawn = view.units.map((unit) => viewOf(unit, alarms.markOf(unit.id)));
+    units.className = isLarge ? "unit-tiles" : "units";
+    units.replaceChildren(...drawn.map((one) => one.node));
+    legend.hidden = !isLarge;
+    setText(legend, tileLegend());
+  }
+
   return {
     draw(view) {
       const wanted = JSON.stringify(view.units.map((unit) => [unit.id, unit.name, unit.bearings.map((b) => b.bearing)]));
-      if (wanted !== shape) {
-        shape = wanted;
-        drawn = view.units.map(unitCard);
-        cards.replaceChildren(...drawn.map((card) => card.node));
-      }
+      if (wanted !== shape) build(view);
+      shape = wanted;
       tally.draw(view);
-      drawn.forEach((card, index) => card.draw(view.units[index]));
+      drawn.forEach((one, index) => one.draw(view.units[index]));
     },
-    close() {},
+    close: alarms.close,
   };
 }
 
