@@ -18,10 +18,10 @@ from service.api.delivery_routes import delivery_router
 from service.api.evidence_routes import evidence_router
 from service.api.film_routes import film_router
 from service.api.health_routes import health_router
+from service.api.motion_routes import motion_router, recorded_motion_router
 from service.api.order1_reference_routes import order1_reference_router
 from service.api.origin_header import OriginHeader
 from service.api.plant_routes import plant_router
-from service.api.motion_routes import motion_router, recorded_motion_router
 from service.api.problems import (
     any_other_problem,
     install_problem_handlers,
@@ -30,11 +30,11 @@ from service.api.problems import (
 from service.api.recording_routes import recording_router
 from service.api.reference_routes import reference_router
 from service.api.source_routes import source_router
+from service.api.spectra_routes import spectra_router
 from service.api.trend_routes import trend_router
 from service.audit.refusals import Refusals
 from service.dashboard.edition import EditionHeader
 from service.dashboard.routes import dashboard_router
-from service.api.spectra_routes import spectra_router
 from service.metrics.routes import metrics_router
 
 DESCRIPTION = """
@@ -70,6 +70,8 @@ def create_app(context: Context) -> FastAPI:
         gap_router(context),
         bearing_router(context),
         trend_router(context),
+        spectra_router(context),
+        motion_router(context),
         centre_router(context),
         reference_router(context),
         film_router(context),
@@ -77,12 +79,11 @@ def create_app(context: Context) -> FastAPI:
         baseline_action_router(context),
         alarm_router(context),
         alarm_rate_router(context),
-        spectra_router(context),
-        motion_router(context),
         order1_reference_router(context),
         operation_router(context),
         evidence_router(context),
         recording_router(context),
+        recorded_motion_router(context),
         delivery_router(context),
         audit_router(context),
         alarm_by_id_router(context),
@@ -90,6 +91,5 @@ def create_app(context: Context) -> FastAPI:
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:
         app.include_router(metrics_router(context.metrics))
-        recorded_motion_router(context),
     app.include_router(dashboard_router())
     return app
