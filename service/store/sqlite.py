@@ -50,6 +50,9 @@ LOOK_AFTER_STEPS = 20_000
 """Steps of the database's machine, some tens of microseconds, after which a read looks whether
 anybody still waits for it."""
 
+PAGE_BYTES = 8192
+"""In pages of half that size, a result of all quantities would need a page of its own."""
+
 INSERT_ASSESSMENT = """
     INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
     ON CONFLICT (series, time_ns) DO NOTHING
@@ -220,6 +223,7 @@ class SqliteStore:
 
     def _prepare(self) -> int:
         """Bring the file up to date; return the number of the layout that is written."""
+        self._writer.execute(f"PRAGMA page_size = {PAGE_BYTES}")  # of a file yet to be written
         had_trail = has_trail(self._writer)
         migrate(
             self._writer, str(self._path), self._origin

@@ -86,12 +86,12 @@ def _gather(writer: sqlite3.Connection, series: int, span: Span) -> None:
     """Fill the spans of every width that end within a span of time."""
     minutes = _minutes(writer, series, span)
     if minutes is not None:
-        _insert(writer, series, MINUTE_NS, minutes)
+        insert_cells(writer, series, MINUTE_NS, minutes)
     for finer_ns, width_ns in pairwise(WIDTHS_NS):
         whole = (_floor(span[0], width_ns), _floor(span[1], width_ns))
         cells = select_cells(writer, series, finer_ns, whole, _columns())
         if cells is not None:
-            _insert(writer, series, width_ns, cells.gathered(width_ns))
+            insert_cells(writer, series, width_ns, cells.gathered(width_ns))
 
 
 def _minutes(writer: sqlite3.Connection, series: int, span: Span) -> Cells | None:
@@ -104,7 +104,8 @@ def _minutes(writer: sqlite3.Connection, series: int, span: Span) -> Cells | Non
     return Cells(Conditions.of(state, eccentricity, oil_c), summaries).gathered(MINUTE_NS)
 
 
-def _insert(writer: sqlite3.Connection, series: int, width_ns: int, cells: Cells) -> None:
+def insert_cells(writer: sqlite3.Connection, series: int, width_ns: int, cells: Cells) -> None:
+    """Write roll-ups of one width, within a transaction."""
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
     writer.executemany(INSERT_CELL, _cell_rows(series, width_s, start_ns, slots, cells.conditions))

@@ -224,3 +224,25 @@ def test_a_closed_store_says_so(store: SqliteStore, assessment: Build) -> None:
 
     with pytest.raises(StoreError, match="closed"):
         store.append([assessment()], [])
+
+
+def test_a_result_of_all_quantities_takes_no_page_of_its_own(
+    store: SqliteStore, assessment: Build, at: At
+) -> None:
+    everything = {
+        q.name: Reading(1.0, u_random=0.1, u_systematic=0.1) if q.has_uncertainty else 1.0
+        for q in CATALOGUE
+    }
+    before = n_bytes(store)
+
+    store.append([assessment(at(i), **everything) for i in range(400)], [])
+
+    assert (n_bytes(store) - before) / 400 < 2500
+
+
+def n_bytes(store: SqliteStore) -> int:
+    n_pages, size = (
+        store._writer.execute(f"PRAGMA {name}").fetchone()[0]
+        for name in ("page_count", "page_size")
+    )
+    return int(n_pages * size)
