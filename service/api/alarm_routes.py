@@ -3,7 +3,7 @@
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Path, Query
+from fastapi import APIRouter, Depends, Path, Query, Response
 
 from core.alarms.alarm import AlarmKind
 from core.alarms.operation import (
@@ -35,6 +35,7 @@ from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.rendering import rendered_now
 from service.api.same_host import require_same_host
 from service.api.times import ns_from_datetime, require_order
 from service.store.port import AlarmQuery
@@ -70,11 +71,12 @@ def alarm_router(context: Context) -> APIRouter:
     """Routes that show alarms."""
     router = APIRouter(prefix="/api/v1/alarms", tags=["alarms"])
 
-    @router.get("", summary="All alarms that are not normal")
-    async def alarms() -> AlarmListModel:
+    @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
+    async def alarms() -> Response:
         """The alarm list, most urgent first, and what cannot be judged now."""
-        return alarm_list_model(
-            context.alarms, context.films, context.origin, context.clock.now_ns()
+        engine, films, origin = context.alarms, context.films, context.origin
+        return await rendered_now(
+            lambda: alarm_list_model(engine, films, origin, context.clock.now_ns())
         )
 
     @router.get("/events", summary="History of all alarms", responses=EVENT_PROBLEMS)

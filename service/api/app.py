@@ -29,6 +29,7 @@ from service.api.problems import (
 )
 from service.api.recording_routes import recording_router
 from service.api.reference_routes import reference_router
+from service.api.revalidation import Revalidation
 from service.api.source_routes import source_router
 from service.api.spectra_routes import spectra_router
 from service.api.trend_routes import trend_router
@@ -56,6 +57,7 @@ def create_app(context: Context) -> FastAPI:
         redoc_url=None,
         responses=any_other_problem(),
     )
+    app.add_middleware(Revalidation, clock=context.clock)
     app.add_middleware(OriginHeader, origin=context.origin)
     app.add_middleware(EditionHeader)
     refusals = context.refusals or Refusals(context.store.audit, context.clock)

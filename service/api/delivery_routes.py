@@ -1,10 +1,11 @@
 """Who is told of alarms, and what waits for them."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
 from service.api.context import Context
 from service.api.delivery_models import DeadLetterModel, DeliveryModel, ReceiverModel
 from service.api.problems import problem_responses
+from service.api.rendering import rendered_now
 from service.api.times import rfc3339
 from service.delivery.deliveries import ReceiverView
 from service.delivery.sender import SenderStatus
@@ -17,19 +18,28 @@ def delivery_router(context: Context) -> APIRouter:
     """Routes about delivery; they change nothing."""
     router = APIRouter(prefix="/api/v1", tags=["alarms"])
 
-    @router.get("/delivery", summary="Who is told of alarms", responses=problem_responses(503))
-    async def delivery() -> DeliveryModel:
+    @router.get(
+        "/delivery",
+        summary="Who is told of alarms",
+        response_model=DeliveryModel,
+        responses=problem_responses(503),
+    )
+    async def delivery() -> Response:
         """All receivers of webhooks and mail: backlog, failures, what was never delivered."""
         receivers = [_receiver(view) for view in await context.deliveries.look()]
-        return DeliveryModel(
-            origin=context.origin.value,
-            time=rfc3339(context.clock.now_ns()),
-            n_waiting=sum(receiver.n_waiting for receiver in receivers),
-            n_failing=sum(receiver.is_failing for receiver in receivers),
-            receivers=receivers,
-        )
+        return await rendered_now(lambda: _delivery(context, receivers))
 
     return router
+
+
+def _delivery(context: Context, receivers: list[ReceiverModel]) -> DeliveryModel:
+    return DeliveryModel(
+        origin=context.origin.value,
+        time=rfc3339(context.clock.now_ns()),
+        n_waiting=sum(receiver.n_waiting for receiver in receivers),
+        n_failing=sum(receiver.is_failing for receiver in receivers),
+        receivers=receivers,
+    )
 
 
 def _receiver(view: ReceiverView) -> ReceiverModel:

@@ -1,47 +1,24 @@
 """The plant, its units and the catalogue of quantities."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request, Response
 
 from core.quantities import CATALOGUE
-from service.api.alarm_views import alarm_count_model
 from service.api.context import Context, UnitId
-from service.api.film_views import film_brief
-from service.api.plant_models import (
-    CapturesModel,
-    EvidenceStatusModel,
-    OverviewModel,
-    PlantModel,
-    QuantityModel,
-    StoreModel,
-    UnitModel,
-    UnitOverviewModel,
-)
+from service.api.overview import Overview
+from service.api.plant_models import OverviewModel, QuantityModel, UnitModel
 from service.api.problems import problem_responses
-from service.api.times import rfc3339
-from service.api.views import latest_model, source_model
+from service.api.views import source_model
 
 
 def plant_router(context: Context) -> APIRouter:
     """Routes that are not about one bearing."""
     router = APIRouter(prefix="/api/v1", tags=["plant"])
+    shown = Overview(context)
 
-    @router.get("/overview", summary="Everything at a glance")
-    async def overview() -> OverviewModel:
+    @router.get("/overview", summary="Everything at a glance", response_model=OverviewModel)
+    async def overview(request: Request) -> Response:
         """All units with all bearings as they may be shown now."""
-        return OverviewModel(
-            plant=PlantModel(name=context.plant_name, origin=context.origin.value),
-            time=rfc3339(context.clock.now_ns()),
-            refresh_s=context.refresh_s,
-            store=StoreModel(error=context.live.store_error, n_unstored=context.live.n_unstored),
-            alarms=alarm_count_model(context.alarms),
-            captures=CapturesModel(
-                error=context.captures.error,
-                n_running=context.captures.n_running,
-                n_written=context.captures.n_written,
-            ),
-            evidence=_evidence(context),
-            units=[_unit_overview(context, unit) for unit in context.units],
-        )
+        return await shown.answer(request.headers.get("if-none-match"))
 
     @router.get("/units", summary="All units")
     async def units() -> list[UnitModel]:
@@ -61,18 +38,6 @@ def plant_router(context: Context) -> APIRouter:
     return router
 
 
-def _evidence(context: Context) -> EvidenceStatusModel | None:
-    if context.evidence is None:
-        return None
-    keeper = context.evidence.keeper
-    return EvidenceStatusModel(
-        error=keeper.error,
-        n_waiting=keeper.n_pending,
-        n_written=keeper.n_written,
-        n_lost=keeper.n_lost,
-    )
-
-
 def _unit(context: Context, unit: str) -> UnitModel:
     settings = context.units[unit]
     return UnitModel(
@@ -81,16 +46,4 @@ def _unit(context: Context, unit: str) -> UnitModel:
         rated_speed_rpm=settings.rated_speed_rpm,
         bearing_ids=[bearing.id for bearing in settings.bearing],
         source=source_model(context.live, unit),
-    )
-
-
-def _unit_overview(context: Context, unit: str) -> UnitOverviewModel:
-    settings = context.units[unit]
-    return UnitOverviewModel(
-        id=unit,
-        name=settings.name,
-        rated_speed_rpm=settings.rated_speed_rpm,
-        source=source_model(context.live, unit),
-        bearings=[latest_model(context.live, unit, bearing.id) for bearing in settings.bearing],
-        films=[film_brief(context, unit, bearing.id) for bearing in settings.bearing],
     )

@@ -1,0 +1,168 @@
+"""The overview, put together for many clients: what has changed is rendered once for them all."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from threading import Lock
+
+from fastapi import Response
+
+from service.api.alarm_views import alarm_count_model
+from service.api.context import Context
+from service.api.entity_tags import digest_of, is_known, tag_of
+from service.api.film_views import film_brief
+from service.api.models import LatestModel
+from service.api.plant_models import (
+    CapturesModel,
+    EvidenceStatusModel,
+    OverviewModel,
+    PlantModel,
+    StoreModel,
+    UnitOverviewModel,
+)
+from service.api.rendering import worked
+from service.api.times import rfc3339
+from service.api.views import latest_model, source_model
+
+NO_AGE = re.compile(rb'(?<="age_s":)null|(?<="data_age_s":)null')
+
+NO_UNITS = b'"units":[]}'
+
+
+@dataclass(frozen=True)
+class UnitState:
+    """What the part about a unit is made of.
+
+    Parameters
+    ----------
+    values
+        Another object is there as soon as anything is new.
+    ages_s
+        Of its newest sample and of each bearing's newest result.
+    """
+
+    values: Sequence[object]
+    ages_s: Sequence[float | None]
+
+
+@dataclass(frozen=True)
+class UnitPart:
+    """JSON about a unit as it was in a state, with holes where ages belong."""
+
+    state: UnitState
+    pieces: Sequence[bytes]
+    digest: bytes
+
+    def is_of(self, state: UnitState) -> bool:
+        """Whether nothing has changed since; objects are compared, not what is in them."""
+        return all(mine is its for mine, its in zip(self.state.values, state.values, strict=True))
+
+    def filled(self, ages_s: Sequence[float | None]) -> bytes:
+        """The JSON with these ages."""
+        first, *others = self.pieces
+        ages = (b"null" if age_s is None else repr(age_s).encode() for age_s in ages_s)
+        return b"".join([first, *(x for pair in zip(ages, others, strict=True) for x in pair)])
+
+
+class Overview:
+    """Keeps the part about each unit until something about that unit is new.
+
+    It is looked at on the event loop, where everything is written; rendering is left to threads.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._parts: dict[str, UnitPart] = {}
+        self._latest: dict[tuple[str, str], tuple[Sequence[object], LatestModel]] = {}
+        self._rendering = Lock()
+
+    async def answer(self, if_none_match: str | None) -> Response:
+        """The overview now, or only that it is as the client knows it."""
+        states = {unit: self._state(unit) for unit in self._context.units}
+        head = self._head()
+        if any(self._is_old(unit, state) for unit, state in states.items()):
+            await worked(lambda: self._renew(states))
+        parts = [self._parts[unit] for unit in states]
+        without_time = head.model_copy(update={"time": ""}).model_dump_json().encode()
+        tag = tag_of(digest_of(without_time), *(part.digest for part in parts))
+        if is_known(tag, if_none_match):
+            return Response(status_code=304, headers={"ETag": tag})
+        units = [p.filled(s.ages_s) for p, s in zip(parts, states.values(), strict=True)]
+        body = head.model_dump_json().encode().removesuffix(NO_UNITS)
+        body += b'"units":[' + b",".join(units) + b"]}"
+        return Response(body, media_type="application/json", headers={"ETag": tag})
+
+    def _state(self, unit: str) -> UnitState:
+        live, films = self._context.live, self._context.films
+        bearings = [bearing.id for bearing in self._context.units[unit].bearing]
+        found = [live.current(unit, bearing) for bearing in bearings]
+        values: list[object] = [live.status(unit)]
+        for bearing, current in zip(bearings, found, strict=True):
+            values += (current.assessment, current.quality.reason, current.is_current)
+            values += (films.newest(unit, bearing), films.baseline(unit, bearing))
+        return UnitState(values, [live.data_age_s(unit), *(current.age_s for current in found)])
+
+    def _is_old(self, unit: str, state: UnitState) -> bool:
+        part = self._parts.get(unit)
+        return part is None or not part.is_of(state)
+
+    def _renew(self, states: Mapping[str, UnitState]) -> None:
+        with self._rendering:  # what one client waits for, the next one finds done
+            for unit, state in states.items():
+                if self._is_old(unit, state):
+                    self._parts[unit] = self._part(unit, state)
+
+    def _part(self, unit: str, state: UnitState) -> UnitPart:
+        context, settings = self._context, self._context.units[unit]
+        source = source_model(context.live, unit).model_copy(update={"data_age_s": None})
+        model = UnitOverviewModel(
+            id=unit,
+            name=settings.name,
+            rated_speed_rpm=settings.rated_speed_rpm,
+            source=source,
+            bearings=[self._ageless(unit, bearing.id) for bearing in settings.bearing],
+            films=[film_brief(context, unit, bearing.id) for bearing in settings.bearing],
+        )
+        content = model.model_dump_json().encode()
+        return UnitPart(state, NO_AGE.split(content), digest_of(content))
+
+    def _ageless(self, unit: str, bearing: str) -> LatestModel:
+        """A bearing now, made anew only after a new result."""
+        current = self._context.live.current(unit, bearing)
+        values = (current.assessment, current.quality.reason)
+        kept = self._latest.get((unit, bearing))
+        if kept is None or any(new is not old for new, old in zip(values, kept[0], strict=True)):
+            latest = latest_model(self._context.live, unit, bearing)
+            kept = (values, latest.model_copy(update={"age_s": None}))
+            self._latest[unit, bearing] = kept
+        return kept[1]
+
+    def _head(self) -> OverviewModel:
+        """Everything but the units."""
+        context = self._context
+        return OverviewModel(
+            plant=PlantModel(name=context.plant_name, origin=context.origin.value),
+            time=rfc3339(context.clock.now_ns()),
+            refresh_s=context.refresh_s,
+            store=StoreModel(error=context.live.store_error, n_unstored=context.live.n_unstored),
+            alarms=alarm_count_model(context.alarms),
+            captures=CapturesModel(
+                error=context.captures.error,
+                n_running=context.captures.n_running,
+                n_written=context.captures.n_written,
+            ),
+            evidence=_evidence(context),
+            units=[],
+        )
+
+
+def _evidence(context: Context) -> EvidenceStatusModel | None:
+    if context.evidence is None:
+        return None
+    keeper = context.evidence.keeper
+    return EvidenceStatusModel(
+        error=keeper.error,
+        n_waiting=keeper.n_pending,
+        n_written=keeper.n_written,
+        n_lost=keeper.n_lost,
+    )

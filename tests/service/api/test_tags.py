@@ -1,0 +1,125 @@
+"""Answers have tags: who has seen one already is told that nothing is new, and only then."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from core.assessment import Assessment
+from service.live import LinkState
+
+POLLED = (
+    "overview",
+    "alarms",
+    "alarms/events",
+    "delivery",
+    "sources",
+    "units",
+    "units/U1/channels",
+    "units/U1/bearings",
+    "units/U1/bearings/UJB/latest",
+    "units/U1/bearings/UJB/film",
+    "units/U1/bearings/UJB/spectrum",
+    "units/U1/bearings/UJB/orbit",
+    "units/U1/bearings/UJB/baselines",
+    "quantities",
+    "openapi.json",
+)
+
+JUMP_S = 7.0
+
+
+async def ask(service: Any, path: str, tag: str | None = None) -> Any:
+    headers = {} if tag is None else {"If-None-Match": tag}
+    return await service.client.get(f"/api/v1/{path}", headers=headers)
+
+
+def advance(service: Any) -> None:
+    """Let time pass, in which nothing happens."""
+    service.clock.s += JUMP_S
+    service.clock.ns += round(JUMP_S * 1e9)
+
+
+async def test_who_has_an_answer_already_is_not_sent_it_again(running: Any) -> None:
+    first = {path: await ask(running, path) for path in POLLED}
+    advance(running)
+    for path, known in first.items():
+        assert known.status_code == 200, known.text
+        again = await ask(running, path, known.headers["etag"])
+        assert again.status_code == 304, path
+        assert again.content == b""
+        assert again.headers["etag"] == known.headers["etag"]
+        assert "content-type" not in again.headers
+
+
+async def tags_of(service: Any, paths: Iterable[str]) -> list[str]:
+    return [(await ask(service, path)).headers["etag"] for path in paths]
+
+
+async def test_whatever_changes_is_news(running: Any, assessments: list[Assessment]) -> None:
+    latest, spectrum = (f"units/U1/bearings/UJB/{what}" for what in ("latest", "spectrum"))
+    new = next(assessment for assessment in assessments if assessment.bearing == "UJB")
+
+    def alarm() -> None:
+        running.alarms.link("U2", False, "no answer")
+        running.clock.ns += 3_600_000_000_000
+        running.alarms.tick()
+
+    changes: list[tuple[Callable[[], object], tuple[str, ...]]] = [
+        (lambda: running.live.set_assessment(new), ("overview", spectrum)),
+        (lambda: setattr(running.live, "store_error", "disk full"), ("overview",)),
+        (alarm, ("overview", "alarms")),
+        (lambda: setattr(running.clock, "s", 30.5), ("overview", latest)),  # no longer current
+        (
+            lambda: running.live.set_link("U1", LinkState.NOT_CONNECTED, "no answer"),
+            ("overview", "sources", "units", latest),
+        ),
+    ]
+    for change, paths in changes:
+        before = await tags_of(running, paths)
+        change()
+        for path, tag in zip(paths, before, strict=True):
+            assert (await ask(running, path, tag)).status_code == 200, path
+
+
+async def test_ages_in_the_overview_are_those_of_now_also_in_parts_that_were_kept(
+    running: Any,
+) -> None:
+    young = (await ask(running, "overview")).json()
+    advance(running)
+    old = (await ask(running, "overview")).json()
+    for before, after in zip(young["units"], old["units"], strict=True):
+        for one, other in zip(before["bearings"], after["bearings"], strict=True):
+            if one["age_s"] is not None:
+                assert other["age_s"] == one["age_s"] + JUMP_S
+            assert {**other, "age_s": 0} == {**one, "age_s": 0}
+    for unit in old["units"]:
+        for shown in unit["bearings"]:
+            path = f"units/{unit['id']}/bearings/{shown['bearing']}/latest"
+            assert (await ask(running, path)).json() == shown
+        assert (await ask(running, f"units/{unit['id']}")).json()["source"] == unit["source"]
+
+
+async def test_an_answer_says_when_it_was_given_so_that_what_is_kept_can_be_counted_on(
+    running: Any,
+) -> None:
+    first = await ask(running, "overview")
+    assert first.headers["padwatch-time"] == first.json()["time"]
+    advance(running)
+    same = await ask(running, "overview", first.headers["etag"])
+    assert same.headers["padwatch-time"] == (await ask(running, "overview")).json()["time"]
+    refused = await ask(running, "units/U9")
+    assert refused.headers["padwatch-time"] == same.headers["padwatch-time"]
+
+
+async def test_a_tag_may_be_named_in_every_spelling(running: Any) -> None:
+    tag = (await ask(running, "alarms")).headers["etag"]
+    strong = tag.removeprefix("W/")
+    for known in (tag, f'"other", {tag}', f'{tag},"other"', strong, "*"):
+        assert (await ask(running, "alarms", known)).status_code == 304, known
+    for unknown in ('"other"', "", ",,,", "W/", 'W/"', '"' * 4000):
+        assert (await ask(running, "alarms", unknown)).status_code == 200, unknown
+
+
+async def test_a_refusal_has_no_tag(running: Any) -> None:
+    refused = await ask(running, "units/U9", "*")
+    assert refused.status_code == 404
+    assert "etag" not in refused.headers
