@@ -7,12 +7,14 @@ from fastapi import APIRouter, Query
 
 from core.alarms.alarm import PLANT
 from core.alarms.figures import DAY_NS
+from service.api.access.declared import needs
 from service.api.alarm_rate_models import AlarmRatesModel
 from service.api.alarm_rate_views import alarm_rates_model, counted
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
 from service.api.times import ns_from_datetime, require_order
+from service.security.roles import Permission
 from service.store.port import AlarmQuery
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400
@@ -24,7 +26,9 @@ RATE_PROBLEMS = described_problems(
 
 def alarm_rate_router(context: Context) -> APIRouter:
     """The route of alarm rates."""
-    router = APIRouter(prefix="/api/v1/alarms", tags=["alarms"])
+    router = APIRouter(
+        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("/rates", summary="How often alarms come", responses=RATE_PROBLEMS)
     async def rates(

@@ -42,17 +42,17 @@ class RequestModel(ApiModel):
 
 
 class ActorModel(RequestModel):
-    """Who does something to an alarm. There is no login yet: the name is believed."""
+    """Who does something to an alarm."""
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
 
 class AcknowledgeModel(RequestModel):
     """That somebody has seen an occurrence of an alarm."""
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
     occurrence: Annotated[int, Field(ge=1, le=2**62, examples=[3])]
     """Which occurrence was seen: one that has come since is not acknowledged."""
@@ -64,8 +64,8 @@ class AcknowledgeModel(RequestModel):
 class CommentModel(RequestModel):
     """What somebody has to say about an alarm."""
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
     text: Words
     """What, 1 to 500 printable characters."""
@@ -74,8 +74,8 @@ class CommentModel(RequestModel):
 class ShelveModel(RequestModel):
     """That somebody takes an alarm off the list for a while."""
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
     reason: Words
     """Why, 1 to 500 printable characters."""
@@ -87,8 +87,8 @@ class ShelveModel(RequestModel):
 class OutageModel(RequestModel):
     """That somebody takes an alarm off the list until further notice."""
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
     reason: Words
     """Why, 1 to 500 printable characters."""

@@ -18,6 +18,8 @@ from core.alarms.operation import (
     Unshelve,
 )
 from core.units import ns_from_s
+from service.api.access.actors import actor_or
+from service.api.access.declared import needs
 from service.api.alarm_models import (
     AlarmEventsModel,
     AlarmListModel,
@@ -36,8 +38,8 @@ from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered_now
-from service.api.same_host import require_same_host
 from service.api.times import ns_from_datetime, require_order
+from service.security.roles import Permission
 from service.store.port import AlarmQuery
 
 MAX_EVENTS = 1000
@@ -54,11 +56,14 @@ AlarmId = Annotated[
     ),
 ]
 
+OUTAGE = [needs(Permission.CHANGE_MEASURING)]
+"""Nobody is told of an alarm out of service, for as long as that lasts."""
+
 EVENT_PROBLEMS = described_problems({422: "A wrong parameter", 503: "The store cannot be read"})
 
 ACTION_PROBLEMS = described_problems(
     {
-        403: "Asked for from another host or site",
+        403: "Not allowed, or asked for by a page of another site",
         404: "Unknown alarm",
         409: "Does not fit the alarm as it is now",
         422: "A wrong parameter",
@@ -69,7 +74,9 @@ ACTION_PROBLEMS = described_problems(
 
 def alarm_router(context: Context) -> APIRouter:
     """Routes that show alarms."""
-    router = APIRouter(prefix="/api/v1/alarms", tags=["alarms"])
+    router = APIRouter(
+        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
     async def alarms() -> Response:
@@ -95,13 +102,15 @@ def operation_router(context: Context) -> APIRouter:
     router = APIRouter(
         prefix="/api/v1/alarms/{alarm}",
         tags=["alarms"],
-        dependencies=[Depends(require_same_host)],
+        dependencies=[needs(Permission.ACT_ON_ALARMS)],
     )
 
     @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
         """Say that an occurrence has been seen; saying so twice changes nothing."""
-        return await _done(context, alarm, Acknowledge(**dict(asked)))
+        return await _done(
+            context, alarm, Acknowledge(**{**dict(asked), "actor": actor_or(asked.actor)})
+        )
 
     @router.post("/shelve", summary="Shelve", responses=ACTION_PROBLEMS)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
@@ -110,39 +119,51 @@ def operation_router(context: Context) -> APIRouter:
             detail = f"duration_s {asked.duration_s:g} is above {context.max_shelf_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
-        return await _done(context, alarm, Shelve(asked.actor, asked.reason, until_ns))
+        return await _done(context, alarm, Shelve(actor_or(asked.actor), asked.reason, until_ns))
 
     @router.post("/unshelve", summary="Unshelve", responses=ACTION_PROBLEMS)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Bring a shelved alarm back before its time."""
-        return await _done(context, alarm, Unshelve(asked.actor))
+        return await _done(context, alarm, Unshelve(actor_or(asked.actor)))
 
-    @router.post("/out-of-service", summary="Take out of service", responses=ACTION_PROBLEMS)
+    @router.post(
+        "/out-of-service",
+        summary="Take out of service",
+        responses=ACTION_PROBLEMS,
+        dependencies=OUTAGE,
+    )
     async def take_out(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
         """Take an alarm off the list until it is returned to service, as for maintenance."""
-        return await _done(context, alarm, TakeOutOfService(asked.actor, asked.reason))
+        return await _done(context, alarm, TakeOutOfService(actor_or(asked.actor), asked.reason))
 
-    @router.post("/return-to-service", summary="Return to service", responses=ACTION_PROBLEMS)
+    @router.post(
+        "/return-to-service",
+        summary="Return to service",
+        responses=ACTION_PROBLEMS,
+        dependencies=OUTAGE,
+    )
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """End that; if the alarm is active, it is announced anew."""
-        return await _done(context, alarm, ReturnToService(asked.actor))
+        return await _done(context, alarm, ReturnToService(actor_or(asked.actor)))
 
     @router.post("/reset", summary="Reset a latched alarm", responses=ACTION_PROBLEMS)
     async def reset(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an alarm that was acknowledged and whose condition has gone."""
-        return await _done(context, alarm, Reset(asked.actor))
+        return await _done(context, alarm, Reset(actor_or(asked.actor)))
 
     @router.post("/comment", summary="Comment", responses=ACTION_PROBLEMS)
     async def comment(alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Say something about an alarm; it stands in its history, and the alarm as it was."""
-        return await _done(context, alarm, Comment(asked.actor, asked.text))
+        return await _done(context, alarm, Comment(actor_or(asked.actor), asked.text))
 
     return router
 
 
 def alarm_by_id_router(context: Context) -> APIRouter:
     """The route of one alarm; after those whose names could be taken for an alarm's."""
-    router = APIRouter(prefix="/api/v1/alarms", tags=["alarms"])
+    router = APIRouter(
+        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("/{alarm}", summary="One alarm", responses=problem_responses(404))
     async def one(alarm: AlarmId) -> AlarmModel:

@@ -4,6 +4,9 @@ from importlib.metadata import version
 
 from fastapi import Depends, FastAPI
 
+from service.api.access.application import GuardedApi
+from service.api.access.desk import AccessDesk
+from service.api.access.session_routes import session_router
 from service.api.alarm_rate_routes import alarm_rate_router
 from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
 from service.api.audit_routes import audit_router
@@ -48,7 +51,7 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 
 def create_app(context: Context) -> FastAPI:
     """Put the application together."""
-    app = FastAPI(
+    app = GuardedApi(
         title="padwatch",
         version=version("padwatch"),
         description=DESCRIPTION,
@@ -58,6 +61,8 @@ def create_app(context: Context) -> FastAPI:
         responses=any_other_problem(),
     )
     app.add_middleware(Revalidation, clock=context.clock)
+    desk = context.access or AccessDesk(context.store.access, context.clock)
+    app.stand_behind(desk)
     app.add_middleware(OriginHeader, origin=context.origin)
     app.add_middleware(EditionHeader)
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
@@ -89,9 +94,11 @@ def create_app(context: Context) -> FastAPI:
         delivery_router(context),
         audit_router(context),
         alarm_by_id_router(context),
+        session_router(context, desk),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:
         app.include_router(metrics_router(context.metrics))
     app.include_router(dashboard_router())
+    app.require_declarations()
     return app

@@ -6,12 +6,14 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
 
+from service.api.access.declared import needs
 from service.api.audit_models import AuditEntryModel, AuditModel
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import described_problems
 from service.api.times import ns_from_datetime, require_order, rfc3339
 from service.audit.entry import MAX_NAME, AuditEntry
+from service.security.roles import Permission
 from service.store.audit_port import AuditQuery
 
 MAX_ENTRIES = 1000
@@ -21,7 +23,9 @@ PROBLEMS = described_problems({422: "A wrong parameter", 503: "The store cannot 
 
 def audit_router(context: Context) -> APIRouter:
     """The route that shows the audit trail."""
-    router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
+    router = APIRouter(
+        prefix="/api/v1/audit", tags=["audit"], dependencies=[needs(Permission.READ_AUDIT)]
+    )
 
     @router.get("", summary="Audit trail", responses=PROBLEMS)
     async def audit(query: Annotated[AuditQuery, Depends(audit_query)]) -> AuditModel:

@@ -238,8 +238,8 @@ class BaselineActionModel(ApiModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
     reason: Words
     """Why, 1 to 500 printable characters."""

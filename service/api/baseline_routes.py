@@ -3,10 +3,12 @@
 import asyncio
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Path, Response
+from fastapi import APIRouter, Path, Response
 
 from core.baseline.baseline import BearingBaseline
 from core.baseline.exchange import BASELINE, FORMAT_VERSION, to_json
+from service.api.access.actors import actor_or
+from service.api.access.declared import needs
 from service.api.baseline_models import (
     BaselineActionModel,
     BaselineModel,
@@ -23,7 +25,6 @@ from service.api.baseline_views import (
 from service.api.context import BearingId, Context, UnitId
 from service.api.film_routes import watched_place
 from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.same_host import require_same_host
 from service.api.times import ns_from_datetime, rfc3339
 from service.films.actions import (
     Accept,
@@ -36,6 +37,7 @@ from service.films.actions import (
 )
 from service.films.progress import learning_progress
 from service.films.versions import versions_after
+from service.security.roles import Permission
 
 Version = Annotated[int, Path(ge=1, le=2**62, description="Version of a baseline.", examples=[3])]
 
@@ -43,7 +45,7 @@ READING_PROBLEMS = problem_responses(404, 422, 503)
 
 ACTION_PROBLEMS = described_problems(
     {
-        403: "Asked for from another host or site",
+        403: "Not allowed, or asked for by a page of another site",
         404: "Unknown unit, bearing or version",
         409: "Does not fit the baselines as they are now, or the film is not watched",
         422: "A wrong parameter",
@@ -67,7 +69,9 @@ EXPORTED: dict[int | str, dict[str, Any]] = {
 def baseline_router(context: Context) -> APIRouter:
     """Routes that show baselines."""
     router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines", tags=["baselines"]
+        prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines",
+        tags=["baselines"],
+        dependencies=[needs(Permission.READ)],
     )
 
     @router.get("", summary="Baselines of a bearing", responses=problem_responses(404, 503))
@@ -104,7 +108,7 @@ def baseline_action_router(context: Context) -> APIRouter:
     router = APIRouter(
         prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines",
         tags=["baselines"],
-        dependencies=[Depends(require_same_host)],
+        dependencies=[needs(Permission.CHANGE_MEASURING)],
     )
 
     @router.post("/{version}/accept", summary="Accept a baseline", responses=ACTION_PROBLEMS)
@@ -156,7 +160,7 @@ async def _done(
     """Do it, and answer when it is on the disk."""
     place = watched_place(context, unit, bearing)
     try:
-        await context.films.act(place, action, asked.actor, asked.reason)
+        await context.films.act(place, action, actor_or(asked.actor), asked.reason)
     except BaselineRefusedError as error:
         raise ProblemError(409, "Does not fit", f"{unit} {bearing}: {error}") from error
     return await asyncio.to_thread(_baselines, context, unit, bearing)

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator
 
 from core.estimators import STIFFNESS_OF
 from core.quantities import BY_NAME
+from service.api.access.declared import needs
 from service.api.bearing_models import BearingModel
 from service.api.bearing_views import bearing_model
 from service.api.budget_models import BudgetModel
@@ -24,6 +25,7 @@ from service.api.views import (
     spectrum_model,
 )
 from service.live import CurrentBearing
+from service.security.roles import Permission
 from service.store.value_range import ValueRange
 
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]
@@ -69,7 +71,11 @@ TimeRange = Annotated[tuple[int, int], Depends(time_range)]
 
 def bearing_router(context: Context) -> APIRouter:
     """Routes about one bearing."""
-    router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
     unknown, no_result = problem_responses(404), problem_responses(404, 409)
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
@@ -124,7 +130,9 @@ def bearing_router(context: Context) -> APIRouter:
 
 def gap_router(context: Context) -> APIRouter:
     """Routes about holes in the samples of a unit."""
-    router = APIRouter(prefix="/api/v1/units/{unit}", tags=["plant"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
     async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from service.api.access.declared import needs
 from service.api.channel_models import ChannelsModel, WaveformModel
 from service.api.channel_views import channels_model, rows_of
 from service.api.context import Context, UnitId
@@ -11,6 +12,7 @@ from service.api.problems import ProblemError, described_problems, problem_respo
 from service.api.rendering import rendered
 from service.api.waveform_views import newest_stretch, waveform_model
 from service.live import HELD_S
+from service.security.roles import Permission
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
@@ -24,7 +26,9 @@ PROBLEMS = described_problems(
 
 def channel_router(context: Context) -> APIRouter:
     """Routes about channels."""
-    router = APIRouter(prefix="/api/v1/units/{unit}", tags=["plant"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("/channels", summary="Channels", responses=problem_responses(404))
     async def channels(unit: UnitId) -> ChannelsModel:

@@ -5,9 +5,11 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
+from service.api.access.declared import Reach, needs
 from service.api.configuration_models import ConfigurationModel
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
+from service.security.roles import Permission
 from service.settings.schema import plant_file_schema
 
 SCHEMA = "/api/v1/configuration/schema"
@@ -19,7 +21,9 @@ ABSENT = described_problems({404: "The service keeps no configuration"})
 
 def configuration_router(context: Context) -> APIRouter:
     """Routes that show the configuration; they change nothing."""
-    router = APIRouter(prefix="/api/v1/configuration", tags=["plant"])
+    router = APIRouter(
+        prefix="/api/v1/configuration", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("", summary="Configuration", responses=ABSENT)
     async def configuration() -> ConfigurationModel:
@@ -41,6 +45,7 @@ def configuration_router(context: Context) -> APIRouter:
 
     @router.get(
         "/schema",
+        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
         summary="JSON schema of plant files",
         response_class=Response,
         responses={200: _schema_content()},

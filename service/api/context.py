@@ -8,6 +8,7 @@ from fastapi import Path
 
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
+from service.api.access.desk import AccessDesk
 from service.api.problems import ProblemError
 from service.audit.refusals import Refusals
 from service.capture.captures import Captures
@@ -44,6 +45,8 @@ class Context:
         What is told to Prometheus; None where nobody asks.
     loops
         What is wrong with each loop of the program; None where nothing is.
+    access
+        Tells who asks; None for one that asks nobody on this computer.
     refusals
         Takes refused requests; None for a taker of the application's own.
     """
@@ -66,6 +69,7 @@ class Context:
     metrics: Watched | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
     refusals: Refusals | None = None
+    access: AccessDesk | None = None
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter, Response
 
+from service.api.access.declared import Reach, needs
 from service.api.context import Context
 from service.api.delivery_models import DeadLetterModel, DeliveryModel, ReceiverModel
 from service.api.problems import problem_responses
@@ -9,6 +10,7 @@ from service.api.rendering import rendered_now
 from service.api.times import rfc3339
 from service.delivery.deliveries import ReceiverView
 from service.delivery.sender import SenderStatus
+from service.security.roles import Permission
 from service.store.outbox_port import Backlog, LetterState, StoredLetter
 
 NO_BACKLOG = Backlog("", 0, None, 0, None, None)
@@ -16,7 +18,9 @@ NO_BACKLOG = Backlog("", 0, None, 0, None, None)
 
 def delivery_router(context: Context) -> APIRouter:
     """Routes about delivery; they change nothing."""
-    router = APIRouter(prefix="/api/v1", tags=["alarms"])
+    router = APIRouter(
+        prefix="/api/v1", tags=["alarms"], dependencies=[needs(Permission.READ, Reach.NO_UNIT)]
+    )
 
     @router.get(
         "/delivery",

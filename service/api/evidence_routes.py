@@ -10,6 +10,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
 
 from core.alarms.alarm import AlarmKind
+from service.api.access.declared import needs
 from service.api.alarm_routes import AlarmId
 from service.api.alarm_views import LEVEL_NAMES
 from service.api.context import Context
@@ -21,6 +22,7 @@ from service.evidence.desk import EvidenceDesk, Found, TooManyDownloadsError
 from service.evidence.document import Evidence
 from service.evidence.report.page import POLICY
 from service.evidence.tables import TableError
+from service.security.roles import Permission
 
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 
@@ -55,7 +57,11 @@ log = structlog.get_logger()
 
 def evidence_router(context: Context) -> APIRouter:
     """Routes that show evidence; they change nothing."""
-    router = APIRouter(prefix="/api/v1/alarms/{alarm}/evidence", tags=["alarms"])
+    router = APIRouter(
+        prefix="/api/v1/alarms/{alarm}/evidence",
+        tags=["alarms"],
+        dependencies=[needs(Permission.READ)],
+    )
 
     @router.get("", summary="Evidence of an alarm", responses=LIST_PROBLEMS)
     async def occurrences(

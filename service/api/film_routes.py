@@ -4,6 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
 
+from service.api.access.declared import needs
 from service.api.bearing_routes import TimeRange, eccentricity_range, oil_temperature_range
 from service.api.context import BearingId, Context, UnitId
 from service.api.film_conditions import states_named
@@ -16,6 +17,7 @@ from service.api.problems import ProblemError, described_problems, problem_respo
 from service.api.rendering import rendered, worked
 from service.api.tables import Column, Format, table_content, table_response
 from service.films.learning import FilmPlace
+from service.security.roles import Permission
 from service.store.film_port import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
 from service.store.value_range import ValueRange
@@ -42,7 +44,11 @@ READING_PROBLEMS = described_problems(
 
 def film_router(context: Context) -> APIRouter:
     """Routes about films."""
-    router = APIRouter(prefix="/api/v1/units/{unit}/bearings/{bearing}/film", tags=["film"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings/{bearing}/film",
+        tags=["film"],
+        dependencies=[needs(Permission.READ)],
+    )
 
     @router.get("", summary="A film now", responses=problem_responses(404))
     async def film(unit: UnitId, bearing: BearingId) -> FilmModel:

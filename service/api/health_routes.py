@@ -2,13 +2,14 @@
 
 from fastapi import APIRouter, Response
 
+from service.api.access.declared import OPEN
 from service.api.context import Context
 from service.api.plant_models import HealthModel
 
 
 def health_router(context: Context) -> APIRouter:
     """Liveness and readiness, for supervisors."""
-    router = APIRouter(tags=["health"])
+    router = APIRouter(tags=["health"], dependencies=[OPEN])
 
     @router.get("/livez", summary="Is the process alive?")
     async def livez() -> HealthModel:

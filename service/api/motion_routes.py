@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Response
 from acquisition.errors import ConfigError
 from core.blocks import SampleBlock
 from core.machine import Bearing
+from service.api.access.declared import needs
 from service.api.context import BearingId, Context, UnitId
 from service.api.motion_models import MotionModel
 from service.api.motion_views import MotionOrigin, motion_model
@@ -24,6 +25,7 @@ from service.orbits.motion import channels_for, motion_of
 from service.orbits.recorded import NoMotionError, recorded_motion
 from service.orbits.stretch import newest_of, stretch_of
 from service.recordings.shelf import Kept
+from service.security.roles import Permission
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
@@ -47,7 +49,11 @@ RECORDING_PROBLEMS = described_problems(
 
 def motion_router(context: Context) -> APIRouter:
     """The route of the newest motion."""
-    router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
 
     @router.get(
         "/{bearing}/motion",
@@ -87,7 +93,9 @@ def motion_router(context: Context) -> APIRouter:
 
 def recorded_motion_router(context: Context) -> APIRouter:
     """The route of the motion in recordings."""
-    router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+    router = APIRouter(
+        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get(
         "/{recording}/motion",

@@ -52,8 +52,8 @@ class Order1ReferenceModel(ApiModel):
 class TakeReferenceModel(RequestModel):
     """That somebody calls the machine, as it runs now, well."""
 
-    actor: Actor
-    """Who, 1 to 80 printable characters."""
+    actor: Actor | None = None
+    """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
     note: Comment = ""
     """What to remember, at most 500 printable characters."""

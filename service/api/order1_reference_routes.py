@@ -2,9 +2,11 @@
 
 import asyncio
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 
 from service.alarms.order1_reference import VectorRefusedError, measured_vectors
+from service.api.access.actors import actor_or
+from service.api.access.declared import needs
 from service.api.context import BearingId, Context, UnitId
 from service.api.order1_reference_models import (
     Order1ReferenceModel,
@@ -12,13 +14,13 @@ from service.api.order1_reference_models import (
     VectorModel,
 )
 from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.same_host import require_same_host
 from service.api.times import rfc3339
+from service.security.roles import Permission
 from service.store.vector_reference_port import SetVectorReference
 
 TAKE_PROBLEMS = described_problems(
     {
-        403: "Asked for from another host or site",
+        403: "Not allowed, or asked for by a page of another site",
         404: "Unknown unit or bearing",
         409: "The machine does not run so that a reference could be taken",
         422: "A wrong parameter",
@@ -29,7 +31,11 @@ TAKE_PROBLEMS = described_problems(
 
 def order1_reference_router(context: Context) -> APIRouter:
     """Routes about reference vectors."""
-    router = APIRouter(prefix="/api/v1/units/{unit}/bearings/{bearing}", tags=["bearing"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings/{bearing}",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
 
     @router.get(
         "/order1-references", summary="References of 1×", responses=problem_responses(404, 503)
@@ -47,7 +53,7 @@ def order1_reference_router(context: Context) -> APIRouter:
         "/order1-references",
         summary="Take a reference of 1×",
         responses=TAKE_PROBLEMS,
-        dependencies=[Depends(require_same_host)],
+        dependencies=[needs(Permission.CHANGE_MEASURING)],
     )
     async def take(
         unit: UnitId, bearing: BearingId, asked: TakeReferenceModel
@@ -60,7 +66,9 @@ def order1_reference_router(context: Context) -> APIRouter:
         except VectorRefusedError as error:
             detail = f"unit {unit} bearing {bearing}: {error}"
             raise ProblemError(409, "No reference", detail) from error
-        found = SetVectorReference(measured, context.clock.now_ns(), asked.actor, asked.note)
+        found = SetVectorReference(
+            measured, context.clock.now_ns(), actor_or(asked.actor), asked.note
+        )
         await asyncio.to_thread(context.store.order1_references.add, found)
         context.alarms.refer_to(measured)
         return _model(found)

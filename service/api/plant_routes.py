@@ -3,16 +3,18 @@
 from fastapi import APIRouter, Request, Response
 
 from core.quantities import CATALOGUE
+from service.api.access.declared import Reach, needs
 from service.api.context import Context, UnitId
 from service.api.overview import Overview
 from service.api.plant_models import OverviewModel, QuantityModel, UnitModel
 from service.api.problems import problem_responses
 from service.api.views import source_model
+from service.security.roles import Permission
 
 
 def plant_router(context: Context) -> APIRouter:
     """Routes that are not about one bearing."""
-    router = APIRouter(prefix="/api/v1", tags=["plant"])
+    router = APIRouter(prefix="/api/v1", tags=["plant"], dependencies=[needs(Permission.READ)])
     shown = Overview(context)
 
     @router.get("/overview", summary="Everything at a glance", response_model=OverviewModel)
@@ -30,7 +32,11 @@ def plant_router(context: Context) -> APIRouter:
         """A unit and how its samples arrive."""
         return _unit(context, context.unit(unit).id)
 
-    @router.get("/quantities", summary="The catalogue of quantities")
+    @router.get(
+        "/quantities",
+        summary="The catalogue of quantities",
+        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
+    )
     async def quantities() -> list[QuantityModel]:
         """Name, unit and meaning of everything that is reported about a bearing."""
         return [QuantityModel(name=q.name, unit=q.unit, label=q.label) for q in CATALOGUE]

@@ -49,9 +49,16 @@ class Problem(BaseModel):
 class ProblemError(Exception):
     """Ends a request with a problem document."""
 
-    def __init__(self, status: int, title: str, detail: str, parameter: str | None = None) -> None:
+    def __init__(
+        self,
+        status: int,
+        title: str,
+        detail: str,
+        parameter: str | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
         super().__init__(detail)
-        self.status, self.title, self.detail = status, title, detail
+        self.status, self.title, self.detail, self.headers = status, title, detail, headers
         self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else []
 
 
@@ -97,7 +104,7 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(ProblemError)
     async def _problem(request: Request, error: ProblemError) -> JSONResponse:
-        return _render(request, error.status, error.title, error.detail, error.errors)
+        return problem_answer(request, error)
 
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> JSONResponse:
@@ -122,6 +129,12 @@ def install_problem_handlers(app: FastAPI) -> None:
     async def _store(request: Request, error: StoreError) -> JSONResponse:
         log.error("a query failed in the store", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
+
+
+def problem_answer(request: Request, error: ProblemError) -> JSONResponse:
+    """The problem document of an error."""
+    words = (error.status, error.title, error.detail)
+    return _render(request, *words, error.errors, error.headers)
 
 
 def _render(

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
 
 from acquisition.errors import ConfigError
+from service.api.access.declared import needs
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
 from service.api.recording_models import (
@@ -19,6 +20,7 @@ from service.api.recording_views import recording_info, recording_model
 from service.api.rendering import rendered, worked
 from service.evidence.desk import EvidenceDesk, TooManyDownloadsError
 from service.recordings.shelf import Shelf
+from service.security.roles import Permission
 
 RecordingId = Annotated[
     str,
@@ -47,7 +49,9 @@ log = structlog.get_logger()
 
 def recording_router(context: Context) -> APIRouter:
     """Routes about recordings; they change nothing."""
-    router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+    router = APIRouter(
+        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
     async def recordings(

@@ -4,15 +4,21 @@ import asyncio
 
 from fastapi import APIRouter
 
+from service.api.access.declared import needs
 from service.api.bearing_models import SetReferenceModel
 from service.api.bearing_views import set_reference_model
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
+from service.security.roles import Permission
 
 
 def reference_router(context: Context) -> APIRouter:
     """Routes about references."""
-    router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
     reading = problem_responses(404, 503)
 
     @router.get("/{bearing}/references", summary="References", responses=reading)

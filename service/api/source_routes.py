@@ -2,15 +2,19 @@
 
 from fastapi import APIRouter
 
+from service.api.access.declared import needs
 from service.api.context import Context
 from service.api.source_models import SourceHealthModel
 from service.api.views import source_model
+from service.security.roles import Permission
 from service.settings.units import UnitSettings
 
 
 def source_router(context: Context) -> APIRouter:
     """The route about sources."""
-    router = APIRouter(prefix="/api/v1/sources", tags=["plant"])
+    router = APIRouter(
+        prefix="/api/v1/sources", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
 
     @router.get("", summary="Health of each source")
     async def sources() -> list[SourceHealthModel]:

@@ -5,6 +5,7 @@ from typing import Annotated
 import structlog
 from fastapi import APIRouter, Query, Response
 
+from service.api.access.declared import needs
 from service.api.bearing_routes import TimeRange
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
@@ -13,6 +14,7 @@ from service.api.series_models import PlaceName
 from service.api.spectra_models import SpectraModel
 from service.api.spectra_views import spectra_model
 from service.api.views import PLACES
+from service.security.roles import Permission
 from service.store.spectra_port import SpectraQuery
 
 MAX_SPECTRA = 1000
@@ -22,7 +24,11 @@ log = structlog.get_logger()
 
 def spectra_router(context: Context) -> APIRouter:
     """The route of spectra over time."""
-    router = APIRouter(prefix="/api/v1/units/{unit}/bearings", tags=["bearing"])
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
 
     @router.get(
         "/{bearing}/spectra",

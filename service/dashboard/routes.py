@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter, HTTPException, Request, Response
 
+from service.api.access.declared import OPEN
 from service.dashboard.assets import Asset, pages, plotly
 
 SECURITY_HEADERS = {
@@ -23,7 +24,7 @@ KEEP_A_WEEK = "public, max-age=604800"
 
 def dashboard_router() -> APIRouter:
     """Build the routes ``/``, ``/static/…`` and ``/static/plotly.min.js``."""
-    router = APIRouter(include_in_schema=False)
+    router = APIRouter(include_in_schema=False, dependencies=[OPEN])
     router.add_api_route("/", _index, methods=["GET", "HEAD"])
     router.add_api_route("/static/plotly.min.js", _plotly, methods=["GET", "HEAD"])
     router.add_api_route("/static/{path:path}", _file, methods=["GET", "HEAD"])

@@ -4,8 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 
+from service.api.access.declared import needs
 from service.metrics.scrape import OPEN_METRICS, rendered, scrape
 from service.metrics.watched import Watched
+from service.security.roles import Permission
 
 EXAMPLE = """\
 # HELP padwatch_link_connected 1 while the device is connected.
@@ -24,7 +26,7 @@ ANSWER = {
 
 def metrics_router(watched: Watched) -> APIRouter:
     """The route that Prometheus asks."""
-    router = APIRouter(tags=["health"])
+    router = APIRouter(tags=["health"], dependencies=[needs(Permission.READ)])
 
     @router.get(
         "/metrics",

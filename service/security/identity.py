@@ -12,6 +12,9 @@ class Means(StrEnum):
     SESSION = "session"
     KEY = "key"
 
+    LOCAL = "local"
+    """By being on this computer, where nobody has to log in."""
+
 
 @dataclass(frozen=True)
 class Identity:
@@ -20,7 +23,7 @@ class Identity:
     Parameters
     ----------
     name
-        Of the account or the key.
+        Of the account or the key, or `LOCAL`'s.
     role
         As it is now, not as it was at login.
     units
@@ -35,7 +38,12 @@ class Identity:
     @property
     def actor(self) -> str:
         """What is written beside actions; a key is told from an account of the same name."""
-        return self.name if self.means is Means.SESSION else f"key:{self.name}"
+        return f"key:{self.name}" if self.means is Means.KEY else self.name
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether its name is more than a place."""
+        return self.means is not Means.LOCAL
 
     def may(self, permission: Permission, unit: str | None = None) -> bool:
         """Whether it may do something, to a unit or to what belongs to no single unit.
@@ -47,3 +55,7 @@ class Identity:
         if not self.units:
             return True
         return permission is Permission.READ if unit is None else unit in self.units
+
+
+LOCAL = Identity("local", Role.ADMIN, Means.LOCAL)
+"""Whoever sits at this computer, where nobody has to log in."""

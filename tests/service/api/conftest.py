@@ -87,6 +87,7 @@ class Service:
     evidence: EvidenceKeeper
     films: FilmKeeper
     loops: dict[str, str | None]
+    context: Context
 
     async def get(self, path: str, **parameters: object) -> httpx2.Response:
         return await self.client.get(path, params=parameters)
@@ -195,6 +196,7 @@ async def service(
             evidence,
             films,
             loops,
+            context,
         )
     recording.cancel()
     await asyncio.wait([recording])

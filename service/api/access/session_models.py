@@ -1,0 +1,77 @@
+"""What is said and asked about logins."""
+
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+
+from service.api.models import ApiModel
+from service.security.names import MAX_NAME
+from service.security.passwords import MAX_LENGTH
+
+RoleName = Literal["viewer", "operator", "engineer", "admin"]
+
+PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audit", "change_access"]
+
+
+class AskedModel(ApiModel):
+    """What all requests share: nothing unknown, nothing converted."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+
+
+LoginName = Annotated[str, Field(max_length=4 * MAX_NAME, examples=["anna"])]
+Password = Annotated[
+    str, Field(max_length=4 * MAX_LENGTH, examples=["a sentence that nobody guesses"])
+]
+
+
+class SessionModel(ApiModel):
+    """Who asks, and what he may do."""
+
+    login_required: bool
+    """Whether one must log in from where this is asked."""
+
+    set_up_needed: bool
+    """Whether there is no account yet that one could log in to."""
+
+    name: Annotated[str | None, Field(examples=["anna"])]
+    """Name of the account or key; null for nobody in particular."""
+
+    role: Annotated[RoleName | None, Field(examples=["operator"])]
+    """What that is to the plant; null where one must log in first."""
+
+    permissions: Annotated[list[PermissionName], Field(examples=[["read", "act_on_alarms"]])]
+    """What that may do; nothing where one must log in first."""
+
+
+class LoginModel(AskedModel):
+    """Somebody wants to log in."""
+
+    name: LoginName
+    """Name of the account; upper and lower case are the same."""
+
+    password: Password
+    """Its password."""
+
+
+class NewPasswordModel(AskedModel):
+    """Somebody changes his own password."""
+
+    password: Password
+    """The password until now."""
+
+    new_password: Password
+    """The one from now on: 12 to 256 characters, at least 6 different ones."""
+
+
+class SetUpModel(AskedModel):
+    """Somebody makes the first account."""
+
+    token: Annotated[str, Field(max_length=256, examples=["the token that the service printed"])]
+    """The token that the service printed when it started."""
+
+    name: LoginName
+    """Name of the account: a-z 0-9 . _ @ -."""
+
+    password: Password
+    """Its password: 12 to 256 characters, at least 6 different ones."""

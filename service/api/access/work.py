@@ -1,0 +1,48 @@
+"""What access costs, away from the event loop and from everybody else's threads."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
+from threading import BoundedSemaphore
+from typing import TypeVar
+
+from service.security.passwords import MAX_AT_ONCE
+
+MAX_WAITING = 16
+"""Passwords that are hashed or wait for it; at a third of a second each nobody waits for long."""
+
+LOOKUP_THREADS = 2
+
+T = TypeVar("T")
+
+
+class TooManyLoginsError(Exception):
+    """So many passwords wait to be hashed that no more are taken."""
+
+
+class AccessWork:
+    """Threads for looking into the store, and others for hashing passwords."""
+
+    def __init__(self) -> None:
+        self._lookups = ThreadPoolExecutor(LOOKUP_THREADS, "access")
+        self._hashes = ThreadPoolExecutor(MAX_AT_ONCE, "passwords")
+        self._places = BoundedSemaphore(MAX_WAITING)
+
+    async def looked_up(self, look: Callable[[], T]) -> T:
+        """Do something short that waits for the disk."""
+        return await asyncio.wrap_future(self._lookups.submit(copy_context().run, look))
+
+    async def hashed(self, work: Callable[[], T]) -> T:
+        """Do something that hashes a password.
+
+        Raises
+        ------
+        TooManyLoginsError
+            If too many wait for it already.
+        """
+        if not self._places.acquire(blocking=False):
+            raise TooManyLoginsError
+        running: Future[T] = self._hashes.submit(copy_context().run, work)
+        running.add_done_callback(lambda _: self._places.release())
+        return await asyncio.wrap_future(running)

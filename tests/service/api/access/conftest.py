@@ -1,0 +1,80 @@
+"""The API where everybody must log in, with passwords whose hashes cost little."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import httpx2
+import pytest
+from argon2 import PasswordHasher
+
+from service.api.access.desk import AccessDesk
+from service.api.app import create_app
+from service.security.passwords import Hashing
+from service.security.people import create_key
+from service.security.roles import Role
+
+PASSWORD = "the river is high in may"  # noqa: S105
+OWN = {"Origin": "http://padwatch"}
+COOKIE = "__Host-padwatch"
+
+
+@dataclass
+class Access:
+    """A service that asks everybody who he is."""
+
+    desk: AccessDesk
+    app: Any
+    service: Any
+
+    def client(self, peer: str = "192.0.2.7", **headers: str) -> httpx2.AsyncClient:
+        """A program elsewhere; it keeps no cookies that are for secure places only."""
+        transport = httpx2.ASGITransport(self.app, client=(peer, 40_000))
+        return httpx2.AsyncClient(transport=transport, base_url="http://padwatch", headers=headers)
+
+    async def account(self, name: str, role: Role) -> None:
+        await self.desk.add(name, role, PASSWORD)
+
+    async def session(self, name: str) -> str:
+        """Log in; the token of the session."""
+        async with self.client() as client:
+            answer = await client.post("/api/v1/session", json={"name": name, "password": PASSWORD})
+        assert answer.status_code == 201, answer.text
+        return token_of(answer)
+
+    def key(self, role: Role, *units: str, days: int = 1) -> str:
+        now_ns = self.service.clock.now_ns()
+        _, shown = create_key(self.desk.store, f"key-{role}", role, units, days, now_ns)
+        return shown
+
+
+def token_of(answer: httpx2.Response) -> str:
+    """The session's token in the cookie of an answer, which must be of the safe kind."""
+    [cookie] = answer.headers.get_list("set-cookie")
+    pair, *attributes = cookie.split("; ")
+    name, _, token = pair.partition("=")
+    assert name == COOKIE
+    assert {"HttpOnly", "Secure", "Path=/", "SameSite=strict"} <= set(attributes)
+    assert not any(attribute.startswith("Domain") for attribute in attributes)
+    return token
+
+
+def cheap_hashing() -> Hashing:
+    return Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
+
+
+@pytest.fixture
+def access(service: Any) -> Access:
+    """A second application over the same store, which asks everybody."""
+    context = service.context
+    desk = AccessDesk(
+        service.store.access, service.clock, asks_everybody=True, hashing=cheap_hashing()
+    )
+    app = create_app(replace(context, access=desk))
+    app.openapi_schema = service.document
+    return Access(desk, app, service)
+
+
+@pytest.fixture
+def as_token() -> Callable[[httpx2.Response], str]:
+    return token_of

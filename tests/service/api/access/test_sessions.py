@@ -1,0 +1,265 @@
+"""Logging in and out, and what a request may show of who sends it."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+import pytest
+
+from service.security.roles import Role
+
+SESSION, UNITS = "/api/v1/session", "/api/v1/units"
+PASSWORD = "the river is high in may"  # noqa: S105
+ANNA = {"name": "anna", "password": PASSWORD}
+COOKIE = "__Host-padwatch"
+
+Token = Callable[[httpx2.Response], str]
+
+
+@pytest.fixture
+async def anna(access: Any) -> str:
+    """Token of a session of an engineer."""
+    await access.account("anna", Role.ENGINEER)
+    token: str = await access.session("anna")
+    return token
+
+
+def cookie(token: str) -> dict[str, str]:
+    return {"Cookie": f"{COOKIE}={token}"}
+
+
+async def test_on_this_computer_nobody_has_to_log_in(service: Any) -> None:
+    said = await service.json(SESSION)
+
+    assert said["login_required"] is False
+    assert said["set_up_needed"] is False
+    assert (said["name"], said["role"]) == (None, "admin")
+    assert len(said["permissions"]) == 5
+
+
+async def test_what_a_proxy_passes_on_is_not_from_this_computer(service: Any) -> None:
+    for header in ("X-Forwarded-For", "Forwarded", "Via", "X-Real-IP"):
+        answer = await service.client.get(UNITS, headers={header: "127.0.0.1"})
+        assert answer.status_code == 401, header
+
+
+async def test_who_has_not_logged_in_sees_nothing_but_that(access: Any) -> None:
+    async with access.client() as client:
+        said = (await client.get(SESSION)).json()
+        refused = await client.get(UNITS)
+
+    assert said == {
+        "login_required": True,
+        "set_up_needed": True,
+        "name": None,
+        "role": None,
+        "permissions": [],
+    }
+    assert refused.status_code == 401
+    assert refused.headers["www-authenticate"].startswith("Bearer")
+
+
+async def test_a_login_opens_what_its_role_may(access: Any, anna: str) -> None:
+    async with access.client(**cookie(anna)) as client:
+        said = (await client.get(SESSION)).json()
+        seen = await client.get(UNITS)
+
+    assert (said["name"], said["role"], said["set_up_needed"]) == ("anna", "engineer", False)
+    assert said["permissions"] == ["read", "act_on_alarms", "change_measuring", "read_audit"]
+    assert seen.status_code == 200
+
+
+async def test_who_logs_out_is_out(access: Any, anna: str) -> None:
+    async with access.client(**cookie(anna), Origin="http://padwatch") as client:
+        out = await client.delete(SESSION)
+        seen = await client.get(UNITS)
+        again = await client.delete(SESSION)
+
+    assert out.status_code == 204
+    assert "Max-Age=0" in out.headers["set-cookie"]
+    assert (seen.status_code, again.status_code) == (401, 204)
+
+
+async def test_a_login_never_takes_a_token_that_was_there_before(
+    access: Any, anna: str, as_token: Token
+) -> None:
+    made_up = "A" * 43
+    tokens = {anna, made_up}
+    for before in (anna, made_up):
+        headers = cookie(before) | {"Origin": "http://padwatch"}
+        async with access.client(**headers) as client:
+            tokens.add(as_token(await client.post(SESSION, json=ANNA)))
+    async with access.client(**cookie(anna)) as client:
+        old = await client.get(UNITS)
+    async with access.client(**cookie(made_up)) as client:
+        fixed = await client.get(UNITS)
+
+    assert len(tokens) == 4
+    assert (old.status_code, fixed.status_code) == (401, 401)
+
+
+@pytest.mark.parametrize("name", ["anna", "nobody", "' OR 1=1 --", "=cmd|x"])
+async def test_a_wrong_login_does_not_say_what_was_wrong(
+    access: Any, anna: str, name: str, as_problem: Callable[[httpx2.Response], dict[str, Any]]
+) -> None:
+    assert anna
+    body = '{"name": ' + json.dumps(name) + ', "password": "wrong wrong wrong"}'
+    async with access.client() as client:
+        answer = await client.post(
+            SESSION, content=body, headers={"Content-Type": "application/json"}
+        )
+
+    problem = as_problem(answer)
+    assert answer.status_code == 401
+    assert problem["detail"] == "the name or the password is wrong"
+    assert "set-cookie" not in answer.headers
+
+
+async def test_after_many_wrong_logins_one_has_to_wait_also_with_the_right_password(
+    access: Any, anna: str
+) -> None:
+    assert anna
+    async with access.client(peer="192.0.2.9") as client:
+        wrong = [
+            (await client.post(SESSION, json={**ANNA, "password": f"wrong {n}"})).status_code
+            for n in range(5)
+        ]
+        answer = await client.post(SESSION, json=ANNA)
+
+    assert wrong == [401] * 5
+    assert answer.status_code == 429
+    assert int(answer.headers["retry-after"]) >= 1
+
+
+async def test_two_cookies_are_neither(access: Any, anna: str) -> None:
+    mallory = "B" * 43
+    for values in (
+        [f"{COOKIE}={anna}; {COOKIE}={mallory}"],
+        [f"{COOKIE}={anna}", f"{COOKIE}={mallory}"],
+        [f"{COOKIE}={anna}; {COOKIE}={anna}"],
+    ):
+        async with access.client() as client:
+            answer = await client.get(UNITS, headers=[("Cookie", value) for value in values])
+        assert answer.status_code == 401, values
+
+
+async def test_two_keys_are_neither(access: Any) -> None:
+    key = access.key(Role.VIEWER)
+    async with access.client() as client:
+        one = await client.get(UNITS, headers=[("Authorization", f"Bearer {key}")])
+        two = await client.get(UNITS, headers=[("Authorization", f"Bearer {key}")] * 2)
+
+    assert (one.status_code, two.status_code) == (200, 401)
+
+
+async def test_a_wrong_key_is_refused_also_where_nobody_has_to_log_in(service: Any) -> None:
+    answer = await service.client.get(UNITS, headers={"Authorization": "Bearer pw_nonsense"})
+
+    assert answer.status_code == 401
+
+
+async def test_a_login_that_is_over_is_no_worse_than_none_on_this_computer(service: Any) -> None:
+    answer = await service.client.get(UNITS, headers=cookie("C" * 43))
+
+    assert answer.status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Origin": "http://padwatch"}, 404),
+        ({"Sec-Fetch-Site": "same-origin"}, 404),
+        ({"Origin": "https://padwatch"}, 404),
+        ({}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Origin": "http://padwatch.evil.example"}, 403),
+        ({"Origin": "http://padwatch:81"}, 403),
+        ({"Origin": "http://[::1"}, 403),
+        ({"Origin": "http://padwatch", "Sec-Fetch-Site": "cross-site"}, 403),
+        ({"Sec-Fetch-Site": "same-site"}, 403),
+    ],
+)
+async def test_with_a_cookie_only_the_dashboard_itself_acts(
+    access: Any, anna: str, headers: dict[str, str], status: int
+) -> None:
+    async with access.client(**cookie(anna), **headers) as client:
+        answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
+
+    assert answer.status_code == status
+
+
+async def test_a_key_acts_wherever_it_is_sent_from(access: Any) -> None:
+    headers = {"Authorization": f"Bearer {access.key(Role.OPERATOR)}"}
+    async with access.client(**headers, Origin="https://elsewhere.example") as client:
+        answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
+
+    assert answer.status_code == 404
+
+
+async def test_no_page_of_another_site_logs_anybody_in(access: Any, anna: str) -> None:
+    assert anna
+    async with access.client(Origin="https://elsewhere.example") as client:
+        answer = await client.post(SESSION, json=ANNA)
+
+    assert answer.status_code == 403
+
+
+async def test_a_new_password_ends_all_other_logins(
+    access: Any, anna: str, as_token: Token
+) -> None:
+    new = "the river is low in august"
+    body = {"password": PASSWORD, "new_password": new}
+    async with access.client(**cookie(anna), Origin="http://padwatch") as client:
+        wrong = await client.post(f"{SESSION}/password", json={**body, "password": "not this"})
+        weak = await client.post(f"{SESSION}/password", json={**body, "new_password": "short"})
+        changed = await client.post(f"{SESSION}/password", json=body)
+        old = await client.get(UNITS)
+    async with access.client(**cookie(as_token(changed))) as client:
+        seen = await client.get(UNITS)
+
+    assert (wrong.status_code, weak.status_code, changed.status_code) == (401, 422, 201)
+    assert weak.json()["errors"][0]["parameter"] == "new_password"
+    assert (old.status_code, seen.status_code) == (401, 200)
+
+
+async def test_a_key_has_no_password_to_change(access: Any) -> None:
+    headers = {"Authorization": f"Bearer {access.key(Role.ADMIN)}"}
+    body = {"password": PASSWORD, "new_password": "the river is low in august"}
+    async with access.client(**headers) as client:
+        answer = await client.post(f"{SESSION}/password", json=body)
+
+    assert answer.status_code == 409
+
+
+async def test_the_first_account_is_made_with_the_printed_token_and_once(access: Any) -> None:
+    token = await access.desk.offer_set_up()
+    body = {"token": token, **ANNA}
+    async with access.client() as client:
+        forged = await client.post("/api/v1/set-up", json={**body, "token": "D" * 43})
+        weak = await client.post("/api/v1/set-up", json={**body, "password": "short"})
+        made = await client.post("/api/v1/set-up", json=body)
+        again = await client.post("/api/v1/set-up", json={**body, "name": "mallory"})
+        after = (await client.get(SESSION)).json()
+
+    assert [r.status_code for r in (forged, weak, made, again)] == [403, 422, 201, 403]
+    assert after["set_up_needed"] is False
+    assert await access.session("anna")
+    assert await access.desk.offer_set_up() is None
+
+
+async def test_logins_are_told_and_nothing_secret_of_them(access: Any, anna: str) -> None:
+    async with access.client(**cookie(anna), Origin="http://padwatch") as client:
+        await client.post(SESSION, json={**ANNA, "password": "quite another password"})
+        await client.delete(SESSION)
+    told = (await access.service.json("/api/v1/audit"))["entries"]
+
+    assert [(entry["action"], entry["actor"], entry["peer"]) for entry in told] == [
+        ("session.ended", "anna", "192.0.2.7"),
+        ("request.refused", "anna", "192.0.2.7"),
+        ("session.begun", "anna", "192.0.2.7"),
+        ("account.added", "", None),
+    ]
+    assert PASSWORD not in str(told)
+    assert anna not in str(told)
+    assert "quite another password" not in str(told)
