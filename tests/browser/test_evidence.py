@@ -65,4 +65,16 @@ async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
     with zipfile.ZipFile(io.BytesIO(await answer.body())) as bundle:
         assert bundle.testzip() is None
         assert {"evidence.json", "report.html", "samples/samples.parquet"} <= set(bundle.namelist())
+
+    await page.goto(f"{alarmed_plant.url}#/recordings")
+    recording = page.locator("[data-recording]").first
+    await expect(recording).to_contain_text("Shaft vibration 1×, x raised")
+    await recording.get_by_role("button", name="Check").press("Enter")
+    await expect(recording).to_contain_text("Checked, whole")
+    await expect(page.locator(".recordings .advice").first).to_contain_text("12 channels at 600")
+    reported = page.locator(f"[data-report='{ALARM} 1']")
+    await expect(reported).to_contain_text("kept")
+    address = await reported.get_by_role("link", name="report").get_attribute("href")
+    assert (await page.request.get(f"{alarmed_plant.url.rstrip('/')}{address}")).ok
+    await picture_of(page, "recordings")
     assert complaints == []

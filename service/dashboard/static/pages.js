@@ -8,9 +8,11 @@
  */
 
 import { alarmsPage } from "./pages/alarms.js";
+import { auditPage } from "./pages/audit.js";
 import { bearingPage } from "./pages/bearing.js";
 import { filmPage } from "./pages/film.js";
 import { overviewPage } from "./pages/overview.js";
+import { recordingsPage } from "./pages/recordings.js";
 import { sourcesPage } from "./pages/sources.js";
 import { unitPage } from "./pages/unit.js";
 import { unknownPage } from "./pages/unknown.js";
@@ -19,6 +21,8 @@ export const PAGES = [
   { pattern: "#/", title: "overview", nav: "Plant", open: overviewPage },
   { pattern: "#/alarms", title: "alarms", nav: "Alarms", open: alarmsPage },
   { pattern: "#/sources", title: "source health", nav: "Sources", open: sourcesPage },
+  { pattern: "#/recordings", title: "recordings and reports", nav: "Recordings", open: recordingsPage },
+  { pattern: "#/audit", title: "audit trail", nav: "Audit", permission: "read_audit", open: auditPage },
   { pattern: "#/units/:unit", title: (unit) => unit, open: unitPage },
   { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },
   { pattern: "#/units/:unit/bearings/:bearing/film", title: (unit, bearing) => `film of ${unit} ${bearing}`, open: filmPage },

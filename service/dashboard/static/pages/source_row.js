@@ -2,6 +2,7 @@
 
 import { element, setAttribute, setText } from "../dom.js";
 import { formatAge, formatCount, formatFixed, formatTime } from "../format.js";
+import { listingCell, listingName, rowBelow } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
 import { unitAddress } from "../route.js";
 import { addressWords, identityWords, reasonsWords, received, rejected, shareWords, sourceKindWords } from "../source_words.js";
@@ -10,17 +11,17 @@ export const HEADS = ["Unit", "State", "For", "Data age", "Received", "Missing",
 
 const DASH = "—";
 
-/** Returns `{ nodes, draw(found, nowMs), isCurrent(current) }`. */
-export function sourceRow(unit, name) {
+/** Returns `{ nodes, draw(found) }`. */
+export function sourceRow({ source: { unit }, name }) {
   const state = mark();
   const texts = HEADS.slice(2, -1).map(() => element("span"));
   const link = element("a", { href: unitAddress(unit) }, name);
   const more = element("button", { type: "button", "aria-expanded": "false", "aria-controls": `source-${unit}` }, "Details");
-  const cells = [state.node, ...texts, more].map((node, n) => element("td", { role: "cell", "data-head": HEADS[n + 1] }, node));
-  const row = element("tr", { role: "row", "data-source": unit }, element("th", { scope: "row", role: "rowheader" }, link), ...cells);
+  const cells = [state.node, ...texts, more].map((node, n) => listingCell(HEADS[n + 1], node));
+  const row = element("tr", { role: "row", "data-source": unit }, listingName(link), ...cells);
   const advice = element("p", { class: "advice" });
   const facts = element("dl", { class: "facts", id: `source-${unit}`, hidden: "" });
-  const below = element("tr", { role: "row", class: "below" }, element("td", { role: "cell", colspan: HEADS.length }, advice, facts));
+  const below = rowBelow(HEADS, advice, facts);
   setAttribute(more, "aria-label", `Details of ${name}`);
 
   function fold() {
@@ -34,7 +35,7 @@ export function sourceRow(unit, name) {
   });
   return {
     nodes: [row, below],
-    draw({ source, trouble, settings }, nowMs) {
+    draw({ source, trouble, settings, nowMs }) {
       state.draw(trouble.look, trouble.words);
       setAttribute(row, "data-look", trouble.look);
       lineWords(source, nowMs).forEach((words, n) => setText(texts[n], words));

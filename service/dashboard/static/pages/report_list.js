@@ -1,0 +1,83 @@
+/** Reports of alarms: every time one was raised, with its page to print and its evidence to take away. */
+
+import { kindWords, placeWords, valueWords } from "../alarm_words.js";
+import { NotReachable, Refused, ask } from "../api.js";
+import { element, setText } from "../dom.js";
+import { formatTime } from "../format.js";
+import { evidenceLinks } from "../parts/evidence.js";
+import { listing, listingCell, listingName } from "../parts/listing.js";
+import { mark } from "../parts/mark.js";
+import { poll } from "../poll.js";
+
+const PERIOD_S = 10;
+const N_EVENTS = "300";
+const MOST_ALARMS = 30;
+const HEADS = ["Raised", "Where", "What", "Level", "Value", "Report and evidence", "Samples"];
+
+const STATES = {
+  complete: "",
+  waiting: "being written",
+  lost: "lost: the disk did not take it",
+  removed: "removed to make room",
+  not_kept: "not kept for this alarm",
+};
+
+const SAMPLES = { complete: "kept", being_made: "being written", lost: "lost", removed: "removed to make room", none: "none for this alarm" };
+
+/** Returns `{ node, close() }`. */
+export function reportList() {
+  const table = listing("Reports, the newest first", HEADS, "None yet: no alarm has been raised.", keyOf, reportRow);
+  const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
+  const questions = poll(async (signal) => {
+    try {
+      const { events } = await ask(["alarms", "events"], [["limit", N_EVENTS]], signal);
+      const raised = events.filter(({ change }) => ["raised", "escalated"].includes(change));
+      const kept = await occurrencesOf([...new Set(raised.map(({ alarm }) => alarm))].slice(0, MOST_ALARMS), signal);
+      table.draw(raised.filter(({ alarm }) => kept.has(alarm)).map((event) => ({ event, kept: kept.get(event.alarm).get(event.occurrence) })));
+      setText(sentence, "");
+    } catch (failure) {
+      if (signal.aborted) return;
+      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
+      setText(sentence, `Reports cannot be listed now. ${words}`);
+    }
+  }, () => PERIOD_S);
+  const node = element("section", { class: "panel listing reports" }, element("h2", {}, "Reports of alarms"), sentence, table.node);
+  return { node, close: questions.stop };
+}
+
+const keyOf = ({ event }) => `${event.alarm} ${event.occurrence}`;
+
+/** For each alarm what is kept of its occurrences, by number. */
+async function occurrencesOf(alarms, signal) {
+  const found = new Map();
+  for (const alarm of alarms) {
+    try {
+      const { occurrences } = await ask(["alarms", alarm, "evidence"], [], signal);
+      found.set(alarm, new Map(occurrences.map((one) => [one.occurrence, one])));
+    } catch (failure) {
+      if (!(failure instanceof Refused) || failure.status !== 404) throw failure;
+      found.set(alarm, new Map()); // no evidence is kept here, or of such an alarm
+    }
+  }
+  return found;
+}
+
+function reportRow({ event }) {
+  const level = mark();
+  level.draw(...(event.level === "danger" ? ["bad", "Danger"] : ["uncertain", "Alert"]));
+  const links = evidenceLinks();
+  links.draw(event.alarm, event.occurrence);
+  const state = element("span", { class: "from" });
+  const samples = element("span");
+  const contents = [placeWords(event), kindWords(event.kind), level.node, valueWords(event), element("span", {}, links.node, state), samples];
+  const cells = contents.map((content, n) => listingCell(HEADS[n + 1], content));
+  const row = element("tr", { role: "row", "data-report": keyOf({ event }) }, listingName(formatTime(Date.parse(event.time))), ...cells);
+  return {
+    nodes: [row],
+    draw({ kept }) {
+      links.node.hidden = kept?.state !== "complete";
+      setText(state, kept ? STATES[kept.state] : STATES.not_kept);
+      setText(samples, kept ? SAMPLES[kept.samples] : SAMPLES.none);
+    },
+  };
+}

@@ -1,0 +1,56 @@
+/** A table with one row for each thing; a row stays the same row for as long as its thing is there. */
+
+import { element, setAttribute } from "../dom.js";
+
+/**
+ * Returns `{ node, draw(things) }`; `nothing` is said where there are none.
+ *
+ * `keyOf(thing)` tells things apart; `rowOf(thing)` makes `{ nodes, draw(thing) }`.
+ */
+export function listing(title, heads, nothing, keyOf, rowOf) {
+  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
+  const body = element("tbody", { role: "rowgroup" });
+  const head = element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells));
+  const table = element("table", { role: "table", "aria-label": title, hidden: "" }, head, body);
+  const empty = element("p", { class: "sentence", hidden: "" }, nothing);
+  const rows = new Map();
+
+  function forget(present) {
+    for (const [key, row] of rows) {
+      if (present.has(key)) continue;
+      for (const node of row.nodes) node.remove();
+      rows.delete(key);
+    }
+  }
+
+  return {
+    node: element("div", {}, empty, table),
+    draw(things) {
+      table.hidden = things.length === 0;
+      empty.hidden = things.length > 0;
+      forget(new Set(things.map(keyOf)));
+      let place = body.firstChild;
+      for (const thing of things) {
+        const key = keyOf(thing);
+        const row = rows.get(key) ?? rows.set(key, rowOf(thing)).get(key);
+        for (const node of row.nodes) {
+          if (place === node) place = node.nextSibling;
+          else body.insertBefore(node, place);
+        }
+        row.draw(thing);
+      }
+    },
+    setCurrent: (current) => setAttribute(table, "data-current", String(current)),
+  };
+}
+
+/** A cell under its heading. */
+export const listingCell = (head, ...content) => element("td", { role: "cell", "data-head": head }, ...content);
+
+/** The cell that names a row. */
+export const listingName = (...content) => element("th", { scope: "row", role: "rowheader" }, ...content);
+
+/** A row of all the width below another one. */
+export function rowBelow(heads, ...content) {
+  return element("tr", { role: "row", class: "below", hidden: "" }, element("td", { role: "cell", colspan: heads.length }, ...content));
+}
