@@ -54,7 +54,7 @@ class AcknowledgeModel(RequestModel):
     actor: Actor | None = None
     """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""
 
-    occurrence: Annotated[int, Field(ge=1, le=2**62, examples=[3])]
+    occurrence: Annotated[int, Field(ge=1, le=10**15, examples=[3])]
     """Which occurrence was seen: one that has come since is not acknowledged."""
 
     comment: Comment = ""

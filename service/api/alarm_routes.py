@@ -202,7 +202,7 @@ def event_query(
     ] = None,
     before: Annotated[
         int | None,
-        Query(ge=1, le=2**62, description="Only events older than this id.", examples=[117]),
+        Query(ge=1, le=10**15, description="Only events older than this id.", examples=[117]),
     ] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_EVENTS, description="Most events in the answer.")

@@ -68,7 +68,7 @@ def audit_query(
     ] = None,
     before: Annotated[
         int | None,
-        Query(ge=1, le=2**62, description="Only entries older than this number.", examples=[117]),
+        Query(ge=1, le=10**15, description="Only entries older than this number.", examples=[117]),
     ] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_ENTRIES, description="Most entries in the answer.")

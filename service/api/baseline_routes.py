@@ -39,7 +39,7 @@ from service.films.progress import learning_progress
 from service.films.versions import versions_after
 from service.security.roles import Permission
 
-Version = Annotated[int, Path(ge=1, le=2**62, description="Version of a baseline.", examples=[3])]
+Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]
 
 READING_PROBLEMS = problem_responses(404, 422, 503)
 

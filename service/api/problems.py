@@ -10,6 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.api.methods import allowed_methods
 from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"
@@ -108,11 +109,15 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> JSONResponse:
+        if error.status_code == 405 and (methods := _methods(request)):
+            return _not_allowed(request, methods)
         said = str(error.detail)
         return _render(request, error.status_code, said, said, headers=error.headers)
 
     @app.exception_handler(RequestValidationError)
     async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
+        if (methods := _methods(request)) and request.method not in methods:
+            return _not_allowed(request, methods)
         mistakes = [
             Mistake(parameter=".".join(str(p) for p in e["loc"][1:]), detail=str(e["msg"]))
             for e in error.errors()
@@ -130,11 +135,26 @@ def install_problem_handlers(app: FastAPI) -> None:
         log.error("a query failed in the store", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
 
+    @app.exception_handler(Exception)
+    async def _bug(request: Request, _: Exception) -> JSONResponse:
+        """Say no more of a bug than that; it goes on to the log."""
+        return _render(request, 500, "Fault in padwatch", "a fault of the program; see its log")
+
 
 def problem_answer(request: Request, error: ProblemError) -> JSONResponse:
     """The problem document of an error."""
     words = (error.status, error.title, error.detail)
     return _render(request, *words, error.errors, error.headers)
+
+
+def _methods(request: Request) -> list[str]:
+    return allowed_methods(request.app.openapi()["paths"], request.scope["path"])
+
+
+def _not_allowed(request: Request, methods: Sequence[str]) -> JSONResponse:
+    detail = f"this is not done with {request.method}, but with {' or '.join(methods)}"
+    allow = {"Allow": ", ".join(methods)}
+    return _render(request, 405, "Method not allowed", detail, headers=allow)
 
 
 def _render(

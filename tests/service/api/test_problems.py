@@ -202,3 +202,21 @@ async def test_far_years_are_no_error(running: Any, start: str, end: str, max_po
     assert sum(body["series"]["speed_rpm"]["count"]) == 6
     assert len(body["time"]) <= max_points
     assert await running.json("/api/v1/units/U1/gaps", start=start, end=end) == []
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("GET", "/api/v1/units/U1/bearings/UJB/baselines/freeze", "POST"),
+        ("DELETE", "/api/v1/units/U1/bearings/UJB/order1-references", "GET, POST"),
+        ("POST", "/api/v1/units", "GET"),
+    ],
+)
+async def test_a_method_a_path_does_not_have_is_refused_with_those_it_has(
+    running: Any, as_problem: AsProblem, method: str, path: str, allowed: str
+) -> None:
+    response = await running.client.request(method, path)
+
+    assert response.status_code == 405
+    assert response.headers["allow"] == allowed
+    assert as_problem(response)["title"] == "Method not allowed"
