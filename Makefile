@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-.PHONY: install run test check docs bench accuracy format lock clean
+.PHONY: install run test check docs bench accuracy torture format lock clean
 
 $(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
@@ -35,11 +35,17 @@ docs: install
 
 bench: install
 	$(BIN)/python benchmarks/ingest.py
+	$(BIN)/python benchmarks/polling.py
 	$(BIN)/python benchmarks/alarms.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/analysis.py
 
 accuracy: install
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2
+
+SEED ?= $(shell date +%s)
+torture: install
+	@echo "make torture SEED=$(SEED)"
+	$(BIN)/python -m pytest tests/torture --torture --torture-seed $(SEED) --durations 20
 
 format: install
 	$(BIN)/ruff format .

@@ -137,7 +137,7 @@ def build_assessment(
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def assessment() -> Callable[..., Assessment]:
     """Builds assessments; keywords are readings."""
     return build_assessment
