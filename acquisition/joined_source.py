@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from acquisition.calibration import UnitCalibration
-from acquisition.source import SampleSource
+from acquisition.source import SampleSource, refused_frames_of
 from core.blocks import SampleBlock
 from core.quality import Reading
 
@@ -35,6 +35,11 @@ class JoinedSource:
 
     def __init__(self, source: SampleSource, slow: SlowValues) -> None:
         self._source, self._slow = source, slow
+
+    @property
+    def refused_frames(self) -> Mapping[str, int]:
+        """Frames that the source of the waveforms has not used, by reason."""
+        return refused_frames_of(self._source)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:

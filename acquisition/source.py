@@ -1,8 +1,8 @@
 """The one port through which samples enter padwatch."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import AbstractAsyncContextManager
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from core.blocks import SampleBlock
 
@@ -25,3 +25,18 @@ class SampleSource(Protocol):
             If the device can never deliver what is configured.
         """
         ...
+
+
+@runtime_checkable
+class RefusesFrames(Protocol):
+    """A source that counts what it heard and could not use, before there is a sample to count."""
+
+    @property
+    def refused_frames(self) -> Mapping[str, int]:
+        """Frames since the start that were not used, by reason."""
+        ...
+
+
+def refused_frames_of(source: SampleSource) -> Mapping[str, int]:
+    """What a source says of refused frames; nothing where it knows none."""
+    return source.refused_frames if isinstance(source, RefusesFrames) else {}

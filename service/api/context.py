@@ -1,7 +1,7 @@
 """What the API's routes work with."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Path
@@ -16,6 +16,7 @@ from service.delivery.deliveries import Deliveries
 from service.evidence.desk import EvidenceDesk
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
+from service.metrics.polls import TimedSource
 from service.metrics.watched import Watched
 from service.origin import Origin
 from service.recorder import Recorder
@@ -49,6 +50,8 @@ class Context:
         Tells who asks; None for one that asks nobody on this computer.
     refusals
         Takes refused requests; None for a taker of the application's own.
+    sources
+        Where samples come from, by unit; of those whose polls are timed.
     """
 
     plant_name: str
@@ -69,6 +72,7 @@ class Context:
     metrics: Watched | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
     refusals: Refusals | None = None
+    sources: Mapping[str, TimedSource] = field(default_factory=dict)
     access: AccessDesk | None = None
 
     def unit(self, unit: str) -> UnitSettings:

@@ -4,8 +4,9 @@ from fastapi import APIRouter
 
 from service.api.access.declared import needs
 from service.api.context import Context
-from service.api.source_models import SourceHealthModel
+from service.api.source_models import PollsModel, SourceHealthModel
 from service.api.views import source_model
+from service.metrics.durations import Seen
 from service.security.roles import Permission
 from service.settings.units import UnitSettings
 
@@ -25,7 +26,7 @@ def source_router(context: Context) -> APIRouter:
 
 
 def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
-    arriving = source_model(context.live, settings.id)
+    arriving, source = source_model(context.live, settings.id), context.sources.get(settings.id)
     return SourceHealthModel(
         **arriving.model_dump(),
         unit=settings.id,
@@ -33,4 +34,13 @@ def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
         n_failed=context.live.status(settings.id).n_failed,
         rate_hz=settings.sampling_hz,
         poll_period_s=getattr(settings.source, "poll_period_s", None),
+        polls=None if source is None else _polls(source.polls.seen()),
+        refused_frames={} if source is None else dict(source.refused_frames),
     )
+
+
+def _polls(seen: Seen) -> PollsModel | None:
+    if seen.newest_s is None:
+        return None
+    n_polls = seen.n_up_to[-1]
+    return PollsModel(n=n_polls, newest_s=seen.newest_s, mean_s=seen.sum_s / n_polls)

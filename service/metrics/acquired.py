@@ -106,7 +106,17 @@ def link_metrics(watched: Watched) -> Iterator[Metric]:
     yield histogram(
         "poll_duration_seconds",
         "What a poll took, with decoding and handing over what it brought.",
-        watched.polls,
+        {unit: source.polls for unit, source in watched.sources.items()},
+    )
+    yield counter(
+        "frames_refused",
+        "Frames of a CAN bus that were not used, by reason.",
+        ("unit", "reason"),
+        (
+            ((unit, reason), n)
+            for unit, source in watched.sources.items()
+            for reason, n in bounded(source.refused_frames).items()
+        ),
     )
 
 

@@ -22,11 +22,14 @@ class Seen:
         How many took at most as long as each bound; the last entry counts all.
     sum_s
         What all of them took together.
+    newest_s
+        What the newest took; None before the first.
     """
 
     bounds_s: tuple[float, ...]
     n_up_to: tuple[int, ...]
     sum_s: float
+    newest_s: float | None = None
 
 
 class Durations:
@@ -49,6 +52,7 @@ class Durations:
         self._bounds_s, self._clock = tuple(bounds_s), clock
         self._n_in = [0] * (len(bounds_s) + 1)
         self._sum_s = 0.0
+        self._newest_s: float | None = None
         self._lock = Lock()
 
     def observe(self, duration_s: float, times: int = 1) -> None:
@@ -57,6 +61,7 @@ class Durations:
         with self._lock:
             self._n_in[place] += times
             self._sum_s += duration_s * times
+            self._newest_s = duration_s
 
     @contextmanager
     def timed(self) -> Iterator[None]:
@@ -68,4 +73,5 @@ class Durations:
     def seen(self) -> Seen:
         """All that was counted so far."""
         with self._lock:
-            return Seen(self._bounds_s, tuple(accumulate(self._n_in)), self._sum_s)
+            n_up_to = tuple(accumulate(self._n_in))
+            return Seen(self._bounds_s, n_up_to, self._sum_s, self._newest_s)

@@ -1,13 +1,13 @@
 """What a poll takes: the time in which a source works between two waits for its next one."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 from weakref import WeakKeyDictionary
 
 from acquisition.clock import Clock
-from acquisition.source import SampleSource
+from acquisition.source import SampleSource, refused_frames_of
 from core.blocks import SampleBlock
 from service.metrics.durations import Durations
 
@@ -66,6 +66,11 @@ class TimedSource:
     def polls(self) -> Durations:
         """What polls took so far."""
         return self._clock.polls
+
+    @property
+    def refused_frames(self) -> Mapping[str, int]:
+        """Frames that the source has not used, by reason."""
+        return refused_frames_of(self._source)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:

@@ -8,7 +8,6 @@ from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
 from core.monitor_port import Monitor
-from service.metrics.durations import Durations
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.runner import WatchedUnit
@@ -51,10 +50,10 @@ def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, Watch
     }
 
 
-def polls_of(units: Mapping[str, WatchedUnit]) -> dict[str, Durations]:
-    """What polls take, of the units whose source is timed."""
+def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
+    """The sources that are timed, by unit."""
     return {
-        unit: watched.source.polls
+        unit: watched.source
         for unit, watched in units.items()
         if isinstance(watched.source, TimedSource)
     }

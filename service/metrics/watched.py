@@ -11,7 +11,7 @@ from service.delivery.deliveries import Deliveries
 from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
-from service.metrics.durations import Durations
+from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.recorder import Recorder
 
@@ -24,8 +24,8 @@ class Watched:
     ----------
     bearings
         Of every unit.
-    polls
-        What polls take, by unit; of those that are polled.
+    sources
+        Where samples come from, by unit; of those that are timed.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -39,4 +39,4 @@ class Watched:
     deliveries: Deliveries
     timings: Timings
     clock: Clock
-    polls: Mapping[str, Durations] = field(default_factory=dict)
+    sources: Mapping[str, TimedSource] = field(default_factory=dict)

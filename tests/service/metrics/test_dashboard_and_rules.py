@@ -1,0 +1,265 @@
+"""The Grafana dashboard and the alert rules ask only for what a running service tells."""
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+DEPLOY = Path(__file__).parents[3] / "deploy"
+DASHBOARD = DEPLOY / "grafana" / "padwatch.json"
+RULES = DEPLOY / "prometheus" / "padwatch-rules.yml"
+
+TARGET = {"job", "instance"}
+"""Labels that Prometheus itself puts on everything it has asked for."""
+
+BY_PROMETHEUS = {"up": ("gauge", {frozenset[tuple[str, str]]()})}
+"""Metrics that Prometheus makes."""
+
+OF_COUNTERS = {"rate", "increase"}
+OF_GAUGES = {"delta", "changes"}
+FUNCTIONS = {*OF_COUNTERS, *OF_GAUGES, "histogram_quantile", "absent", "vector"}
+AGGREGATIONS = {"sum", "max", "count"}
+BINARY = {"and", "or"}
+TOKEN = re.compile(
+    r"""\s*(?:(?P<string>"[^"\\]*")|(?P<duration>\d+[smhd]\b)|(?P<number>\d+(?:\.\d+)?\b)
+    |(?P<word>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>==|!=|=~|!~|[-+*/><=(){}\[\],]))""",
+    re.VERBOSE,
+)
+
+Exposed = dict[str, tuple[str, set[frozenset[tuple[str, str]]]]]
+"""Type and sets of labels, by the name of a sample."""
+
+
+@dataclass
+class Query:
+    """What a PromQL expression asks for: metrics with matchers and function, labels that remain."""
+
+    uses: list[tuple[str, dict[str, tuple[str, str]], str | None]] = field(default_factory=list)
+    kept: set[str] = field(default_factory=set)
+    matched_on: set[str] = field(default_factory=set)
+
+
+class Reader:
+    """Reads the part of PromQL that is used here, and nothing else."""
+
+    def __init__(self, expr: str) -> None:
+        self.tokens = list(tokens(expr.replace("$__rate_interval", "5m")))
+        self.at = 0
+        self.query = Query()
+
+    def read(self) -> Query:
+        depth, function = 0, None
+        while self.at < len(self.tokens):
+            kind, text = self.take()
+            if kind == "word" and text in FUNCTIONS | AGGREGATIONS:
+                function = self.called(text)
+            elif kind == "word" and text in BINARY:
+                if self.follows("on"):
+                    self.query.matched_on |= self.labels()
+            elif kind == "word":
+                self.metric(text, function)
+            elif text in ("(", ")"):
+                depth += 1 if text == "(" else -1
+                assert depth >= 0, "too many )"
+            else:
+                assert kind == "number" or text in "-+*/><==,", f"unexpected {text}"
+        assert depth == 0, "( without )"
+        return self.query
+
+    def called(self, name: str) -> str:
+        if name in AGGREGATIONS and self.follows("by"):
+            self.query.kept |= self.labels()
+        assert self.tokens[self.at][1] == "(", f"{name} without ("
+        return name
+
+    def metric(self, name: str, function: str | None) -> None:
+        matchers: dict[str, tuple[str, str]] = {}
+        while self.follows("{") or (matchers and self.follows(",")):
+            label, operator = self.take()[1], self.take()[1]
+            kind, value = self.take()
+            assert (operator in ("=", "=~", "!=", "!~"), kind) == (True, "string"), label
+            matchers[label] = (operator, value.strip('"'))
+        if matchers:
+            assert self.take()[1] == "}", f"{name}: }} is missing"
+        if self.follows("["):
+            assert self.take()[0] == "duration"
+            assert self.take()[1] == "]"
+            assert function in OF_COUNTERS | OF_GAUGES, f"{name}: a range for {function}"
+        else:
+            function = None if function in AGGREGATIONS else function
+            assert function not in OF_COUNTERS | OF_GAUGES or self.is_closed(), f"{name}: no range"
+            function = None
+        self.query.uses.append((name, matchers, function))
+
+    def is_closed(self) -> bool:
+        """Whether the call of the function that was read last has ended before this."""
+        before = [text for _, text in self.tokens[: self.at]]
+        start = max(n for n, text in enumerate(before) if text in OF_COUNTERS | OF_GAUGES)
+        return before[start:].count("(") == before[start:].count(")")
+
+    def labels(self) -> set[str]:
+        assert self.take()[1] == "("
+        found = set()
+        while (text := self.take()[1]) != ")":
+            if text != ",":
+                found.add(text)
+        return found
+
+    def take(self) -> tuple[str, str]:
+        self.at += 1
+        return self.tokens[self.at - 1]
+
+    def follows(self, text: str) -> bool:
+        if self.at < len(self.tokens) and self.tokens[self.at][1] == text:
+            self.at += 1
+            return True
+        return False
+
+
+def tokens(expr: str) -> Iterator[tuple[str, str]]:
+    at, expr = 0, expr.rstrip()
+    while at < len(expr):
+        found = TOKEN.match(expr, at)
+        assert found is not None, f"not understood: {expr[at:]}"
+        at = found.end()
+        assert found.lastgroup is not None
+        yield found.lastgroup, found[found.lastgroup]
+
+
+def check(expr: str, exposed: Exposed) -> tuple[Query, set[str]]:
+    """Compare an expression with what is told; return it with the labels of its result."""
+    query = Reader(expr).read()
+    known = set(TARGET)
+    assert query.uses, expr
+    for name, matchers, function in query.uses:
+        assert name in exposed, f"{expr}: nobody tells {name}"
+        kind, label_sets = exposed[name]
+        assert (kind == "counter") == (function in OF_COUNTERS), f"{name} in {function}"
+        labels = {label for labels in label_sets for label, _ in labels}
+        known |= labels
+        for label, (operator, value) in matchers.items():
+            assert label in labels | TARGET, f"{expr}: {name} has no label {label}"
+            if operator == "=" and label in labels:
+                assert any((label, value) in labels for labels in label_sets), f"{label}={value}"
+    assert query.kept | query.matched_on <= known, f"{expr}: a label that nothing has"
+    return query, query.kept or known
+
+
+@pytest.fixture(scope="module")
+def exposed(told: Any) -> Exposed:
+    """All that a running service tells, once its results are on the disk."""
+    found: Exposed = dict(BY_PROMETHEUS)
+    for family in told.plain.families.values():
+        for sample in family.samples:
+            is_gauge = family.type == "gauge"
+            _, sets = found.setdefault(sample.name, ("gauge" if is_gauge else "counter", set()))
+            sets.add(frozenset(sample.labels.items()))
+    return found
+
+
+@pytest.fixture(scope="module")
+def dashboard() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(DASHBOARD.read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.fixture(scope="module")
+def rules() -> list[dict[str, Any]]:
+    document = yaml.safe_load(RULES.read_text(encoding="utf-8"))
+    assert set(document) == {"groups"}
+    return [rule for group in document["groups"] for rule in group["rules"]]
+
+
+def test_the_dashboard_asks_only_for_what_is_told(
+    exposed: Exposed, dashboard: dict[str, Any]
+) -> None:
+    asked = set()
+    for panel in dashboard["panels"]:
+        for target in panel.get("targets", ()):
+            query, labels = check(target["expr"], exposed)
+            asked |= {name for name, _, _ in query.uses}
+            legend = set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]))
+            assert legend <= labels, f"{panel['title']}: {target['legendFormat']}"
+    own = {name.removesuffix("_bucket") for name in asked if name.startswith("padwatch_")}
+    assert len(own) > 30
+
+
+def test_choices_of_the_dashboard_are_labels_that_are_told(
+    exposed: Exposed, dashboard: dict[str, Any]
+) -> None:
+    choices = {choice["name"]: choice for choice in dashboard["templating"]["list"]}
+    for name, choice in choices.items():
+        if choice["type"] == "query":
+            found = re.fullmatch(r"label_values\((.+), (\w+)\)", choice["definition"])
+            assert found is not None, name
+            _, labels = check(found[1], exposed)
+            assert found[2] in labels
+    used = set(re.findall(r"\$\{?(\w+)", json.dumps(dashboard["panels"])))
+    assert used - {"__rate_interval"} == set(choices)
+
+
+def test_the_dashboard_fits_together(dashboard: dict[str, Any]) -> None:
+    panels = dashboard["panels"]
+
+    assert len({panel["id"] for panel in panels}) == len(panels)
+    taken: set[tuple[int, int]] = set()
+    for panel in panels:
+        at = panel["gridPos"]
+        cells = {(at["x"] + x, at["y"] + y) for x in range(at["w"]) for y in range(at["h"])}
+        assert at["x"] + at["w"] <= 24
+        assert not cells & taken, panel["title"]
+        taken |= cells
+        assert panel["title"]
+        assert panel["type"] == "row" or panel["description"].endswith(".")
+
+
+def test_alert_rules_ask_only_for_what_is_told(
+    exposed: Exposed, rules: list[dict[str, Any]]
+) -> None:
+    assert len({rule["alert"] for rule in rules}) == len(rules)
+    for rule in rules:
+        _, labels = check(rule["expr"], exposed)
+        assert set(rule) <= {"alert", "expr", "for", "labels", "annotations"}
+        assert re.fullmatch(r"Padwatch[A-Za-z]+", rule["alert"])
+        assert re.fullmatch(r"\d+m", rule.get("for", "1m"))
+        assert rule["labels"]["severity"] in ("warning", "critical")
+        assert set(rule["annotations"]) == {"summary", "description"}
+        words = " ".join(rule["annotations"].values())
+        assert set(re.findall(r"\$labels\.(\w+)", words)) <= labels, rule["alert"]
+
+
+def test_a_link_without_results_is_an_alert(exposed: Exposed, rules: list[dict[str, Any]]) -> None:
+    [silent] = [rule for rule in rules if rule["alert"] == "PadwatchSilentHealthy"]
+
+    query, _ = check(silent["expr"], exposed)
+
+    by_name = {name: exposed[name][1] for name, _, _ in query.uses}
+    connected = by_name["padwatch_link_connected"]
+    results = by_name["padwatch_assessment_duration_seconds_count"]
+    # sides of `and` meet where all labels agree: from the start on, for every unit
+    assert connected == results == {frozenset({("unit", unit)}) for unit in ("U1", "U2")}
+
+
+WRONG = (
+    "padwatch_link_conected",
+    'padwatch_link_connected{station="U1"}',
+    'padwatch_alarms_active{priority="high"}',
+    "sum by (bearing) (padwatch_link_connected)",
+    "padwatch_samples_missing_total",
+    "rate(padwatch_samples_missing_total)",
+    "rate(padwatch_queue_blocks[5m])",
+    "max(rate(padwatch_samples_missing_total[5m])",
+    "average(padwatch_queue_blocks)",
+    "padwatch_queue_blocks ~ 3",
+)
+
+
+def test_a_wrong_expression_is_noticed(exposed: Exposed) -> None:
+    for expr in WRONG:
+        with pytest.raises(AssertionError):
+            check(expr, exposed)

@@ -1,0 +1,106 @@
+"""What Prometheus is told by a running service."""
+
+from typing import Any
+
+from prometheus_client.openmetrics.parser import text_string_to_metric_families
+
+from core.account import SampleAccount
+
+
+def test_counts_agree_with_the_account_of_samples(told: Any, account: SampleAccount) -> None:
+    def of(name: str, **labels: str) -> float:
+        found = told.plain.value(f"padwatch_samples_{name}_total", unit="U1", **labels)
+        return float(found)
+
+    rejected = {reason: of("rejected", reason=reason) for reason in account.rejected}
+    assert of("received", quality="good") == account.n_stored
+    assert of("received", quality="flagged") == account.n_flagged
+    assert of("missing") == account.n_gap
+    assert rejected == account.rejected
+    assert of("offered") == account.n_offered
+    assert of("offered") == sum(
+        number
+        for name in ("received", "missing", "rejected")
+        for labels, number in told.plain.numbers(f"padwatch_samples_{name}_total").items()
+        if ("unit", "U1") in labels
+    )
+
+
+def test_a_device_that_does_not_answer_is_told_without_numbers_that_nobody_knows(
+    told: Any,
+) -> None:
+    value = told.plain.value
+    assert value("padwatch_link_connected", unit="U1") == 1.0
+    assert value("padwatch_link_connected", unit="U2") == 0.0
+    for name in ("ingest_lag_seconds", "data_age_seconds"):
+        assert value(f"padwatch_{name}", unit="U1") is not None
+        assert value(f"padwatch_{name}", unit="U2") is None
+    assert value("padwatch_bearings", unit="U2", quality="bad") == 3.0
+    assert value("padwatch_samples_offered_total", unit="U2") == 0.0
+
+
+def test_every_result_every_poll_and_every_commit_is_timed_once(told: Any) -> None:
+    def count(name: str, **labels: str) -> float:
+        return float(told.plain.value(f"padwatch_{name}_duration_seconds_count", **labels))
+
+    # segments of 8192 samples every 7168: the first after the missing block is the only one
+    assert count("assessment", unit="U1") == 6.0
+    assert count("assessment", unit="U2") == 0.0
+    # 19 blocks with a wait after each: what came before the first wait has no beginning
+    assert count("poll", unit="U1") == 18.0
+    assert count("poll", unit="U2") == 0.0
+    assert count("store_commit") > 0.0
+
+
+def test_frames_that_were_not_used_are_counted(told: Any) -> None:
+    refused = told.plain.numbers("padwatch_frames_refused_total")
+
+    assert refused == {frozenset({("unit", "U1"), ("reason", "duplicate")}): 2.0}
+
+
+def test_the_health_of_sources_says_what_polls_take_and_which_frames_were_not_used(
+    told: Any,
+) -> None:
+    first, second = told.sources
+
+    assert (first["unit"], first["polls"]["n"]) == ("U1", 18)
+    assert first["polls"]["newest_s"] > 0.0
+    total_s = told.plain.value("padwatch_poll_duration_seconds_sum", unit="U1")
+    assert abs(first["polls"]["mean_s"] - total_s / 18) < 1e-9
+    assert first["refused_frames"] == {"duplicate": 2}
+    assert (second["unit"], second["polls"], second["refused_frames"]) == ("U2", None, {})
+
+
+def test_the_format_is_the_one_that_is_asked_for(told: Any) -> None:
+    plain, asked = told.plain, told.scrapes["openmetrics"]
+
+    assert plain.headers["content-type"] == "text/plain; version=0.0.4; charset=utf-8"
+    expected = "application/openmetrics-text; version=1.0.0; charset=utf-8"
+    assert asked.headers["content-type"] == expected
+    assert asked.text.endswith("# EOF\n")
+    names = {family.name for family in text_string_to_metric_families(asked.text)}
+    assert names == set(plain.families)
+
+
+def test_a_strange_accept_header_is_no_fault_and_not_repeated(told: Any) -> None:
+    assert "zzz" not in str(told.scrapes["strange"].headers)
+
+
+def test_metrics_are_described_with_the_api(told: Any) -> None:
+    operation = told.document["paths"]["/metrics"]["get"]
+
+    assert operation["summary"]
+    assert set(operation["responses"]["200"]["content"]) == {
+        "text/plain",
+        "application/openmetrics-text",
+    }
+    assert told.below_the_api == 404
+
+
+def test_an_outbox_that_cannot_be_read_is_a_metric_and_no_failed_scrape(told: Any) -> None:
+    waiting = "padwatch_delivery_waiting_messages"
+
+    assert told.plain.value("padwatch_outbox_readable") == 1.0
+    assert told.plain.value(waiting, receiver="control-room") is not None
+    assert told.blind.value("padwatch_outbox_readable") == 0.0
+    assert told.blind.value(waiting, receiver="control-room") is None
