@@ -10,6 +10,7 @@
 import { alarmsPage } from "./pages/alarms.js";
 import { auditPage } from "./pages/audit.js";
 import { bearingPage } from "./pages/bearing.js";
+import { explorerPage } from "./pages/explorer.js";
 import { filmPage } from "./pages/film.js";
 import { overviewPage } from "./pages/overview.js";
 import { recordingsPage } from "./pages/recordings.js";
@@ -20,6 +21,7 @@ import { unknownPage } from "./pages/unknown.js";
 export const PAGES = [
   { pattern: "#/", title: "overview", nav: "Plant", open: overviewPage },
   { pattern: "#/alarms", title: "alarms", nav: "Alarms", open: alarmsPage },
+  { pattern: "#/trends", title: "trends", nav: "Trends", open: explorerPage },
   { pattern: "#/sources", title: "source health", nav: "Sources", open: sourcesPage },
   { pattern: "#/recordings", title: "recordings and reports", nav: "Recordings", open: recordingsPage },
   { pattern: "#/audit", title: "audit trail", nav: "Audit", permission: "read_audit", open: auditPage },
