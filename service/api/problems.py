@@ -74,8 +74,8 @@ def described_problems(words: Mapping[int, str]) -> dict[int | str, dict[str, An
 
 
 def any_other_problem() -> dict[int | str, dict[str, Any]]:
-    """OpenAPI entry for what may happen to every operation."""
-    return {"default": _documented("Any other problem")}
+    """OpenAPI entries for what may happen to every operation."""
+    return {422: _documented(WORDS[422]), "default": _documented("Any other problem")}
 
 
 def refuse_unknown_parameters(request: Request) -> None:

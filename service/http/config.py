@@ -43,6 +43,7 @@ class GuardedConfig(uvicorn.Config):
             ws="none",
             log_level="warning",
             access_log=False,
+            server_header=False,
             lifespan="off",
             timeout_keep_alive=round(limits.keep_alive_s),
             timeout_graceful_shutdown=STOP_S,
