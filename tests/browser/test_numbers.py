@@ -8,9 +8,10 @@ from playwright.async_api import Page, Route, expect
 BEARING = "#/units/U1/bearings/UJB"
 A_NUMBER = re.compile(r"\d")
 HAS_STIFFNESS_MS = 60_000
-N_NUMBERS = 48
+N_NUMBERS = 57
 """Two preferred, seven of operation and gaps, four of the shaft centre, 13 for each of two orders
-(amplitudes, coherence, frequency, equation (5), transfer), and dynamic's 13 less two by axis."""
+(amplitudes, coherence, frequency, equation (5), transfer), four phases, five broad-band, and
+dynamic's 13 less two by axis."""
 
 WORDS = {
     "dynamic": "dynamic",
@@ -24,6 +25,8 @@ DECIMALS = {
     "_n_per_m": (1e9, 3),
     "_n_s_per_m": (1e6, 2),
     "_um_pk": (1, 2),
+    "_um_pp": (1, 2),
+    "_mm_s_rms": (1, 2),
     "_um": (1, 2),
     "_rpm": (1, 2),
     "_mw": (1, 1),

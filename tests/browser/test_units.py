@@ -68,3 +68,22 @@ async def test_an_unknown_unit_is_named_and_leads_back(running_plant, page) -> N
     await expect(page.get_by_text("This plant has no unit U9.")).to_be_visible()
     await page.locator("main").get_by_role("link", name="Overview").click()
     await expect(page.locator("[data-unit=U1]")).to_be_visible()
+
+
+PLACES = """
+async (alarms) => {
+  const { alarmPlace } = await import("/static/alarm_place.js");
+  return alarms.map(alarmPlace);
+}
+"""
+
+
+async def test_an_alarm_leads_to_where_most_is_told_about_it(running_plant, page) -> None:
+    await page.goto(running_plant.url)
+    bearing = ("order1_shaft_x", "zone_bearing_y", "oil_temperature", "gap_x", "opposite_gap_y")
+    alarms = [("stiffness_x", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
+    alarms += [(kind, "UJB") for kind in bearing]
+    told = [{"unit": "U1", "subject": subject, "kind": kind} for kind, subject in alarms]
+    found = await page.evaluate(PLACES, told)
+    place = "#/units/U1/bearings/UJB"
+    assert found == [f"{place}/film", "#/units/U1", "#/sources", *([place] * len(bearing))]

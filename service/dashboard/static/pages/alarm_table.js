@@ -1,6 +1,7 @@
 /** Alarms as a table; a row stays the same row as long as its alarm is there. */
 
 import { conditionWords, holdWords, kindWords, levelMark, placeWords, stateWords, valueWords } from "../alarm_words.js";
+import { alarmPlace } from "../alarm_place.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { evidenceLinks } from "../parts/evidence.js";
@@ -47,7 +48,7 @@ export function alarmTable(title, nothing, actor, again) {
 
 function alarmRow(actor, again) {
   const priority = mark();
-  const texts = HEADS.slice(1, -1).map(() => element("span"));
+  const texts = HEADS.slice(1, -1).map((head) => element(head === "Where" ? "a" : "span"));
   const hold = element("span", { class: "hold" });
   const actions = alarmActions(actor, again);
   const cells = [priority.node, ...texts, actions.node].map((node, index) =>
@@ -72,6 +73,7 @@ function alarmRow(actor, again) {
         alarm.raised ? formatTime(Date.parse(alarm.raised)) : "",
       ];
       texts.forEach((text, index) => setText(text, words[index]));
+      setAttribute(texts[HEADS.indexOf("Where") - 1], "href", alarmPlace(alarm));
       setText(hold, holdWords(alarm));
       evidence.draw(alarm.id, alarm.occurrence);
       actions.draw(alarm);

@@ -6,7 +6,7 @@ import { element, setText } from "../dom.js";
 import { formatAge, formatTime } from "../format.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
-import { bearingAddress } from "../route.js";
+import { bearingAddress, unitAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
 import { estimatorTable } from "./estimator_table.js";
 import { filmMatrices } from "./film_matrices.js";
@@ -74,8 +74,8 @@ function windowAge(latest) {
 }
 
 function drawSiblings(nav, unit, bearingId) {
-  if (nav.childElementCount === unit.bearings.length + 1) return;
+  if (nav.childElementCount === unit.bearings.length + 2) return;
   const links = unit.bearings.map(({ bearing }) => element("a", { href: bearingAddress(unit.id, bearing) }, bearing));
   links.find((link) => link.textContent === bearingId).setAttribute("aria-current", "page");
-  nav.replaceChildren(overviewLink(), ...links);
+  nav.replaceChildren(overviewLink(), element("a", { href: unitAddress(unit.id) }, unit.name), ...links);
 }

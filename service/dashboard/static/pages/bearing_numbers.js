@@ -22,6 +22,12 @@ const TILES = [
   ["Orbit roundness, + forward", [["order1_roundness", "vortex_roundness"], ["1×", "vortex"]]],
   ["Oil and power", [["oil_temperature_c", "power_mw"], ["oil", "power"]]],
 ];
+const BROAD_BAND = [
+  ["Shaft motion, broad-band", [["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"]]],
+  ["Bearing velocity, broad-band", [["overall_bearing_x_mm_s_rms", "overall_bearing_y_mm_s_rms"], ["x", "y"]]],
+  ["Phase of shaft motion, 1×", [["order1_shaft_x_phase_deg", "order1_shaft_y_phase_deg"], ["x", "y"]]],
+  ["Phase of bearing motion, 1×", [["order1_bearing_x_phase_deg", "order1_bearing_y_phase_deg"], ["x", "y"]]],
+];
 const OPPOSITE = ["opposite_gap_x_um", "opposite_gap_y_um"];
 const GROWTH = "gap_growth_um";
 
@@ -30,7 +36,8 @@ export function bearingNumbers(path) {
   const budget = budgetPanel(path);
   budget.node.classList.add("panel");
   const small = TILES.map((one) => tile(one, budget));
-  const tiles = [preferredStiffness(budget), ...small, gapsTile(budget), speedTile()];
+  const more = [...BROAD_BAND.map((one) => tile(one, budget)), excursionTile()];
+  const tiles = [preferredStiffness(budget), ...small, gapsTile(budget), speedTile(), ...more];
   const nodes = [...tiles.map((one) => one.node), budget.node];
   return {
     node: element("section", { class: "tiles", "aria-label": "Numbers" }, ...nodes),
@@ -65,6 +72,12 @@ function gapsTile(budget) {
       growth.node.hidden = opposite.node.hidden || !exists(latest, GROWTH);
     },
   };
+}
+
+/** The farthest that the shaft moves from its mean, in whichever direction. */
+function excursionTile() {
+  const excursion = readingView("overall_shaft_um_pk", "");
+  return { node: element("div", { class: "tile" }, element("h2", {}, "Farthest excursion"), excursion.node), draw: excursion.draw };
 }
 
 function speedTile() {

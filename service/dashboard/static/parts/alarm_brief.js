@@ -1,6 +1,7 @@
 /** Alarms of one unit in a few lines: what is on the list, and how much cannot be judged. */
 
 import { alarmReasonWords, holdWords, isHidden, kindWords, levelMark, placeWords, stateWords, valueWords } from "../alarm_words.js";
+import { alarmPlace } from "../alarm_place.js";
 import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
@@ -54,6 +55,6 @@ function alarmLine(alarm) {
   const since = alarm.raised ? `since ${formatTime(Date.parse(alarm.raised))}` : "";
   const why = alarm.condition === "unknown" ? `condition not known: ${alarmReasonWords(alarm.condition_reason)}` : "";
   const words = [valueWords(alarm), stateWords(alarm.state).toLowerCase(), why, since, holdWords(alarm)].filter(Boolean);
-  const what = element("strong", {}, `${placeWords(alarm)}: ${kindWords(alarm.kind)}`);
+  const what = element("a", { href: alarmPlace(alarm) }, `${placeWords(alarm)}: ${kindWords(alarm.kind)}`);
   return element("li", { "data-alarm": alarm.id }, level.node, what, element("span", {}, words.join(" · ")));
 }

@@ -8,7 +8,7 @@ import { element, setAttribute } from "../dom.js";
  * `keyOf(thing)` tells things apart; `rowOf(thing)` makes `{ nodes, draw(thing) }`.
  */
 export function listing(title, heads, nothing, keyOf, rowOf) {
-  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
+  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));
   const body = element("tbody", { role: "rowgroup" });
   const head = element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells));
   const table = element("table", { role: "table", "aria-label": title, hidden: "" }, head, body);
