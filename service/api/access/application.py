@@ -9,6 +9,7 @@ from service.api.access.declared import Declared, declared
 from service.api.access.desk import AccessDesk
 from service.api.access.gate import Gate, require_declared
 from service.api.access.openapi import describe_access
+from service.api.description import describe_answers
 
 
 class GuardedApi(FastAPI):
@@ -44,9 +45,10 @@ class GuardedApi(FastAPI):
         return self._declared
 
     def openapi(self) -> dict[str, Any]:
-        """The published description, with what each operation needs; made once, as routes are."""
+        """The published description, made once: routes are no longer added."""
         if self.openapi_schema is not None:
             return self.openapi_schema
         document: dict[str, Any] = super().openapi()
         describe_access(document, self.declared)
+        describe_answers(document)
         return document

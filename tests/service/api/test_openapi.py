@@ -1,10 +1,12 @@
 """The published description of the API is complete."""
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from jsonschema_rs import Draft202012Validator
 
 
 @pytest.fixture
@@ -77,11 +79,66 @@ def test_every_error_is_documented_as_a_problem(
         responses = operation["responses"]
         assert set(responses) >= {"default", *expected.get(name, ())}, name
         for status, response in responses.items():
-            if status.startswith("2") or (name, status) == ("GET /readyz", "503"):
+            if status[0] in "23" or (name, status) == ("GET /readyz", "503"):
                 continue
             [(media_type, content)] = response["content"].items()
             assert media_type == "application/problem+json", f"{name} {status}"
             assert "instance" in content["schema"]["properties"]
+
+
+def test_every_answer_and_every_question_has_an_example_that_fits_its_schema(
+    service: Any, operations: list[tuple[str, dict[str, Any]]]
+) -> None:
+    n_checked = 0
+    for name, operation in operations:
+        answers = [a for status, a in operation["responses"].items() if status.startswith("2")]
+        for told in (*answers, operation.get("requestBody", {})):
+            content = told.get("content", {}).get("application/json")
+            if content is None:
+                continue
+            schema = {**content["schema"], "components": service.document["components"]}
+            for problem in Draft202012Validator(schema).iter_errors(content["example"]):
+                raise AssertionError(f"{name}: {problem}")
+            n_checked += 1
+    assert n_checked >= len(operations)
+
+
+def test_no_example_holds_a_number_that_is_none(service: Any) -> None:
+    json.dumps(service.document, allow_nan=False)
+
+
+def test_every_model_refuses_what_it_does_not_know(service: Any) -> None:
+    for name, schema in service.document["components"]["schemas"].items():
+        if schema.get("type") == "object":
+            assert schema.get("additionalProperties") is False, name
+
+
+def test_operations_are_named_by_their_address(
+    operations: list[tuple[str, dict[str, Any]]],
+) -> None:
+    names = {name: operation["operationId"] for name, operation in operations}
+
+    assert len(set(names.values())) == len(names)
+    assert names["GET /api/v1/overview"] == "get_overview"
+    latest = "GET /api/v1/units/{unit}/bearings/{bearing}/latest"
+    assert names[latest] == "get_units_unit_bearings_bearing_latest"
+    shelve = "POST /api/v1/alarms/{alarm}/shelve"
+    assert names[shelve] == "post_alarms_alarm_shelve"
+
+
+def test_every_answer_that_can_be_asked_for_again_says_how(
+    operations: list[tuple[str, dict[str, Any]]],
+) -> None:
+    for name, operation in operations:
+        is_json = "application/json" in operation["responses"].get("200", {}).get("content", {})
+        is_tagged = name.startswith("GET /api/") and is_json
+        asked = [p["name"] for p in operation.get("parameters", ()) if p["in"] == "header"]
+        assert asked == (["If-None-Match"] if is_tagged else []), name
+        assert ("304" in operation["responses"]) == is_tagged, name
+        if is_tagged:
+            for status in ("200", "304"):
+                headers = operation["responses"][status]["headers"]
+                assert {"ETag", "Padwatch-Time", "Padwatch-Origin"} <= set(headers), name
 
 
 def test_every_field_of_every_answer_is_explained(service: Any) -> None:
