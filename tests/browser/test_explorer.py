@@ -1,0 +1,181 @@
+"""The trend explorer: comparing, zooming, colouring, and what it says where there is nothing."""
+
+import csv
+import re
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from playwright.async_api import Page, Request, expect
+
+DATA_MS = 60_000
+STIFFNESS = "[data-chart=trend-film-stiffness-gn-m]"
+COMPARED = "#/trends?b=U1/UJB&b=U1/LJB&q=stiffness_xx_n_per_m"
+CURVES = ".chart .scatterlayer .trace path.js-line"
+
+
+async def await_curve(page: Page, name: str = STIFFNESS) -> None:
+    await expect(page.locator(f"{name} {CURVES}").first).to_be_attached(timeout=DATA_MS)
+
+
+def days(request: Request) -> float:
+    """How long a time of trends is asked for; 0 if it is something else."""
+    parts = urlsplit(request.url)
+    if not parts.path.endswith("/trends"):
+        return 0.0
+    query = parse_qs(parts.query)
+    start, end = (datetime.fromisoformat(query[name][0]) for name in ("start", "end"))
+    return (end - start) / timedelta(days=1)
+
+
+async def test_two_bearings_are_compared_and_the_address_says_so(
+    living_plant, page, complaints_of, picture_of
+) -> None:
+    complaints = complaints_of(page)
+    await page.goto(living_plant.url + "#/trends")
+    await expect(page.locator("summary").first).to_have_text("Bearings: 1", timeout=DATA_MS)
+
+    await page.locator("summary").first.click()
+    await page.get_by_role("checkbox", name="U1 LJB").check()
+    await page.get_by_role("radio", name="Month").check()
+
+    legend = page.locator(f"{STIFFNESS} .legendtext")
+    await expect(legend.filter(has_text="U1 UJB: xx")).to_have_count(1, timeout=DATA_MS)
+    await expect(legend.filter(has_text="U1 LJB: xx")).to_have_count(1)
+    assert "b=U1%2FUJB&b=U1%2FLJB" in page.url
+    assert "last=2592000" in page.url
+    await picture_of(page, "month")
+    assert complaints == []
+
+
+async def test_quantities_are_found_by_words_and_have_charts_by_kind(living_plant, page) -> None:
+    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+    await await_curve(page)
+
+    await page.locator("summary", has_text="Quantities").click()
+    await page.get_by_role("searchbox", name="Find in quantities").fill("oil temp")
+    boxes = page.get_by_role("group", name="Operation").get_by_role("checkbox")
+    await expect(boxes).to_have_count(1)
+    await boxes.check()
+
+    await await_curve(page, "[data-chart=trend-operation-c]")
+    heading = page.locator("[data-chart=trend-operation-c] h2")
+    await expect(heading).to_have_text("Oil temperature")
+    assert "q=oil_temperature_c" in page.url
+
+
+async def test_zooming_asks_for_finer_data_and_back_leads_back(living_plant, page) -> None:
+    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+    await await_curve(page)
+    before = page.url
+
+    area = page.locator(f"{STIFFNESS} .nsewdrag")
+    box = await area.bounding_box()
+    assert box is not None
+    across = [box["x"] + share * box["width"] for share in (0.4, 0.6)]
+    await page.mouse.move(across[0], box["y"] + box["height"] / 2)
+    await page.mouse.down()
+    await page.mouse.move(across[1], box["y"] + box["height"] / 2, steps=8)
+    async with page.expect_request(lambda request: 0.0 < days(request) < 29.0) as zoomed:
+        await page.mouse.up()
+
+    assert days(await zoomed.value) == pytest.approx(6.0, rel=0.1)
+    await expect(page).to_have_url(re.compile("from=.*to="))
+    await page.get_by_role("button", name="Back").click()
+    await expect(page).to_have_url(before)
+    await expect(page.get_by_role("radio", name="Month")).to_be_checked()
+    await expect(page.get_by_role("button", name="Back")).to_be_disabled()
+
+
+async def test_the_keyboard_zooms_and_moves_as_well(living_plant, page) -> None:
+    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+    await await_curve(page)
+
+    for words in ("Zoom in", "Earlier"):
+        await page.get_by_role("button", name=words).focus()
+        await page.keyboard.press("Enter")
+
+    query = parse_qs(urlsplit(page.url).fragment.partition("?")[2])
+    start, end = (datetime.fromisoformat(query[name][0]) for name in ("from", "to"))
+    assert end - start == pytest.approx(timedelta(days=15), abs=timedelta(seconds=1))
+    assert datetime.now(UTC) - end > timedelta(days=12)
+
+
+async def test_oil_temperature_colours_the_points(living_plant, page, picture_of) -> None:
+    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+    await await_curve(page)
+
+    await page.get_by_role("radio", name="Oil temperature").check()
+
+    await expect(page.locator(f"{STIFFNESS} .cbtitle")).to_contain_text("oil", timeout=DATA_MS)
+    fills = await page.locator(f"{STIFFNESS} .points path.point").evaluate_all(
+        "points => new Set(points.map((point) => getComputedStyle(point).fill)).size"
+    )
+    assert fills > 5
+    assert "colour=oil_temperature_c" in page.url
+    await picture_of(page, "coloured")
+
+
+async def test_a_time_without_results_says_so(living_plant, page) -> None:
+    empty = "&from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z"
+    await page.goto(living_plant.url + COMPARED + empty)
+    sentence = page.locator(f"{STIFFNESS} .sentence")
+    await expect(sentence).to_contain_text("Nothing was stored from 2001-01-01", timeout=DATA_MS)
+
+    await page.get_by_label("While at").select_option("standstill")
+    await expect(sentence).to_contain_text("at standstill")
+    await page.locator("summary").first.click()
+    for bearing in ("U1 UJB", "U1 LJB"):
+        await page.get_by_role("checkbox", name=bearing).uncheck()
+    await expect(page.get_by_text("Choose at least one bearing.")).to_be_visible()
+
+
+async def test_an_address_restores_what_was_shown(living_plant, page) -> None:
+    address = (
+        "#/trends?b=U1/TJB&q=speed_rpm&q=power_mw&last=604800&state=full_load"
+        "&colour=eccentricity_ratio"
+    )
+    await page.goto(living_plant.url + address)
+
+    await expect(page.locator("[data-chart=trend-operation-r-min]")).to_be_visible(timeout=DATA_MS)
+    await expect(page.locator("[data-chart=trend-operation-mw]")).to_be_visible()
+    await expect(page.get_by_role("radio", name="Week")).to_be_checked()
+    await expect(page.get_by_role("radio", name="Eccentricity")).to_be_checked()
+    await expect(page.get_by_label("While at")).to_have_value("full_load")
+    await expect(page.locator("summary").first).to_have_text("Bearings: 1")
+
+
+async def test_an_address_from_elsewhere_is_complained_of_in_words(living_plant, page) -> None:
+    address = "#/trends?b=U1/UJB&b=U9/XYZ&q=stiffness_xx_n_per_m&q=warp_factor&last=2592000"
+    await page.goto(living_plant.url + address)
+
+    await await_curve(page)
+    await expect(page.get_by_text("This padwatch knows no quantity warp_factor.")).to_be_visible()
+    await expect(page.get_by_text("U9 XYZ:")).to_be_visible()
+
+
+async def test_what_is_shown_can_be_taken_away(living_plant, page, tmp_path) -> None:
+    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+    await await_curve(page)
+
+    async with page.expect_download() as started:
+        await page.get_by_role("link", name="U1 LJB as CSV").click()
+    path = tmp_path / "trend.csv"
+    await (await started.value).save_as(path)
+
+    rows = list(csv.DictReader(Path(path).read_text().splitlines()))
+    assert len(rows) > 100
+    assert "stiffness_xx_n_per_m_mean [N/m]" in rows[0]
+
+
+async def test_a_phone_shows_it_without_scrolling_sideways(
+    living_plant, phone_page, picture_of
+) -> None:
+    await phone_page.goto(living_plant.url + COMPARED + "&q=speed_rpm&last=2592000")
+    await await_curve(phone_page)
+    width, visible = await phone_page.evaluate(
+        "() => [document.documentElement.scrollWidth, window.innerWidth]"
+    )
+    assert width <= visible
+    await picture_of(phone_page, "phone")
