@@ -10,6 +10,7 @@ from functools import partial
 from acquisition.clock import Clock
 from service.alarms.health import health_of
 from service.alarms.start import alarm_engine
+from service.api.access.desk import AccessDesk
 from service.api.app import create_app
 from service.api.context import Context
 from service.bus import Bus
@@ -35,6 +36,7 @@ from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.supervision import Supervision
+from service.wiring.access import access_desk
 from service.wiring.audit import ServiceTrail
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of, router_of
@@ -81,7 +83,8 @@ async def run_service(
     listener
         Where the HTTP server listens.
     announce
-        Called with the URL once the server answers.
+        Called with the URL once the server answers, and before with the token for setting up where
+        everybody must log in and nobody can.
     manager
         Told when the service is ready, alive and stopping.
 
@@ -89,6 +92,8 @@ async def run_service(
     ------
     StoreError
         If the database cannot be used.
+    ClosedError
+        If others could reach the service, and it is not fit for that.
     """
     plant, origin = performance.plant, performance.origin
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * _refresh_s(plant))
@@ -111,6 +116,7 @@ async def _run(
     manager: ServiceManager,
 ) -> None:
     plant, units = performance.plant, performance.units
+    desk = access_desk(plant, store.access, clock)
     receivers = receivers_of(plant, performance.origin, clock)
     deliveries = Deliveries(receivers, store.outbox, clock)
     timings = Timings(units, clock)
@@ -169,6 +175,7 @@ async def _run(
         sources=timed_sources(units),
         loops=beats.look,
         refusals=audit.refusals,
+        access=desk,
     )
     server = server_of(create_app(context), plant, clock)
     stopped = _stop_on_signals()
@@ -186,7 +193,7 @@ async def _run(
                 beats.tend("serve", partial(server.run_on, listener)), name="serve"
             )
             announcing = tasks.create_task(
-                _announce(server, listener, announce, supervision), name="announce"
+                _announce(server, listener, announce, supervision, desk), name="announce"
             )
             supervising = tasks.create_task(supervision.run(), name="supervise")
             if performance.ends:
@@ -234,8 +241,11 @@ async def _announce(
     listener: socket.socket,
     announce: Callable[[str], None],
     supervision: Supervision,
+    desk: AccessDesk,
 ) -> None:
     while not server.started:
         await asyncio.sleep(0.01)
     supervision.ready()
-    announce(url_of(listener))
+    if token := await desk.offer_set_up():
+        announce(f"to make the first account, within one hour and once: {token}")
+    announce(url_of(listener, has_tls=server.config.is_ssl))

@@ -17,8 +17,9 @@ REPLAYS = "replays"
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """The part of a plant that is replayed, with a data folder of its own."""
-    service = plant.service.model_copy(update={"data_folder": str(folder)})
+    """The part of a plant that is replayed: in a data folder of its own, for this computer."""
+    closed = {"host": "127.0.0.1", "socket": None, "tls": None}
+    service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
     return plant.model_copy(update={"unit": chosen, "service": service})
 

@@ -16,13 +16,14 @@ from service.cli.daq_process import daq_process
 from service.cli.ending import run_to_its_end
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import announce
-from service.http.listening import PortInUseError, listen
+from service.http.listening import PortInUseError
 from service.origin import Origin
 from service.program import Performance, run_service
 from service.replay import PlayedOut, replay_folder, replayed_plant
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.wires import Wire, over_wire
+from service.wiring.http import listener_of
 from service.wiring.recordings import recordings_by_unit, replay_source
 from service.wiring.sources import source_of, watched_units
 from service.wiring.stores import database_path
@@ -93,5 +94,5 @@ def _performance(
 
 
 def _run(performance: Performance, port: int) -> None:
-    with listen(performance.plant.service.host, port) as listener:
+    with listener_of(performance.plant, port) as listener:
         run_to_its_end(run_service(performance, listener, SystemClock(), announce))

@@ -10,14 +10,20 @@ from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from service.cli.ending import run_to_its_end
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.http.listening import PortInUseError, listen
+from service.http.listening import PortInUseError
+from service.http.tls import CertificateError
 from service.notify import ServiceManager
 from service.program import Performance, run_service
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
+from service.wiring.access import ClosedError
+from service.wiring.http import listener_of
 from service.wiring.sources import live_units
 
 log = structlog.get_logger()
+
+CLOSED = (ClosedError, CertificateError)
+"""What will be so the next time, too."""
 
 
 def run(
@@ -34,11 +40,13 @@ def run(
 def run_plant(plant: PlantFile, port: int) -> None:
     """Run the service on a port; ends the command with one line if it cannot."""
     try:
-        with listen(plant.service.host, port) as listener:
+        with listener_of(plant, port) as listener:
             clock = SystemClock()
             performance = Performance(plant, live_units(plant, clock))
             manager = ServiceManager(os.environ)
             run_to_its_end(run_service(performance, listener, clock, announce, manager))
+    except CLOSED as error:
+        fail(f"padwatch: {error}", 2)
     except (PortInUseError, StoreError, AcquisitionError) as error:
         fail(f"padwatch: {error}")
 

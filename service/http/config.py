@@ -45,6 +45,7 @@ class GuardedConfig(uvicorn.Config):
             access_log=False,
             server_header=False,
             lifespan="off",
+            proxy_headers=False,  # uvicorn would believe everybody on this computer
             timeout_keep_alive=round(limits.keep_alive_s),
             timeout_graceful_shutdown=STOP_S,
             **options,

@@ -24,7 +24,10 @@ def listen(host: str, port: int) -> socket.socket:
         raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
-def url_of(listener: socket.socket) -> str:
+def url_of(listener: socket.socket, has_tls: bool = False) -> str:
     """Where the service is found."""
+    if listener.family == socket.AF_UNIX:
+        return f"unix:{listener.getsockname()}"
     host, port = listener.getsockname()[:2]
-    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+    place = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    return f"{'https' if has_tls else 'http'}://{place}/"

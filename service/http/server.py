@@ -10,6 +10,7 @@ import uvicorn
 from service.heartbeats import UNHEARD, Pulse
 from service.http.config import STOP_S, GuardedConfig
 from service.http.connections import Connections
+from service.http.protocol import GuardedProtocol
 
 SWEEP_TICKS = 5
 """Connections are looked at every so many of uvicorn's ticks of 0.1 s."""
@@ -32,6 +33,29 @@ class GuardedServer(uvicorn.Server):
     def open(self) -> Connections:
         """The open connections."""
         return self._guarded.connections
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen; uvicorn's own would let a client take a minute for its TLS handshake."""
+        if self.config.ssl is None:
+            await super().startup(sockets)
+            return
+        await self.lifespan.startup()
+        loop = asyncio.get_running_loop()
+        self.servers = [
+            await loop.create_server(
+                self._connection,
+                sock=listener,
+                ssl=self.config.ssl,
+                backlog=self.config.backlog,
+                ssl_handshake_timeout=self.open.limits.head_s,
+                ssl_shutdown_timeout=STOP_S,
+            )
+            for listener in sockets or ()
+        ]
+        self.started = True
+
+    def _connection(self) -> asyncio.Protocol:
+        return GuardedProtocol(self._guarded, self.server_state, self.lifespan.state)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

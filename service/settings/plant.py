@@ -6,6 +6,8 @@ from typing import Annotated, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from core.units import hz_from_rpm
+from service.security.addresses import is_loopback
+from service.settings.access import AccessSettings, TlsSettings
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
 from service.settings.delivery import DeliverySettings
@@ -35,10 +37,19 @@ class ServiceSettings(Settings):
     """The running program."""
 
     host: Annotated[str, StringConstraints(min_length=1)] = "127.0.0.1"
-    """Address the HTTP server listens on. There is no login yet: keep it on loopback."""
+    """Address the HTTP server listens on. Any other than loopback needs [service.tls] and an
+    account (padwatch users add)."""
 
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     """TCP port of the HTTP server; 0 takes a free one and prints it."""
+
+    socket: Annotated[str, StringConstraints(pattern=r"^/[^\x00]{1,99}$")] | None = None
+    """File of a unix socket to listen on instead of host and port, for a proxy on this computer;
+    example: "/run/padwatch/http.sock". What the proxy says of where a request comes from is
+    believed there, and only there."""
+
+    tls: TlsSettings | None = None
+    """Certificate of the HTTP server; without it HTTP is plain."""
 
     data_folder: Annotated[str, StringConstraints(min_length=1)] = "var"
     """Folder of the database, relative to where padwatch is started."""
@@ -53,10 +64,13 @@ class ServiceSettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.host not in ("127.0.0.1", "::1", "localhost"):
+        if self.socket is not None:
+            if self.tls is not None:
+                raise MisfitError("is for a host and port: on a socket the proxy has TLS", "tls")
+        elif not is_loopback(self.host) and self.tls is None:
             raise MisfitError(
-                'is not loopback: padwatch has no login yet, use "127.0.0.1" and a reverse proxy'
-                " that authenticates",
+                "is reached from other hosts, which needs a certificate and its key in"
+                " [service.tls]; else use 127.0.0.1, or a unix socket behind a proxy",
                 "host",
             )
         return self
@@ -166,6 +180,9 @@ class PlantFile(Settings):
 
     service: ServiceSettings = ServiceSettings()
     """HTTP server and data folder of the running program."""
+
+    access: AccessSettings = AccessSettings()
+    """Logins: who needs one, and how long it lasts."""
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments and averaging."""

@@ -71,7 +71,9 @@ def composer_of(plant: PlantFile, look: LookAround) -> Composer:
     """What writes messages about a plant."""
     service = plant.service
     host = f"[{service.host}]" if ":" in service.host else service.host
-    own = f"http://{host}:{service.port}/" if service.port else None
+    scheme = "http" if service.tls is None else "https"
+    is_found = service.port and service.socket is None
+    own = f"{scheme}://{host}:{service.port}/" if is_found else None
     names = {unit.id: unit.name for unit in plant.unit}
     return Composer(Plant(plant.plant.name, plant.delivery.dashboard_url or own, names), look)
 

@@ -98,7 +98,7 @@ UJB = "unit[1].bearing[1]."
             "needed is one in degC",
         ),
         ("minimum = 0.0", "minimum = 200.0", "unit[1].slow_channel[1].minimum = 200.0", "maximum"),
-        ('"127.0.0.1"', '"0.0.0.0"', "service.host = '0.0.0.0'", "not loopback"),
+        ('"127.0.0.1"', '"0.0.0.0"', "service.host = '0.0.0.0'", "[service.tls]"),
         ("seed = 1\n", "seed = -1\n", "unit[1].simulation.seed = -1", "greater than or equal to 0"),
         (
             'bearing = "LJB"',
