@@ -41,6 +41,9 @@ link_lost_after_s = 2.0
 OWN_TABLES = re.compile(r"^\[(?:analysis|alarms)\]\n(?:[^\[\n].*\n|\n)*", re.MULTILINE)
 """What an example itself says of these."""
 
+ROLES = ("viewer", "operator", "engineer")
+PASSWORD = "the river is high in may"  # noqa: S105 - of accounts that exist in tests alone
+
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
@@ -83,6 +86,21 @@ class Plant:
 
     def stop_service(self) -> None:
         stop(self._service)
+
+    def add_account(self, name: str, role: str, password: str) -> None:
+        """What an admin does at the computer's own prompt."""
+        given, wanted = os.pipe()
+        with os.fdopen(wanted, "w") as pipe:
+            pipe.write(password)
+        command = [*PADWATCH, "users", "add", str(self._plant_file()), name, "--role", role]
+        with os.fdopen(given):
+            subprocess.run(
+                [*command, "--password-fd", str(given)],
+                pass_fds=[given],
+                cwd=self._folder,
+                check=True,
+                capture_output=True,
+            )
 
     def live_first(self) -> None:
         """Give the unit a past with a learned baseline before anything is started."""
@@ -183,6 +201,16 @@ def living_plant(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Ite
         yield plant
 
 
+@pytest.fixture(scope="session")
+def guarded_plant(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:  # noqa: ARG001
+    """A plant without a DAQ, so that it has an alarm, and with an account of each role."""
+    with Plant(tmp_path_factory.mktemp("guarded")) as plant:
+        for role in ROLES:
+            plant.add_account(role, role, PASSWORD)
+        plant.start_service()
+        yield plant
+
+
 @pytest.fixture
 async def browser(chromium: str) -> AsyncIterator[Browser]:
     """A browser without a past."""
@@ -196,6 +224,21 @@ async def browser(chromium: str) -> AsyncIterator[Browser]:
 async def page(browser: Browser) -> Page:
     """A page on a control-room screen."""
     return await browser.new_page(viewport={"width": 1280, "height": 800})
+
+
+@pytest.fixture
+async def remote_page(browser: Browser) -> Page:
+    """A page on a screen elsewhere, behind the plant's proxy: there one must log in."""
+    headers = {"X-Forwarded-For": "192.0.2.7"}
+    return await browser.new_page(
+        viewport={"width": 1280, "height": 800}, extra_http_headers=headers
+    )
+
+
+@pytest.fixture
+def password() -> str:
+    """Of all accounts of the guarded plant."""
+    return PASSWORD
 
 
 @pytest.fixture

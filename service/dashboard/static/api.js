@@ -20,6 +20,8 @@ export class Refused extends Error {
 const answers = new Map();
 const N_ANSWERS = 32;
 
+const REFUSED = "padwatch-refused";
+
 /**
  * Fetch JSON from `/api/v1`; `path` is a list of segments, `query` a list of pairs.
  *
@@ -39,10 +41,13 @@ export async function ask(path, query = [], signal = undefined) {
 
 /** Ask `/api/v1` to do something; `body` is sent as JSON. Null where there is nothing to answer. */
 export async function tell(path, body, method = "POST") {
-  const headers = { ...JSON_ONLY, "Content-Type": "application/json" };
+  const headers = body === undefined ? JSON_ONLY : { ...JSON_ONLY, "Content-Type": "application/json" };
   const response = await answer(urlOf(path), undefined, { method, headers, body: JSON.stringify(body) });
   return response.status === 204 ? null : given(response);
 }
+
+/** Call `look` whenever the service did not want to know us, or did not let us: perhaps a login is over. */
+export const onRefused = (look) => window.addEventListener(REFUSED, look);
 
 /** Forget every answer: the next reader may be somebody else. */
 export const forget = () => answers.clear();
@@ -89,6 +94,7 @@ async function decoded(response) {
 
 function refusal(response, body) {
   const { status } = response;
+  if (status === 401 || status === 403) window.dispatchEvent(new Event(REFUSED));
   const words = body?.detail || body?.title || `The service answered with status ${status}`;
   const sentence = words.charAt(0).toUpperCase() + words.slice(1).replace(/\.?$/, ".");
   const seconds = Number.parseInt(response.headers.get("Retry-After"), 10);

@@ -1,61 +1,41 @@
-/** The page as a whole: polls the overview, follows the address, redraws every second. */
+/** The page as a whole: who is here, polls the overview, follows the address, redraws every second. */
 
-import { countWords } from "./alarm_words.js";
+import { pageOf } from "./admission.js";
 import { onAmplitudes } from "./amplitudes.js";
-import { NotReachable, ask } from "./api.js";
+import { NotReachable, ask, onRefused } from "./api.js";
 import { onUpgrade } from "./edition.js";
-import { formatAge, formatTime, formatZone } from "./format.js";
-import { setAttribute, setText } from "./dom.js";
 import { SILENCE, failedNow, heardNow, moment, viewAt } from "./live.js";
+import { PAGES } from "./pages.js";
+import { bar } from "./parts/bar.js";
 import { poll } from "./poll.js";
-import { ALARMS_ADDRESS, routeOf } from "./route.js";
-import { NO_PAGE, PAGES } from "./pages.js";
-import { mark } from "./parts/mark.js";
-import { navigation } from "./parts/navigation.js";
+import { ALARMS_ADDRESS } from "./route.js";
+import { askSession, isLocked, onSession, session } from "./session.js";
 
 const OVERVIEW_PERIOD_S = 2;
 const REDRAW_PERIOD_MS = 1000;
 
 const main = document.getElementById("main");
-const banner = document.getElementById("banner");
-const alarmLink = document.getElementById("alarms");
-const alarms = mark();
-alarmLink.append(alarms.node);
-const ways = navigation(PAGES);
-document.getElementById("bar").append(ways.button, ways.node);
+const head = bar(PAGES, ALARMS_ADDRESS);
 let live = SILENCE;
 let page = null;
 
 async function askOverview(signal) {
   try {
-    live = heardNow(live, await ask(["overview"], [], signal), moment());
+    if (session() === null || isLocked()) await askSession(signal);
+    if (isLocked()) live = SILENCE;
+    else live = heardNow(live, await ask(["overview"], [], signal), moment());
   } catch (failure) {
     if (signal.aborted) return;
     live = failedNow(live, failureWords(failure), moment());
   }
+  if (page === null) openPage();
   draw();
 }
 
 function draw() {
   const view = viewAt(live, moment());
-  drawBar(view);
-  page.draw(view);
-}
-
-function drawBar(view) {
-  setText(document.getElementById("plant"), view.plant ?? "");
-  setText(document.getElementById("clock"), `${formatTime(Date.now())} ${formatZone(Date.now())}`);
-  setText(document.getElementById("service"), serviceSentence(view));
-  document.getElementById("replay").hidden = view.origin !== "replay";
-  alarms.draw(...countWords(view.alarms));
-  banner.hidden = view.failure === null;
-  setText(document.getElementById("failure"), view.failure ?? "");
-  setText(document.getElementById("failure-age"), view.failure === null ? "" : failureAge(view));
-}
-
-function serviceSentence(view) {
-  if (view.silenceS === null) return "Waiting for the service’s first answer.";
-  return `Service answered ${formatAge(view.silenceS)} ago`;
+  head.draw(view);
+  page?.draw(view);
 }
 
 function failureWords(failure) {
@@ -63,22 +43,21 @@ function failureWords(failure) {
   return `${what} ${failure.message} Trying again every ${OVERVIEW_PERIOD_S} s.`;
 }
 
-function failureAge(view) {
-  const numbers = view.current ? "Numbers are those of the last answer." : "No number is shown as current.";
-  return `For ${formatAge(view.failedS)} now. ${numbers}`;
-}
-
 function openPage() {
-  const { page: wanted, segments } = routeOf(location.hash, PAGES) ?? { page: NO_PAGE, segments: [] };
+  const { page: wanted, segments } = pageOf(location.hash);
   page?.close();
   main.replaceChildren();
   page = wanted.open(main, ...segments);
   document.title = `padwatch: ${typeof wanted.title === "function" ? wanted.title(...segments) : wanted.title}`;
-  setAttribute(alarmLink, "aria-current", wanted.pattern === ALARMS_ADDRESS ? "page" : null);
-  ways.show(wanted);
-  ways.close();
+  head.show(wanted);
   window.scrollTo(0, 0);
   draw();
+}
+
+/** Somebody has come or gone, or may now do something else. */
+function changePerson() {
+  openPage();
+  overviews.again();
 }
 
 document.querySelector(".skip").addEventListener("click", (click) => {
@@ -89,6 +68,8 @@ document.getElementById("reload").addEventListener("click", () => location.reloa
 onUpgrade(() => (document.getElementById("upgrade").hidden = false));
 window.addEventListener("hashchange", openPage);
 onAmplitudes(openPage);
-openPage();
-poll(askOverview, () => OVERVIEW_PERIOD_S);
+draw();
+const overviews = poll(askOverview, () => OVERVIEW_PERIOD_S);
+onSession(changePerson);
+onRefused(() => askSession().catch(() => {})); // whoever is not reachable is told so by the overview
 setInterval(draw, REDRAW_PERIOD_MS);

@@ -4,7 +4,8 @@
  * `pattern` is its address, with open segments after a colon. `title` follows "padwatch: " in the
  * browser's tab; it is a text or is made from the segments. `nav` is its entry in the navigation,
  * in the order of this list; pages without stay reachable by links only. `open(main, ...segments)`
- * fills the empty `main` and returns `{ draw(view), close() }`.
+ * fills the empty `main` and returns `{ draw(view), close() }`. A page with a `permission` is for those
+ * who have it.
  */
 
 import { alarmsPage } from "./pages/alarms.js";

@@ -2,6 +2,7 @@
 
 import { tell } from "../api.js";
 import { element, setText } from "../dom.js";
+import { may } from "../session.js";
 
 const DURATIONS = [
   ["900", "15 min"],
@@ -45,12 +46,12 @@ export function alarmActions(actor, again) {
     node: element("span", { class: "actions" }, acknowledge, reset, shelve, unshelve, back, comment, form.node, words.node, failure),
     draw(now) {
       alarm = now;
-      acknowledge.hidden = now.is_acknowledged;
-      reset.hidden = !now.is_latched || !now.is_acknowledged;
-      unshelve.hidden = now.shelf === null;
-      comment.hidden = !words.node.hidden;
-      shelve.hidden = now.shelf !== null || !form.node.hidden;
-      back.hidden = now.outage === null;
+      acknowledge.hidden = !actor.may || now.is_acknowledged;
+      reset.hidden = !actor.may || !now.is_latched || !now.is_acknowledged;
+      unshelve.hidden = !actor.may || now.shelf === null;
+      comment.hidden = !actor.may || !words.node.hidden;
+      shelve.hidden = !actor.may || now.shelf !== null || !form.node.hidden;
+      back.hidden = !may("change_measuring") || now.outage === null;
     },
   };
 }

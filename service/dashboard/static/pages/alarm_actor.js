@@ -1,11 +1,21 @@
-/** Who sits here: there is no login yet, so that a name must be given before anything is done. */
+/** In whose name something is done: who is logged in; where no login is needed, a name is asked for. */
 
 import { element } from "../dom.js";
+import { limitSentence, may, session } from "../session.js";
 
 const KEY = "padwatch-actor";
 
-/** Returns `{ node, name() }`; the name is asked for where it is missing, and then null. `hint`: when it is needed. */
-export function actorField(hint = "before you acknowledge") {
+/**
+ * Returns `{ node, name(), may }`; the name is asked for where it is missing, and then null.
+ *
+ * `permission` and `what` it permits to whom; `hint`: when a name is needed.
+ */
+export function actorField(permission, what, hint) {
+  if (!may(permission)) {
+    return { node: element("p", { class: "actor limit" }, limitSentence(permission, what)), name: () => null, may: false };
+  }
+  const known = session()?.name ?? null;
+  if (known !== null) return { node: element("span", { hidden: "" }), name: () => known, may: true };
   const input = element("input", { id: "actor", maxlength: "80", autocomplete: "name", placeholder: hint });
   input.value = remembered();
   input.addEventListener("change", () => remember(input.value.trim()));
@@ -16,6 +26,7 @@ export function actorField(hint = "before you acknowledge") {
       if (!name) input.focus();
       return name || null;
     },
+    may: true,
   };
 }
 

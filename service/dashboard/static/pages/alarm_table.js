@@ -14,7 +14,7 @@ const HEADS = ["Priority", "State", "Where", "What", "Value", "Condition now", "
 export function alarmTable(title, nothing, actor, again) {
   const body = element("tbody", { role: "rowgroup" });
   const empty = element("p", { class: "sentence" }, nothing);
-  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
+  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));
   const table = element(
     "table",
     { role: "table", "aria-label": title, hidden: "" },

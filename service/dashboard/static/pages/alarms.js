@@ -21,7 +21,7 @@ const N_EVENTS = "50";
 /** Returns `{ draw(view), close() }`. */
 export function alarmsPage(main) {
   const state = mark();
-  const actor = actorField();
+  const actor = actorField("act_on_alarms", "act on alarms", "before you acknowledge");
   const again = () => [lists, histories].forEach((each) => each.again());
   const listed = alarmTable("On the list", "Nothing is on the list.", actor, again);
   const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);

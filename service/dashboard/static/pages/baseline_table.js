@@ -33,13 +33,13 @@ export function baselineTable(path, actor, again) {
     node: element("section", { class: "panel alarm-list baselines" }, ...nodes),
     draw(found) {
       setText(learning, found.learning ? learningSentence(found) : "This film is not watched.");
-      buttons.hidden = found.learning === null;
+      buttons.hidden = found.learning === null || !actor.may;
       freeze.hidden = found.is_frozen || found.in_force === null;
       thaw.hidden = !found.is_frozen;
       const now = JSON.stringify([found.versions, found.steps]);
       if (now === drawn) return;
       drawn = now;
-      versions.fill(found.versions.map((version) => versionRow(version, path, form)));
+      versions.fill(found.versions.map((version) => versionRow(version, path, form, actor.may)));
       steps.fill(found.steps.map(stepRow));
     },
     fail(words) {
@@ -50,7 +50,7 @@ export function baselineTable(path, actor, again) {
 
 function table(title, heads) {
   const body = element("tbody", { role: "rowgroup" });
-  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
+  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));
   const whole = element("table", { role: "table", "aria-label": title, hidden: "" }, element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells)), body);
   const none = element("p", { class: "sentence" }, "None yet.");
   return {
@@ -63,15 +63,15 @@ function table(title, heads) {
   };
 }
 
-function versionRow(version, path, form) {
+function versionRow(version, path, form, mayChange) {
   const status = mark();
   status.draw(...(STATUS[version.status] ?? ["absent", version.status]));
   const frozen = version.is_frozen ? element("span", { class: "hold" }, "Frozen") : "";
   const node = element("tr", { role: "row", "data-version": String(version.version), "data-status": version.status });
   const accept = button("Accept…", () => form.open("accept", version.version, accept));
   const reject = button("Reject…", () => form.open("reject", version.version, reject));
-  accept.hidden = version.status === "in_force";
-  reject.hidden = version.status === "rejected";
+  accept.hidden = !mayChange || version.status === "in_force";
+  reject.hidden = !mayChange || version.status === "rejected";
   for (const [one, word] of [[accept, "Accept"], [reject, "Reject"]]) setAttribute(one, "aria-label", `${word} version ${version.version}…`);
   const href = `/api/v1/${[...path, "baselines", String(version.version), "export"].map(encodeURIComponent).join("/")}`;
   const save = element("a", { href, download: "" }, "Export");

@@ -16,7 +16,7 @@ const PERIOD_S = 10;
 export function filmPage(main, unitId, bearingId) {
   const path = ["units", unitId, "bearings", bearingId];
   const head = headPart(unitId, bearingId);
-  const actor = actorField("before you change a baseline");
+  const actor = actorField("change_measuring", "change baselines", "before you change a baseline");
   const verdict = verdictPanel();
   const charts = filmCharts(path);
   const baselines = baselineTable(path, actor, () => questions.again());

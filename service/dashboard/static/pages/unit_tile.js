@@ -32,7 +32,7 @@ export function unitTile(unit, alarm) {
       link.node.hidden = level === "good";
       link.draw(level, words);
       alarm.draw();
-      rows.forEach((row, index) => row.draw(now.bearings[index], now.films[index]));
+      rows.forEach((row, index) => row.draw(now.bearings[index], now.films[index], level !== "good"));
     },
   };
 }
@@ -51,10 +51,10 @@ function bearingLine(unit, bearing) {
   const link = element("a", { href: bearingAddress(unit, bearing) }, bearing);
   return {
     node: element("tr", { "data-bearing": bearing }, element("th", { scope: "row" }, link), ...numbers, element("td", { class: "quality" }, state.node)),
-    draw(latest, film) {
+    draw(latest, film, isSaid) {
       const texts = [...STIFFNESS.map((name) => digits(name, readingOf(latest, name).value)), digits(SHAFT[0], largest(latest))];
       texts.forEach((text, index) => setText(numbers[index], text));
-      state.draw(...stateOf(latest, film));
+      state.draw(...stateOf(latest, film, isSaid));
     },
   };
 }
@@ -66,11 +66,15 @@ function largest(latest) {
   return values.length ? Math.max(...values) : null;
 }
 
-/** What is worst of a bearing in few words: its readings first, for a film is judged by them. */
-function stateOf(latest, film) {
+/**
+ * What is worst of a bearing in few words: its readings first, for a film is judged by them.
+ *
+ * `isSaid`: the head of the tile says loudly already why nothing current arrives.
+ */
+function stateOf(latest, film, isSaid) {
   const { level, reason } = qualityOf(latest);
   const look = lookOf(level, reason);
-  if (NOT_CURRENT.has(reason)) return ["absent", "no data"]; // the head of the tile or page says why, loudly
+  if (isSaid && NOT_CURRENT.has(reason)) return ["absent", "no data"];
   if (look === "bad") return [look, reasonWords(reason)];
   const verdicts = film.why_not === null ? [film.x, film.y].map(verdictMark) : [];
   const judged = verdicts.find(([one]) => one === "bad") ?? verdicts.find(([one]) => one === "uncertain");

@@ -2,9 +2,10 @@
 
 import { AMPLITUDES, amplitudes, chooseAmplitudes } from "../amplitudes.js";
 import { element, setAttribute } from "../dom.js";
+import { isLocked, may } from "../session.js";
 import { THEMES, chooseTheme, theme } from "../theme.js";
 
-/** Returns `{ button, node, show(page), close() }`; `show` marks where we are, `close` folds the menu up. */
+/** Returns `{ button, node, show(page), close(), draw() }`; `show` marks where we are, `close` folds the menu up. */
 export function navigation(pages) {
   const links = pages.filter((page) => page.nav).map((page) => [page, element("a", { href: page.pattern }, page.nav)]);
   const list = element("ul", {}, ...links.map(([, link]) => element("li", {}, link)));
@@ -26,6 +27,11 @@ export function navigation(pages) {
       for (const [page, link] of links) setAttribute(link, "aria-current", page === here ? "page" : null);
     },
     close: () => unfold(false),
+    draw() {
+      for (const [{ permission }, link] of links) {
+        link.parentNode.hidden = isLocked() || (permission !== undefined && !may(permission));
+      }
+    },
   };
 }
 

@@ -1,0 +1,24 @@
+/** Which page opens for an address, for whoever is here. */
+
+import { NO_PAGE, PAGES } from "./pages.js";
+import { forbiddenPage } from "./pages/forbidden.js";
+import { loginPage } from "./pages/login.js";
+import { setUpPage } from "./pages/set_up.js";
+import { routeOf } from "./route.js";
+import { isLocked, may, session } from "./session.js";
+
+const LOGIN_PAGE = { title: "log in", open: loginPage };
+const SET_UP_PAGE = { title: "set up", open: setUpPage };
+
+/**
+ * The page to open, with the segments of its address.
+ *
+ * As long as nobody has logged in it is the door, whatever the address: that stays, and leads on.
+ */
+export function pageOf(hash) {
+  if (isLocked()) return { page: session().set_up_needed ? SET_UP_PAGE : LOGIN_PAGE, segments: [] };
+  const { page, segments } = routeOf(hash, PAGES) ?? { page: NO_PAGE, segments: [] };
+  const { permission } = page;
+  if (permission === undefined || may(permission)) return { page, segments };
+  return { page: { ...page, open: (main) => forbiddenPage(main, permission) }, segments };
+}

@@ -1,0 +1,28 @@
+/** Who is logged in, and the way out; nothing where no login is needed. */
+
+import { element, setText } from "../dom.js";
+import { logOut, session } from "../session.js";
+
+/** Returns `{ node, draw() }`. */
+export function personView() {
+  const who = element("span");
+  const leave = element("button", { type: "button" }, "Log out");
+  const failure = element("span", { class: "action-failure", role: "alert" });
+  leave.addEventListener("click", async () => {
+    try {
+      await logOut();
+      setText(failure, "");
+    } catch (error) {
+      setText(failure, `Not logged out: ${error.message}`);
+    }
+  });
+  const node = element("span", { class: "person", hidden: "" }, who, leave, failure);
+  return {
+    node,
+    draw() {
+      const known = session();
+      node.hidden = !known?.name;
+      if (known?.name) setText(who, `${known.name}, ${known.role}`);
+    },
+  };
+}

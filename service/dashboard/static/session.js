@@ -1,0 +1,57 @@
+/** Who sits at this browser, as far as the service knows, and what he or she may do. */
+
+import { ask, forget, tell } from "./api.js";
+
+const CHANGED = "padwatch-session";
+
+/** The lowest role that has each permission, for sentences. */
+const ROLES = { act_on_alarms: "operator", change_measuring: "engineer", read_audit: "engineer", change_access: "admin" };
+
+let known = null;
+
+/** `{ login_required, set_up_needed, name, role, permissions }`; null until the service has said. */
+export const session = () => known;
+
+/** Whether nothing of the plant may be seen before somebody has logged in. */
+export const isLocked = () => known !== null && known.login_required && known.name === null;
+
+/** Whether something is permitted; while nothing is known the service itself has the last word. */
+export const may = (permission) => known === null || known.permissions.includes(permission);
+
+/** Why something is not permitted, or null if it is. */
+export function limitSentence(permission, what) {
+  if (may(permission)) return null;
+  return `You are logged in as ${known.name}, ${known.role}: to ${what} takes the role ${ROLES[permission]}.`;
+}
+
+/** Find out; pages hear `padwatch-session` when it is somebody else or something else than before. */
+export async function askSession(signal) {
+  settle(await ask(["session"], [], signal));
+}
+
+/** Let somebody in, or throw why not. */
+export async function logIn(name, password) {
+  settle(await tell(["session"], { name, password }));
+}
+
+/** End the session here and on the service. */
+export async function logOut() {
+  await tell(["session"], undefined, "DELETE");
+  await askSession();
+}
+
+/** Make the first account with the token that the service has printed, and log in with it. */
+export async function setUp(token, name, password) {
+  await tell(["set-up"], { token, name, password });
+  await logIn(name, password);
+}
+
+/** Call `redraw` after every change. */
+export const onSession = (redraw) => window.addEventListener(CHANGED, redraw);
+
+function settle(found) {
+  const isNew = JSON.stringify(found) !== JSON.stringify(known);
+  if (known !== null && found.name !== known.name) forget();
+  known = found;
+  if (isNew) window.dispatchEvent(new Event(CHANGED));
+}

@@ -1,0 +1,105 @@
+"""Who looks at a plant from elsewhere logs in first, and is offered what his role may do."""
+
+import re
+
+from playwright.async_api import Page, expect
+
+ALARMS = "#/alarms"
+FIRST_MS = 60_000
+ROW = "[data-alarm='U1:link:link_lost']"
+
+
+async def log_in(page: Page, name: str, password: str) -> None:
+    await page.get_by_label("Name", exact=True).fill(name)
+    await page.get_by_label("Password", exact=True).fill(password)
+    await page.keyboard.press("Enter")
+
+
+async def open_alarms(page: Page, url: str, name: str, password: str) -> None:
+    await page.goto(url + ALARMS)
+    await log_in(page, name, password)
+    await expect(page.locator(ROW)).to_be_visible(timeout=FIRST_MS)
+
+
+async def test_nothing_of_the_plant_shows_before_a_login_which_leads_on_to_the_page_asked_for(
+    guarded_plant, remote_page, password, complaints_of, picture_of
+) -> None:
+    page = remote_page
+    complaints = complaints_of(page)
+    await page.goto(guarded_plant.url + ALARMS)
+    await expect(page.get_by_role("heading", name="Log in")).to_be_visible(timeout=FIRST_MS)
+    await expect(page.get_by_label("Name", exact=True)).to_be_focused()
+    await expect(page.locator("#plant")).to_be_empty()
+    await expect(page.locator("#alarms")).to_be_hidden()
+    await expect(page.get_by_role("navigation").get_by_role("link")).to_have_count(0)
+    await picture_of(page, "door")
+    await log_in(page, "operator", password)
+    await expect(page.get_by_role("heading", name="Alarms", exact=True)).to_be_visible()
+    assert page.url.endswith(ALARMS)
+    await expect(page.locator(".person")).to_contain_text("operator, operator")
+    await page.reload()
+    await expect(page.get_by_role("heading", name="Alarms", exact=True)).to_be_visible()
+    assert complaints == []
+
+
+async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(
+    guarded_plant, remote_page, password
+) -> None:
+    page = remote_page
+    await page.goto(guarded_plant.url)
+    button = page.locator(".entries button")
+    said = page.get_by_role("alert").filter(has_text=re.compile("wrong|wait", re.IGNORECASE))
+    for _ in range(20):
+        await expect(button).to_be_enabled()
+        await log_in(page, "nobody-here", password)
+        await expect(said).to_be_visible(timeout=FIRST_MS)
+        if await button.is_disabled():
+            break
+    await expect(button).to_have_text(re.compile(r"Wait \d+ s"))
+    await expect(page.locator(".person")).to_be_hidden()
+
+
+async def test_a_viewer_is_told_what_he_may_not_do_and_not_offered_it(
+    guarded_plant, remote_page, password, picture_of
+) -> None:
+    page = remote_page
+    await open_alarms(page, guarded_plant.url, "viewer", password)
+    await expect(page.locator(f"{ROW} button:visible")).to_have_count(0)
+    await expect(page.locator(".limit")).to_contain_text("takes the role operator")
+    await expect(page.locator("#actor")).to_have_count(0)
+    await expect(page.get_by_role("link", name="Audit")).to_be_hidden()
+    await picture_of(page, "alarms")
+    await page.goto(guarded_plant.url + "#/audit")
+    await expect(page.get_by_text("takes the role engineer")).to_be_visible()
+
+
+async def test_an_operator_acts_in_his_own_name_and_leaves_baselines_alone(
+    guarded_plant, remote_page, password, picture_of
+) -> None:
+    page = remote_page
+    await open_alarms(page, guarded_plant.url, "operator", password)
+    await page.locator(ROW).get_by_role("button", name="Comment…").click()
+    await page.get_by_label("Comment", exact=True).fill("the DAQ is being painted")
+    await page.keyboard.press("Enter")
+    history = page.locator("table[aria-label=History]")
+    await expect(history).to_contain_text("the DAQ is being painted", timeout=FIRST_MS)
+    await expect(history.get_by_role("row").filter(has_text="painted")).to_contain_text("operator")
+    await picture_of(page, "alarms")
+    await page.goto(guarded_plant.url + "#/units/U1/bearings/UJB/film")
+    await expect(page.locator(".limit")).to_contain_text("takes the role engineer")
+
+
+async def test_a_login_that_ends_leads_to_the_door_and_back_to_the_same_page(
+    guarded_plant, remote_page, password
+) -> None:
+    page = remote_page
+    await open_alarms(page, guarded_plant.url, "engineer", password)
+    await page.context.clear_cookies()
+    await expect(page.get_by_role("heading", name="Log in")).to_be_visible(timeout=FIRST_MS)
+    assert page.url.endswith(ALARMS)
+    await log_in(page, "operator", password)
+    await expect(page.locator(ROW)).to_be_visible(timeout=FIRST_MS)
+    await page.get_by_role("button", name="Log out").click()
+    await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
+    await page.reload()
+    await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
