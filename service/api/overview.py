@@ -1,6 +1,5 @@
 """The overview, put together for many clients: what has changed is rendered once for them all."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
@@ -24,7 +23,7 @@ from service.api.rendering import worked
 from service.api.times import rfc3339
 from service.api.views import latest_model, source_model
 
-NO_AGE = re.compile(rb'(?<="age_s":)null|(?<="data_age_s":)null')
+DATA_AGE, AGE, NONE = b'"data_age_s":', b'"age_s":', b"null"
 
 NO_UNITS = b'"units":[]}'
 
@@ -60,7 +59,7 @@ class UnitPart:
     def filled(self, ages_s: Sequence[float | None]) -> bytes:
         """The JSON with these ages."""
         first, *others = self.pieces
-        ages = (b"null" if age_s is None else repr(age_s).encode() for age_s in ages_s)
+        ages = (NONE if age_s is None else repr(age_s).encode() for age_s in ages_s)
         return b"".join([first, *(x for pair in zip(ages, others, strict=True) for x in pair)])
 
 
@@ -124,7 +123,7 @@ class Overview:
             films=[film_brief(context, unit, bearing.id) for bearing in settings.bearing],
         )
         content = model.model_dump_json().encode()
-        return UnitPart(state, NO_AGE.split(content), digest_of(content))
+        return UnitPart(state, _around_ages(content), digest_of(content))
 
     def _ageless(self, unit: str, bearing: str) -> LatestModel:
         """A bearing now, made anew only after a new result."""
@@ -154,6 +153,13 @@ class Overview:
             evidence=_evidence(context),
             units=[],
         )
+
+
+def _around_ages(content: bytes) -> list[bytes]:
+    """What stands around the ages about a unit, which are all null: its source's comes first."""
+    source, bearings = content.split(DATA_AGE + NONE, 1)
+    *before, last = bearings.split(AGE + NONE)
+    return [source + DATA_AGE, *(piece + AGE for piece in before), last]
 
 
 def _evidence(context: Context) -> EvidenceStatusModel | None:
