@@ -68,7 +68,7 @@ async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
 
     await page.goto(f"{alarmed_plant.url}#/recordings")
     recording = page.locator("[data-recording]").first
-    await expect(recording).to_contain_text("Shaft vibration 1×, x raised")
+    await expect(recording).to_contain_text("UJB: Shaft vibration 1×, x")
     await recording.get_by_role("button", name="Check").press("Enter")
     await expect(recording).to_contain_text("Checked, whole")
     await expect(page.locator(".recordings .advice").first).to_contain_text("12 channels at 600")

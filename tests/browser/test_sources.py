@@ -37,6 +37,7 @@ async def test_a_source_in_good_health_says_what_arrives_from_where(
     await expect(facts).to_contain_text("Modbus, block ring")
     await expect(facts).to_contain_text("127.0.0.1:")
     await expect(facts).to_contain_text("Not checked: the plant file gives none")
+    await expect(row.locator("[data-head=Poll]")).to_contain_text("s")
     [source] = await (await page.request.get(f"{running_plant.url}api/v1/sources")).json()
     shown = await row.locator("[data-head=Received]").inner_text()
     assert 0 < int(re.sub(r"\D", "", shown)) <= source["n_stored"] + source["n_flagged"]

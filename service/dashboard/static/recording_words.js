@@ -26,8 +26,9 @@ export function alarmIdWords(id) {
 /** What a recording was made for: the alarm that began it, and how many joined. */
 export function occasionWords({ alarms }) {
   if (alarms.length === 0) return "Made for no alarm";
-  const more = alarms.length > 1 ? `, and ${alarms.length - 1} more` : "";
-  return `${alarmIdWords(alarms[0].alarm)} ${changeWords(alarms[0].change)}${more}`;
+  const [{ alarm, change }, ...others] = alarms;
+  const how = change === "raised" ? "" : ` (${changeWords(change)})`;
+  return alarmIdWords(alarm) + how + (others.length ? ` and ${others.length} more` : "");
 }
 
 /** An alarm whose samples are still being written. */

@@ -56,8 +56,8 @@ export function shareWords(count, all) {
   return `${formatCount(count)} (${percent < 0.01 ? "< 0.01" : formatFixed(percent, 2)} %)`;
 }
 
-/** Rejected samples by reason: `checksum 600, late 50`. */
-export function reasonsWords({ rejected: byReason }) {
+/** Counts by reason: `checksum 600, late 50`. */
+export function reasonsWords(byReason) {
   return Object.entries(byReason)
     .filter(([, count]) => count > 0)
     .map(([reason, count]) => `${reason.replaceAll("_", " ")} ${formatCount(count)}`)

@@ -6,6 +6,7 @@ import { element, setText } from "../dom.js";
 import { formatAge, formatTime } from "../format.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
+import { wayLinks } from "../parts/ways.js";
 import { bearingAddress, unitAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
 import { estimatorTable } from "./estimator_table.js";
@@ -55,7 +56,7 @@ function headPart(unitId, bearingId) {
   const source = sourceView();
   const state = element("div", { class: "state" }, quality.node, why, age);
   return {
-    node: element("header", { class: "bearing-head" }, siblings, title, state, source.node),
+    node: element("header", { class: "bearing-head" }, siblings, title, state, source.node, wayLinks(unitId, bearingId, bearingAddress(unitId, bearingId))),
     draw(latest, unit) {
       drawSiblings(siblings, unit, bearingId);
       setText(title, `${unit.name}, ${bearingId}`);

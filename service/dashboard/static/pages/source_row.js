@@ -7,7 +7,7 @@ import { mark } from "../parts/mark.js";
 import { unitAddress } from "../route.js";
 import { addressWords, identityWords, reasonsWords, received, rejected, shareWords, sourceKindWords } from "../source_words.js";
 
-export const HEADS = ["Unit", "State", "For", "Data age", "Received", "Missing", "Rejected", "Lag", "Device clock", ""];
+export const HEADS = ["Unit", "State", "For", "Data age", "Received", "Missing", "Rejected", "Lag", "Device clock", "Poll", ""];
 
 const DASH = "—";
 
@@ -57,6 +57,7 @@ function lineWords(source, nowMs) {
     shareWords(rejected(source), source.n_offered),
     source.last_sample_time === null ? DASH : `${formatFixed((nowMs - Date.parse(source.last_sample_time)) / 1000, 1)} s`,
     clockBrief(source.clock),
+    source.polls === null ? DASH : durationWords(source.polls.newest_s),
   ];
 }
 
@@ -72,7 +73,7 @@ function factsOf(source, settings) {
     ["Error now", source.reason ?? "None"],
     ["Attempts that failed since the start", formatCount(source.n_failed)],
     ["Received: all good, some channel not good", `${formatCount(source.n_stored)}, ${formatCount(source.n_flagged)}`],
-    ["Rejected", reasonsWords(source) || "None"],
+    ["Rejected", reasonsWords(source.rejected) || "None"],
     ["Sent twice, dropped", formatCount(source.n_repeated)],
     ["Restarts of the device", formatCount(source.n_restarts)],
     ["Clock drift", driftWords(source.clock)],
@@ -80,10 +81,19 @@ function factsOf(source, settings) {
     ["Kind", sourceKindWords(source.kind)],
     ["Sampling", `${formatFixed(source.rate_hz, source.rate_hz % 1 ? 2 : 0)} per second and channel`],
     ["Asked every", source.poll_period_s === null ? "It sends by itself" : `${source.poll_period_s} s`],
+    ["A poll takes", pollWords(source)],
   ];
+  if (source.kind === "can") facts.push(["Frames not used", reasonsWords(source.refused_frames) || "None"]);
   if (settings) facts.push(["Address", addressWords(settings)], ["Identity", identityWords(settings)]);
   return facts;
 }
+
+function pollWords({ polls, poll_period_s: period }) {
+  if (polls === null) return period === null ? "It is not asked" : "Not known yet";
+  return `${durationWords(polls.newest_s)}, on average ${durationWords(polls.mean_s)}`;
+}
+
+const durationWords = (seconds) => (seconds < 1 ? `${formatFixed(1000 * seconds, 0)} ms` : `${formatFixed(seconds, 1)} s`);
 
 function driftWords(clock) {
   if (!clock || clock.drift_ppm === null) return "Not known yet";

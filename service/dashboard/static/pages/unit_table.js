@@ -8,7 +8,8 @@ import { centrePicture } from "../parts/centre_picture.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingView } from "../parts/reading.js";
 import { stiffnessBrief } from "../parts/stiffness_brief.js";
-import { bearingAddress, filmAddress } from "../route.js";
+import { wayLinks } from "../parts/ways.js";
+import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
 
 const NO_SPREAD = () => null;
@@ -53,7 +54,7 @@ export function unitTable(unit) {
 }
 
 function tableRow(unit, bearings, [head, words, view]) {
-  const cells = bearings.map((bearing) => (view ? view() : { node: links(unit, bearing), draw() {} }));
+  const cells = bearings.map((bearing) => (view ? view() : { node: wayLinks(unit, bearing), draw() {} }));
   const boxes = cells.map((cell, n) => element("td", { role: "cell", "data-head": bearings[n], "data-bearing": bearings[n] }, cell.node));
   const title = element("th", { scope: "row", role: "rowheader" }, head, element("small", {}, words));
   return { cells, node: element("tr", { role: "row" }, title, ...boxes) };
@@ -123,9 +124,4 @@ function qualityCell() {
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
     },
   };
-}
-
-function links(unit, bearing) {
-  const ways = [["Numbers and charts", bearingAddress(unit, bearing)], ["Film and baseline", filmAddress(unit, bearing)]];
-  return element("ul", { class: "ways" }, ...ways.map(([words, href]) => element("li", {}, element("a", { href }, words))));
 }

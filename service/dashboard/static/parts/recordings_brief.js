@@ -43,5 +43,5 @@ function whatElse(nLines, error) {
 
 function recordingLine(recording) {
   const what = element("strong", {}, recordingTime(recording));
-  return element("li", { "data-recording": recording.id }, what, element("span", {}, `${occasionWords(recording)}, ${lengthWords(recording)}`));
+  return element("li", { "data-recording": recording.id }, what, element("span", {}, `${occasionWords(recording)} · ${lengthWords(recording)}`));
 }
