@@ -1,5 +1,6 @@
 /** What somebody may do to one alarm: acknowledge it, shelve it, bring it back. */
 
+import { kindWords, placeWords } from "../alarm_words.js";
 import { tell } from "../api.js";
 import { element, setText } from "../dom.js";
 import { may } from "../session.js";
@@ -11,7 +12,16 @@ const DURATIONS = [
   ["86400", "24 h"],
 ];
 
-/** Returns `{ node, draw(alarm) }`; `again` asks for the list afresh. */
+const DONE = {
+  acknowledge: "acknowledged",
+  reset: "reset",
+  shelve: "shelved",
+  unshelve: "back from the shelf",
+  comment: "commented",
+  "return-to-service": "back in service",
+};
+
+/** Returns `{ node, draw(alarm) }`; `again(sentence)` hears what was done, null for nothing, and asks afresh. */
 export function alarmActions(actor, again) {
   let alarm = null;
   const failure = element("span", { class: "action-failure", role: "alert" });
@@ -22,15 +32,16 @@ export function alarmActions(actor, again) {
       setText(failure, "Give your name first.");
       return false;
     }
+    const sentence = `${placeWords(alarm)}, ${kindWords(alarm.kind)}: ${DONE[action]}.`;
     try {
       await tell(["alarms", alarm.id, action], { actor: name, ...body });
       setText(failure, "");
+      again(sentence);
       return true;
     } catch (error) {
       setText(failure, error.message);
+      again(null);
       return false;
-    } finally {
-      again();
     }
   }
 
@@ -38,10 +49,10 @@ export function alarmActions(actor, again) {
   const reset = button("Reset", () => act("reset"));
   const unshelve = button("Unshelve", () => act("unshelve"));
   const back = button("Return to service", () => act("return-to-service"));
-  const form = shelfForm((body) => act("shelve", body));
   const shelve = button("Shelve…", () => form.open());
-  const words = commentForm((body) => act("comment", body));
+  const form = shelfForm((body) => act("shelve", body), shelve);
   const comment = button("Comment…", () => words.open());
+  const words = commentForm((body) => act("comment", body), comment);
   return {
     node: element("span", { class: "actions" }, acknowledge, reset, shelve, unshelve, back, comment, form.node, words.node, failure),
     draw(now) {
@@ -56,46 +67,42 @@ export function alarmActions(actor, again) {
   };
 }
 
-function shelfForm(submit) {
+function shelfForm(submit, opener) {
   const reason = element("input", { required: "", maxlength: "500", "aria-label": "Why it is shelved", placeholder: "why" });
   const choices = DURATIONS.map(([value, words]) => element("option", { value }, words));
   const duration = element("select", { "aria-label": "For how long" }, ...choices);
-  const close = button("Cancel", () => (node.hidden = true));
-  const send = element("button", { type: "submit" }, "Shelve");
-  const node = element("form", { class: "shelf-form", hidden: "" }, reason, duration, send, close);
-  node.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    if (await submit({ reason: reason.value.trim(), duration_s: Number(duration.value) })) {
-      node.hidden = true;
-      reason.value = "";
-    }
-  });
-  return {
-    node,
-    open() {
-      node.hidden = false;
-      reason.focus();
-    },
-  };
+  return foldingForm("Shelve", [reason, duration], opener, () =>
+    submit({ reason: reason.value.trim(), duration_s: Number(duration.value) }),
+  );
 }
 
-function commentForm(submit) {
+function commentForm(submit, opener) {
   const text = element("input", { required: "", maxlength: "500", "aria-label": "Comment", placeholder: "what to remember" });
-  const close = button("Cancel", () => (node.hidden = true));
-  const send = element("button", { type: "submit" }, "Comment");
-  const node = element("form", { class: "shelf-form", hidden: "" }, text, send, close);
+  return foldingForm("Comment", [text], opener, () => submit({ text: text.value.trim() }));
+}
+
+/** A form in place of the button that opens it; the keyboard goes in with it, and back when it closes. */
+function foldingForm(words, fields, opener, send) {
+  const cancel = button("Cancel", close);
+  const node = element("form", { class: "shelf-form", hidden: "" }, ...fields, element("button", { type: "submit" }, words), cancel);
+  function close() {
+    node.hidden = true;
+    opener.hidden = false;
+    opener.focus();
+  }
+  node.addEventListener("keydown", (key) => key.key === "Escape" && close());
   node.addEventListener("submit", async (event) => {
     event.preventDefault();
-    if (await submit({ text: text.value.trim() })) {
-      node.hidden = true;
-      text.value = "";
-    }
+    if (!(await send())) return;
+    fields[0].value = "";
+    close();
   });
   return {
     node,
     open() {
       node.hidden = false;
-      text.focus();
+      opener.hidden = true;
+      fields[0].focus();
     },
   };
 }

@@ -22,13 +22,17 @@ const N_EVENTS = "50";
 export function alarmsPage(main) {
   const state = mark();
   const actor = actorField("act_on_alarms", "act on alarms", "before you acknowledge");
-  const again = () => [lists, histories].forEach((each) => each.again());
+  const done = element("span", { class: "done", role: "status" });
+  const again = (sentence) => {
+    setText(done, sentence ?? "");
+    for (const each of [lists, histories]) each.again();
+  };
   const listed = alarmTable("On the list", "Nothing is on the list.", actor, again);
   const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);
   const unjudged = unjudgedView();
   const rates = ratesLine();
   const history = historyTable();
-  const head = element("div", { class: "alarms-head" }, element("h1", {}, "Alarms"), state.node, actor.node);
+  const head = element("div", { class: "alarms-head" }, element("h1", { tabindex: "-1" }, "Alarms"), state.node, done, actor.node);
   const delivery = deliveryView();
   main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, rates.node, history.node);
   let heard = null;
@@ -46,8 +50,10 @@ export function alarmsPage(main) {
     try {
       const found = await ask(["alarms"], [], signal);
       [heard, failure] = [moment(), null];
-      listed.draw(found.alarms.filter((alarm) => !isHidden(alarm)));
-      hidden.draw(found.alarms.filter(isHidden));
+      keepingFocus(main, () => {
+        listed.draw(found.alarms.filter((alarm) => !isHidden(alarm)));
+        hidden.draw(found.alarms.filter(isHidden));
+      });
       unjudged.draw(found.unjudged);
     } catch (error) {
       if (signal.aborted) return;
@@ -93,6 +99,16 @@ export function alarmsPage(main) {
       deliveries.stop();
     },
   };
+}
+
+/** A button that was pressed may go away with what it did: the keyboard goes on at its row, or at the top. */
+function keepingFocus(main, draw) {
+  const focused = document.activeElement;
+  const row = focused.closest("tr");
+  draw();
+  if (focused.isConnected && !focused.closest("[hidden]")) return;
+  const next = row?.isConnected ? [...row.querySelectorAll("button")].find((button) => !button.closest("[hidden]")) : null;
+  (next ?? main.querySelector("h1")).focus();
 }
 
 function silenceWords(silenceS, failure) {

@@ -16,7 +16,8 @@ export function bar(pages, alarmsPattern) {
   const ways = navigation(pages);
   const person = personView();
   part("alarms").append(alarms.node);
-  part("bar").append(person.node, ways.button, ways.node);
+  ways.node.append(person.node);
+  part("bar").append(ways.button, ways.node);
   return {
     draw(view) {
       setText(part("plant"), view.plant ?? "");
