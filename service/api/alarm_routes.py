@@ -33,11 +33,13 @@ from service.api.alarm_requests import (
     OutageModel,
     ShelveModel,
 )
+from service.api.alarm_tables import event_table
 from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.rendering import rendered_now
+from service.api.rendering import rendered, rendered_now, worked
+from service.api.tables import Format, table_content, table_response
 from service.api.times import ns_from_datetime, require_order
 from service.security.roles import Permission
 from service.store.port import AlarmQuery
@@ -86,13 +88,29 @@ def alarm_router(context: Context) -> APIRouter:
             lambda: alarm_list_model(engine, films, origin, context.clock.now_ns())
         )
 
-    @router.get("/events", summary="History of all alarms", responses=EVENT_PROBLEMS)
-    async def events(query: Annotated[AlarmQuery, Depends(event_query)]) -> AlarmEventsModel:
-        """Every transition of every alarm, newest first, page by page."""
+    @router.get(
+        "/events",
+        summary="History of all alarms",
+        response_model=AlarmEventsModel,
+        responses={**EVENT_PROBLEMS, **table_content("History of all alarms")},
+    )
+    async def events(
+        query: Annotated[AlarmQuery, Depends(event_query)], wanted: Format
+    ) -> Response:
+        """Every transition of every alarm, newest first, page by page.
+
+        As CSV or Parquet, too: a row for each transition.
+        """
         one_more = AlarmQuery(**{**vars(query), "limit": query.limit + 1})
-        found = await asyncio.to_thread(context.store.alarm_events, one_more)
-        page = list(found[: query.limit])
-        return alarm_events_model(page, context.origin, there_is_more=len(found) > query.limit)
+        found = await worked(lambda: context.store.alarm_events(one_more))
+        page, is_more = list(found[: query.limit]), len(found) > query.limit
+        if wanted == "json":
+            return await rendered(
+                lambda: alarm_events_model(page, context.origin, there_is_more=is_more)
+            )
+        columns = await worked(lambda: event_table(page))
+        cursor = str(page[-1].id) if is_more else None
+        return table_response(wanted, columns, "alarm-events", cursor)
 
     return router
 

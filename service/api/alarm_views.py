@@ -133,12 +133,13 @@ def alarm_events_model(
     """A page of the history."""
     return AlarmEventsModel(
         origin=origin.value,
-        events=[_event(stored) for stored in events],
+        events=[event_model(stored) for stored in events],
         next_before=events[-1].id if there_is_more else None,
     )
 
 
-def _event(stored: StoredEvent) -> AlarmEventModel:
+def event_model(stored: StoredEvent) -> AlarmEventModel:
+    """One line of the history."""
     event, identity = stored.event, stored.event.identity
     return AlarmEventModel(
         id=stored.id,

@@ -1,16 +1,19 @@
 """The audit trail over HTTP: who did what to what."""
 
-import asyncio
 import json
+from collections.abc import Sequence
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Depends, Query, Response
 
 from service.api.access.declared import needs
 from service.api.audit_models import AuditEntryModel, AuditModel
+from service.api.audit_tables import audit_table
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import described_problems
+from service.api.rendering import rendered, worked
+from service.api.tables import Format, table_content, table_response
 from service.api.times import ns_from_datetime, require_order, rfc3339
 from service.audit.entry import MAX_NAME, AuditEntry
 from service.security.roles import Permission
@@ -27,19 +30,35 @@ def audit_router(context: Context) -> APIRouter:
         prefix="/api/v1/audit", tags=["audit"], dependencies=[needs(Permission.READ_AUDIT)]
     )
 
-    @router.get("", summary="Audit trail", responses=PROBLEMS)
-    async def audit(query: Annotated[AuditQuery, Depends(audit_query)]) -> AuditModel:
-        """Who did what to what, before and after: newest first, page by page."""
+    @router.get(
+        "",
+        summary="Audit trail",
+        response_model=AuditModel,
+        responses={**PROBLEMS, **table_content("Audit trail")},
+    )
+    async def audit(query: Annotated[AuditQuery, Depends(audit_query)], wanted: Format) -> Response:
+        """Who did what to what, before and after: newest first, page by page.
+
+        As CSV or Parquet, too: a row for each entry, what was before and after as JSON.
+        """
         one_more = AuditQuery(**{**vars(query), "limit": query.limit + 1})
-        found = await asyncio.to_thread(context.store.audit.entries, one_more)
+        found = await worked(lambda: context.store.audit.entries(one_more))
         page = list(found[: query.limit])
-        return AuditModel(
-            entries=[_model(entry) for entry in page],
-            next_before=page[-1].number if len(found) > query.limit else None,
-            head_error=context.store.audit.head_error,
-        )
+        next_before = page[-1].number if len(found) > query.limit else None
+        if wanted == "json":
+            head_error = context.store.audit.head_error
+            return await rendered(lambda: _answer(page, next_before, head_error))
+        cursor = None if next_before is None else str(next_before)
+        return table_response(wanted, audit_table(page), "audit", cursor)
 
     return router
+
+
+def _answer(
+    page: Sequence[AuditEntry], next_before: int | None, head_error: str | None
+) -> AuditModel:
+    entries = [_model(entry) for entry in page]
+    return AuditModel(entries=entries, next_before=next_before, head_error=head_error)
 
 
 def audit_query(

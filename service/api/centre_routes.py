@@ -12,9 +12,11 @@ from service.api.context import BearingId, Context, UnitId
 from service.api.film_conditions import states_named
 from service.api.film_routes import States
 from service.api.problems import problem_responses
-from service.api.rendering import rendered
+from service.api.rendering import rendered, worked
+from service.api.tables import Column, Format, table_content, table_response
 from service.api.times import rfc3339
 from service.api.trend_routes import HOLE_HOPS, MAX_POINTS
+from service.api.trend_tables import trend_table
 from service.api.trend_views import bucket_s, simulated_until, times_s, trend_columns
 from service.api.views import LEVEL_NAMES
 from service.security.roles import Permission
@@ -43,12 +45,16 @@ def centre_router(context: Context) -> APIRouter:
         "/{bearing}/shaft-centre",
         summary="Shaft centre line",
         response_model=CentreLineModel,
-        responses=problem_responses(404, 422, 503),
+        responses={
+            **problem_responses(404, 422, 503),
+            **table_content("Shaft centre line, by column"),
+        },
     )
     async def shaft_centre(
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
+        wanted: Format,
         oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
         state: States = None,
         max_points: Annotated[
@@ -56,7 +62,10 @@ def centre_router(context: Context) -> APIRouter:
             Query(ge=2, le=MAX_POINTS, description="More readings are gathered into buckets."),
         ] = 1000,
     ) -> Response:
-        """Where the shaft's centre was in its bearing, oldest first, with its uncertainty."""
+        """Where the shaft's centre was in its bearing, oldest first, with its uncertainty.
+
+        As CSV or Parquet, too: a row for each time.
+        """
         context.bearing(unit, bearing)
         query = TrendQuery(
             unit=unit,
@@ -69,8 +78,11 @@ def centre_router(context: Context) -> APIRouter:
             oil_temperature_c=oil_temperature,
             states=states_named(state),
         )
-        clearance_um = context.references.bearing(unit, bearing).clearance_um
-        return await rendered(lambda: _line(context, query, clearance_um))
+        if wanted == "json":
+            clearance_um = context.references.bearing(unit, bearing).clearance_um
+            return await rendered(lambda: _line(context, query, clearance_um))
+        columns = await worked(lambda: _table(context, query))
+        return table_response(wanted, columns, f"shaft-centre-{unit}-{bearing}")
 
     return router
 
@@ -89,6 +101,11 @@ def _line(context: Context, query: TrendQuery, clearance_um: float) -> CentreLin
         time=times_s(trend),
         **{name: _column(trend, quantity) for name, quantity in COLUMNS.items()},
     )
+
+
+def _table(context: Context, query: TrendQuery) -> list[Column]:
+    past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
+    return trend_table(context.store.trend(query), None, past_end_ns)
 
 
 def _column(trend: Trend, quantity: str) -> CentreColumnModel:

@@ -22,6 +22,16 @@ MEDIA_TYPES: dict[str, FormatName] = {
     "text/csv": "csv",
     "application/vnd.apache.parquet": "parquet",
 }
+CURSOR_HEADER = "Padwatch-Next-Cursor"
+
+CURSOR = {
+    "description": "In tables: where the next page begins; not there on the last.",
+    "schema": {"type": "string"},
+    "example": "1795248192400000000",
+}
+
+CSV_EXAMPLE = "time_utc,speed_rpm_mean [r/min]\r\n2026-11-21T09:03:12.400Z,90.91\r\n"
+
 TYPE_OF = {name: media_type for media_type, name in MEDIA_TYPES.items()}
 
 ROWS_AT_ONCE = 500
@@ -86,9 +96,9 @@ Format = Annotated[FormatName, Depends(wanted_format)]
 def table_content(words: str) -> dict[int | str, dict[str, Any]]:
     """OpenAPI entry for an answer that is there as a table, too."""
     binary = {"schema": {"type": "string", "format": "binary"}}
-    text = {"schema": {"type": "string"}}
+    text = {"schema": {"type": "string"}, "example": CSV_EXAMPLE}
     content = {TYPE_OF["csv"]: text, TYPE_OF["parquet"]: binary}
-    return {200: {"description": words, "content": content}}
+    return {200: {"description": words, "content": content, "headers": {CURSOR_HEADER: CURSOR}}}
 
 
 def table_response(
@@ -101,7 +111,7 @@ def table_response(
     name
         Of the file, without its suffix.
     next_cursor
-        Goes into the header Padwatch-Next-Cursor.
+        Goes into the header `CURSOR_HEADER`.
     """
     pieces = csv_pieces(columns) if wanted == "csv" else iter([parquet_file(columns)])
     headers = {
@@ -109,7 +119,7 @@ def table_response(
         "X-Content-Type-Options": "nosniff",
     }
     if next_cursor is not None:
-        headers["Padwatch-Next-Cursor"] = next_cursor
+        headers[CURSOR_HEADER] = next_cursor
     return StreamingResponse(pieces, media_type=TYPE_OF[wanted], headers=headers)
 
 
