@@ -177,7 +177,9 @@ async def _run(
         refusals=audit.refusals,
         access=desk,
     )
-    server = server_of(create_app(context), plant, clock)
+    app = create_app(context)
+    app.openapi()  # kept from now on: no client waits for it, nor samples for a client
+    server = server_of(app, plant, clock)
     stopped = _stop_on_signals()
     try:
         async with asyncio.TaskGroup() as tasks:

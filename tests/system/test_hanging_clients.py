@@ -14,8 +14,12 @@ HANGING = (
     b"GET / HTTP/1.1\r\nHost: localhost\r\nX-Slow: ",
     b"POST /api/v1/alarms HTTP/1.1\r\nHost: localhost\r\nContent-Length: 60000\r\n\r\n[",
     b"GET /static/plotly.min.js HTTP/1.1\r\nHost: localhost\r\n\r\n" * 8,
+    b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    b"GET /api/v1/units/U1/bearings/UJB/film/readings?format=parquet HTTP/1.1\r\n"
+    b"Host: localhost\r\n\r\n",
 )
-"""Silent, never ending their headers or their body, never reading megabytes."""
+"""Silent, never ending their headers or their body, never reading megabytes, idle after an answer,
+not reading a table."""
 
 
 async def test_the_service_serves_and_stops_among_hanging_clients(
@@ -28,7 +32,7 @@ async def test_the_service_serves_and_stops_among_hanging_clients(
     url = await service.wait_for_url()
     host, _, port = url.removeprefix("http://").partition(":")
     async with AsyncExitStack() as stack:
-        for n in range(80):
+        for n in range(120):
             _, writer = await asyncio.open_connection(host, int(port), limit=1024)
             stack.callback(writer.close)
             writer.write(HANGING[n % len(HANGING)])
