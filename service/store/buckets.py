@@ -10,7 +10,25 @@ from core.quality import Level
 from service.store.port import Trend, TrendSeries
 from service.store.summaries import IntArray, Summaries
 
-NICE_WIDTHS_S = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
+NICE_WIDTHS_S = (
+    1,
+    2,
+    5,
+    10,
+    15,
+    30,
+    60,
+    120,
+    300,
+    600,
+    1200,
+    1800,
+    3600,
+    7200,
+    14400,
+    21600,
+    43200,
+)
 NICE_WIDTHS_NS = tuple(width * 1_000_000_000 for width in NICE_WIDTHS_S)
 DAY_NS = 86_400_000_000_000
 MAX_DAYS = (2**63 - 1) // DAY_NS
@@ -53,12 +71,11 @@ def bucketed(readings: Summaries, width_ns: int) -> Trend:
     if readings.time_ns.size == 0:
         nothing = {name: TrendSeries([], [], [], [], []) for name in readings.names}
         return Trend(width_ns, [], nothing)
-    number = readings.time_ns // width_ns
+    summed = readings.in_spans(width_ns)
+    number = summed.time_ns // width_ns
     first = int(number[0])
     n_buckets = int(number[-1]) - first + 1
-    starts = np.flatnonzero(np.diff(number, prepend=first - 1))
-    filled = number[starts] - first
-    summed = readings.summed(starts, number[starts] * width_ns)
+    filled = number - first
     series = {
         name: _bucket_series(summed, column, filled, n_buckets)
         for column, name in enumerate(summed.names)

@@ -81,6 +81,14 @@ class Summaries:
             self.level[:, columns],
         )
 
+    def in_spans(self, width_ns: int) -> "Summaries":
+        """One summary for each aligned span of this width that has any, of rows in order."""
+        if self.time_ns.size == 0:
+            return self
+        number = self.time_ns // width_ns
+        starts = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
+        return self.summed(starts, number[starts] * width_ns)
+
     def summed(self, starts: IntArray, time_ns: IntArray) -> "Summaries":
         """One summary for each run of rows.
 

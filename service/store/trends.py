@@ -42,9 +42,14 @@ def select_page(reader: sqlite3.Connection, query: TrendQuery) -> Summaries:
 
 
 def select_readings(
-    reader: sqlite3.Connection, query: TrendQuery, spans: Iterable[Span]
-) -> Summaries:
-    """Readings of one bearing in some spans of time, oldest first.
+    reader: sqlite3.Connection, query: TrendQuery, spans: Iterable[Span], width_ns: int
+) -> tuple[int, Summaries]:
+    """How many readings of one bearing there are in some spans of time, and they, oldest first.
+
+    Parameters
+    ----------
+    width_ns
+        What is more than ``max_points`` is summed up in buckets of this width as it is read.
 
     Raises
     ------
@@ -52,10 +57,14 @@ def select_readings(
         If they are more than `MAX_ROWS`.
     """
     layouts = select_layouts(reader)
-    parts = [decoded_rows([], layouts, query.quantities)]
+    n_readings, single, summed = 0, [decoded_rows([], layouts, query.quantities)], []
     for rows in _chunks(reader, query, spans):
-        parts.append(decoded_rows(rows, layouts, query.quantities))
-    return Summaries.together(parts)
+        n_readings += len(rows)
+        single.append(decoded_rows(rows, layouts, query.quantities))
+        if n_readings > query.max_points:
+            summed += [part.in_spans(width_ns) for part in single]
+            single = []
+    return n_readings, Summaries.together([*summed, *single])
 
 
 def _chunks(

@@ -15,6 +15,9 @@ from service.store.rollups.widths import HOUR_NS
 from service.store.summaries import IntArray, Summaries
 from service.store.trends import Span, arguments
 
+MAX_SPANS = 4096
+"""That many are read at a time, so that no range needs more memory than another."""
+
 REDONE = """
     SELECT start_ns FROM rollup_redo
     WHERE series = ? AND start_ns >= ? AND start_ns < ? ORDER BY start_ns
@@ -28,7 +31,7 @@ class Cover:
     Parameters
     ----------
     summaries
-        Roll-ups, of which every reading is wanted.
+        Out of roll-ups of which every reading is wanted, summed up in buckets.
     spans
         Where single readings are to be read instead.
     rolled_spans
@@ -44,7 +47,11 @@ class Cover:
 
 
 def covered(
-    reader: sqlite3.Connection, query: TrendQuery, whole: Span, widths_ns: Sequence[int]
+    reader: sqlite3.Connection,
+    query: TrendQuery,
+    whole: Span,
+    widths_ns: Sequence[int],
+    bucket_ns: int,
 ) -> Cover:
     """Cover a range of time.
 
@@ -52,21 +59,25 @@ def covered(
     ----------
     widths_ns
         Of the roll-ups that fit the buckets asked for, finest first.
+    bucket_ns
+        Width of those buckets.
     """
     found = reader.execute(
         "SELECT id FROM series WHERE unit = ? AND bearing = ?", (query.unit, query.bearing)
     ).fetchone()
     if found is None:
         return Cover()
-    covering = _Covering(reader, query, int(found[0]))
+    covering = _Covering(reader, query, int(found[0]), bucket_ns)
     covering.take(whole, widths_ns)
     covering.cover.spans.sort()
     return covering.cover
 
 
 class _Covering:
-    def __init__(self, reader: sqlite3.Connection, query: TrendQuery, series: int) -> None:
-        self._reader, self._series = reader, series
+    def __init__(
+        self, reader: sqlite3.Connection, query: TrendQuery, series: int, bucket_ns: int
+    ) -> None:
+        self._reader, self._series, self._bucket_ns = reader, series, bucket_ns
         self._names = query.quantities
         self._mark_ns = select_mark(reader, series)
         conditions = arguments(query)
@@ -86,7 +97,9 @@ class _Covering:
             self.take(span, finer_ns)
             return
         self.take((span[0], inner[0]), finer_ns)
-        self._take_inner(inner, width_ns, finer_ns)
+        for start_ns in range(inner[0], inner[1], MAX_SPANS * width_ns):
+            some = _within(inner, (start_ns, start_ns + MAX_SPANS * width_ns))
+            self._take_inner(some, width_ns, finer_ns)
         self.take((inner[1], span[1]), finer_ns)
 
     def _gathered_until(self, end_ns: int, width_ns: int) -> int:
@@ -112,7 +125,7 @@ class _Covering:
     def _use(self, cells: Cells, rows: npt.NDArray[np.bool_], width_ns: int) -> None:
         if rows.any():
             chosen = cells.summaries.at(rows)
-            self.cover.summaries.append(chosen)
+            self.cover.summaries.append(chosen.in_spans(self._bucket_ns))
             self.cover.n_rolled += int(cells.conditions.n_readings[rows].sum())
             self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)
 

@@ -24,12 +24,12 @@ def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
     width_ns = bucket_width_ns(*whole, query.max_points)
     fitting_ns = [width for width in WIDTHS_NS if width_ns % width == 0]
     reader.execute("BEGIN")  # one state of the database for all that is read
-    cover = covered(reader, query, whole, fitting_ns)
-    singles = select_readings(reader, query, cover.spans)
-    if cover.n_rolled + singles.time_ns.size > query.max_points:
+    cover = covered(reader, query, whole, fitting_ns, width_ns)
+    n_single, singles = select_readings(reader, query, cover.spans, width_ns)
+    if cover.n_rolled + n_single > query.max_points:
         return bucketed(Summaries.together([*cover.summaries, singles]), width_ns)
     if cover.n_rolled:
-        singles = select_readings(reader, query, _all_spans(cover))
+        _, singles = select_readings(reader, query, _all_spans(cover), width_ns)
     return single_points(singles, query.hole_ns)
 
 

@@ -15,6 +15,7 @@ from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.quality import GOOD, Level, Reading, Reason, missing, uncertain
+from service.store import trends
 from service.store.port import StoreError, Trend, TrendQuery
 from service.store.rollups import cover, rolling
 from service.store.sqlite import SqliteStore
@@ -115,6 +116,8 @@ def test_roll_ups_say_what_single_readings_say(
     plain: SqliteStore, rolled: SqliteStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     n_used = count_roll_ups(monkeypatch)
+    monkeypatch.setattr(cover, "MAX_SPANS", 7)  # as a long time is read, piece by piece
+    monkeypatch.setattr(trends, "ROWS_AT_ONCE", 50)
 
     @given(STARTS, STARTS, st.integers(2, 90), BOUNDS, BOUNDS, DEGREES, DEGREES, STATES)
     @settings(max_examples=150, deadline=None)
@@ -294,3 +297,15 @@ def test_few_readings_of_a_long_time_stay_single(rolled: SqliteStore, plain: Sql
     assert rolled.trend(few).bucket_ns is None
     assert len(rolled.trend(few).time_ns) > 100
     require_same(rolled.trend(few), plain.trend(few))
+
+
+@pytest.mark.parametrize("reach", [2**63, 2**63 - 1, 10**21])
+def test_a_range_wider_than_any_date_is_everything(
+    rolled: SqliteStore, plain: SqliteStore, reach: int
+) -> None:
+    giant = replace(WHOLE, start_ns=-reach, end_ns=reach, max_points=2)
+
+    require_same(rolled.trend(giant), plain.trend(giant))
+    assert sum(rolled.trend(giant).series["speed_rpm"].count) > 100
+    later = replace(giant, start_ns=reach - 1)
+    assert list(rolled.trend(later).time_ns) == []
