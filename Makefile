@@ -4,9 +4,11 @@ PORT ?= 8080
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+NPM_FOLDER := tests/browser/javascript
+AXE := $(NPM_FOLDER)/node_modules/axe-core/axe.min.js
 SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-.PHONY: install run test check docs bench accuracy torture format lock clean
+.PHONY: install run axe test check docs bench accuracy torture format lock clean
 
 $(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
@@ -20,7 +22,15 @@ install: $(STAMP)
 run: install
 	@exec $(BIN)/padwatch demo --port $(PORT)
 
-test: install
+$(AXE): $(NPM_FOLDER)/package-lock.json
+	npm ci --prefix $(NPM_FOLDER) --ignore-scripts --prefer-offline --no-audit --no-fund --loglevel=error
+	touch $@
+
+axe:
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory $(AXE); \
+	else echo 'npm is not installed: pages are not tested with axe-core'; fi
+
+test: install axe
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: install
