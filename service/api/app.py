@@ -4,8 +4,10 @@ from importlib.metadata import version
 
 from fastapi import Depends, FastAPI
 
+from service.api.access.account_routes import account_router
 from service.api.access.application import GuardedApi
 from service.api.access.desk import AccessDesk
+from service.api.access.key_routes import key_router
 from service.api.access.session_routes import session_router
 from service.api.alarm_rate_routes import alarm_rate_router
 from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
@@ -95,6 +97,8 @@ def create_app(context: Context) -> FastAPI:
         audit_router(context),
         alarm_by_id_router(context),
         session_router(context, desk),
+        account_router(desk.registry),
+        key_router(context, desk.registry),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:

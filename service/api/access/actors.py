@@ -1,9 +1,20 @@
 """Whose name stands beside an action."""
 
-from service.audit.acting import acting
+from fastapi import Request
+
+from service.api.access.gate import identity_of
+from service.audit.acting import acting, name_actor
 from service.security.identity import LOCAL
 
 
 def actor_or(given: str | None) -> str:
     """The name of who has shown who he is; else the one that was given, or where he sits."""
     return acting().actor or given or LOCAL.name
+
+
+async def name_whoever_asks(request: Request) -> None:
+    """Let what is done by a request be told with a name also where nobody has to log in.
+
+    Not in a thread, as plain functions are: what is said there is not heard here.
+    """
+    name_actor(identity_of(request).actor)

@@ -9,13 +9,13 @@ from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.api.access.credentials import Credentials, Kind, credentials_of
 from service.api.access.locality import is_from_here
+from service.api.access.registry import AccessRegistry
 from service.api.access.work import AccessWork
 from service.security.backoff import Backoff
 from service.security.doors import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.security.identity import LOCAL, Identity
 from service.security.passwords import Hashing
 from service.security.people import People
-from service.security.roles import Role
 from service.security.sessions import SessionLimits
 from service.store.access_port import AccessStore
 
@@ -58,11 +58,12 @@ class AccessDesk:
         hashing: Hashing | None = None,
         limits: SessionLimits | None = None,
     ) -> None:
-        self.store, self._clock, self._limits = store, clock, limits
+        self._store, self._clock, self._limits = store, clock, limits
         self.asks_everybody = asks_everybody
         self._hashing = hashing or Hashing()
         self._people = People(store, self._hashing)
-        self.work = AccessWork()
+        self._work = AccessWork()
+        self.registry = AccessRegistry(store, self._people, self._work, clock)
 
     async def caller(self, scope: Scope) -> Caller:
         """Tell who sends a request.
@@ -89,24 +90,13 @@ class AccessDesk:
             If too many try at the same time.
         """
         now_ns, ticks_ns = self._clock.now_ns(), ns_from_s(self._clock.monotonic_s())
-        return await self.work.hashed(
+        return await self._work.hashed(
             lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns)
         )
 
     async def log_out(self, token: str) -> None:
         """End a session; one that is over already is fine."""
-        await self.work.looked_up(lambda: self._doors.log_out(token))
-
-    async def set_password(self, name: str, password: str) -> None:
-        """Change a password; all sessions of the account end.
-
-        Raises
-        ------
-        PasswordRefusedError, AccessRefusedError, TooManyLoginsError
-            If it is not accepted, there is no such account, or too many are hashed just now.
-        """
-        now_ns = self._clock.now_ns()
-        await self.work.hashed(lambda: self._people.set_password(name, password, now_ns))
+        await self._work.looked_up(lambda: self._doors.log_out(token))
 
     async def set_up(self, token: str, name: str, password: str) -> bool:
         """Make the first account, an admin; whether the token was good for it.
@@ -117,40 +107,29 @@ class AccessDesk:
             If one is not accepted, or too many are hashed just now.
         """
         now_ns = self._clock.now_ns()
-        return await self.work.hashed(lambda: self._people.set_up(token, name, password, now_ns))
-
-    async def add(self, name: str, role: Role, password: str) -> str:
-        """Add an account; return its name as it is stored.
-
-        Raises
-        ------
-        NameRefusedError, PasswordRefusedError, AccessRefusedError, TooManyLoginsError
-            If one is not accepted, there is one of that name, or too many are hashed just now.
-        """
-        now_ns = self._clock.now_ns()
-        return await self.work.hashed(lambda: self._people.add(name, role, password, now_ns))
+        return await self._work.hashed(lambda: self._people.set_up(token, name, password, now_ns))
 
     async def offer_set_up(self) -> str | None:
         """Draw the token with which the first account is made; None if nobody needs one."""
         if not self.asks_everybody:
             return None
         now_ns = self._clock.now_ns()
-        return await self.work.looked_up(lambda: self._people.offer_set_up(now_ns))
+        return await self._work.looked_up(lambda: self._people.offer_set_up(now_ns))
 
     async def has_accounts(self) -> bool:
         """Whether anybody could log in."""
-        return bool(await self.work.looked_up(self.store.accounts.all))
+        return bool(await self._work.looked_up(self._store.accounts.all))
 
     async def _proven(self, shown: Credentials) -> Identity | None:
         now_ns = self._clock.now_ns()
         if shown.kind is Kind.SESSION:
-            found = await self.work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
+            found = await self._work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
         elif shown.kind is Kind.KEY:
-            found = await self.work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
+            found = await self._work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
         else:
             return None
         return None if isinstance(found, Refusal) else found
 
     @cached_property
     def _doors(self) -> Doors:
-        return Doors(self.store, self._hashing, Backoff(), self._limits)
+        return Doors(self._store, self._hashing, Backoff(), self._limits)

@@ -92,7 +92,7 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
         identity = _person(identity_of(request))
         await _let_in(desk, request, identity.name, asked.password)
         with told_as_problems("new_password"):
-            await desk.set_password(identity.name, asked.new_password)
+            await desk.registry.set_password(identity.name, asked.new_password)
         let_in = await _let_in(desk, request, identity.name, asked.new_password)
         await tell(context.store.audit, context.clock, BEGUN, identity.name)
         return await _begun(desk, request, response, let_in)

@@ -1,8 +1,14 @@
 """What is said about who asks, accounts and keys."""
 
+from typing import Any
+
+from service.api.access.account_models import AccountModel
 from service.api.access.desk import AccessDesk, Caller
 from service.api.access.session_models import SessionModel
+from service.api.times import rfc3339
+from service.security.keys import ApiKey
 from service.security.roles import Permission
+from service.store.access_port import Account
 
 
 async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
@@ -16,3 +22,28 @@ async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
         role=identity.role.value if identity is not None else None,
         permissions=[p.value for p in Permission if identity is not None and identity.role.may(p)],
     )
+
+
+def account_model(account: Account) -> AccountModel:
+    """What is shown of an account: all but the hash of its password."""
+    return AccountModel(
+        name=account.name,
+        role=account.role.value,
+        created=rfc3339(account.created_ns),
+        password_set=rfc3339(account.password_ns),
+    )
+
+
+def key_model(key: ApiKey, now_ns: int) -> dict[str, Any]:
+    """What is shown of a key: all but its digest."""
+    return {
+        "id": key.id,
+        "name": key.name,
+        "role": key.role.value,
+        "units": list(key.units),
+        "state": key.state(now_ns).value,
+        "created": rfc3339(key.created_ns),
+        "expires": rfc3339(key.expires_ns),
+        "used": None if key.used_ns is None else rfc3339(key.used_ns),
+        "revoked": None if key.revoked_ns is None else rfc3339(key.revoked_ns),
+    }

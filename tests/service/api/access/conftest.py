@@ -10,6 +10,9 @@ from argon2 import PasswordHasher
 
 from service.api.access.desk import AccessDesk
 from service.api.app import create_app
+from service.bus import Bus
+from service.metrics.timings import Timings
+from service.metrics.watched import Watched
 from service.security.passwords import Hashing
 from service.security.people import create_key
 from service.security.roles import Role
@@ -33,7 +36,7 @@ class Access:
         return httpx2.AsyncClient(transport=transport, base_url="http://padwatch", headers=headers)
 
     async def account(self, name: str, role: Role) -> None:
-        await self.desk.add(name, role, PASSWORD)
+        await self.desk.registry.add(name, role, PASSWORD)
 
     async def session(self, name: str) -> str:
         """Log in; the token of the session."""
@@ -44,7 +47,7 @@ class Access:
 
     def key(self, role: Role, *units: str, days: int = 1) -> str:
         now_ns = self.service.clock.now_ns()
-        _, shown = create_key(self.desk.store, f"key-{role}", role, units, days, now_ns)
+        _, shown = create_key(self.service.store.access, f"key-{role}", role, units, days, now_ns)
         return shown
 
 
@@ -63,15 +66,35 @@ def cheap_hashing() -> Hashing:
     return Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
 
 
+@pytest.fixture(scope="session")
+def documents_with_metrics() -> dict[str, Any]:
+    """The description of the API, once it was made."""
+    return {}
+
+
 @pytest.fixture
-def access(service: Any) -> Access:
+def access(service: Any, documents_with_metrics: dict[str, Any]) -> Access:
     """A second application over the same store, which asks everybody."""
     context = service.context
+    watched = Watched(
+        bearings={unit: [bearing.id for bearing in s.bearing] for unit, s in context.units.items()},
+        live=context.live,
+        bus=Bus(1, service.clock),
+        recorder=context.recorder,
+        alarms=context.alarms,
+        films=context.films,
+        captures=context.captures,
+        evidence=service.evidence,
+        deliveries=context.deliveries,
+        timings=Timings(context.units, service.clock),
+        clock=service.clock,
+    )
     desk = AccessDesk(
         service.store.access, service.clock, asks_everybody=True, hashing=cheap_hashing()
     )
-    app = create_app(replace(context, access=desk))
-    app.openapi_schema = service.document
+    app = create_app(replace(context, access=desk, metrics=watched))
+    app.openapi_schema = documents_with_metrics.get("access")
+    documents_with_metrics["access"] = app.openapi()
     return Access(desk, app, service)
 
 

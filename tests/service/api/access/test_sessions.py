@@ -1,6 +1,5 @@
 """Logging in and out, and what a request may show of who sends it."""
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -99,21 +98,17 @@ async def test_a_login_never_takes_a_token_that_was_there_before(
     assert (old.status_code, fixed.status_code) == (401, 401)
 
 
-@pytest.mark.parametrize("name", ["anna", "nobody", "' OR 1=1 --", "=cmd|x"])
 async def test_a_wrong_login_does_not_say_what_was_wrong(
-    access: Any, anna: str, name: str, as_problem: Callable[[httpx2.Response], dict[str, Any]]
+    access: Any, anna: str, as_problem: Callable[[httpx2.Response], dict[str, Any]]
 ) -> None:
     assert anna
-    body = '{"name": ' + json.dumps(name) + ', "password": "wrong wrong wrong"}'
-    async with access.client() as client:
-        answer = await client.post(
-            SESSION, content=body, headers={"Content-Type": "application/json"}
-        )
-
-    problem = as_problem(answer)
-    assert answer.status_code == 401
-    assert problem["detail"] == "the name or the password is wrong"
-    assert "set-cookie" not in answer.headers
+    for name in ("anna", "nobody", "' OR 1=1 --", "=cmd|x", "x" * 256):
+        async with access.client() as client:
+            body = {"name": name, "password": "wrong wrong wrong"}
+            answer = await client.post(SESSION, json=body)
+        assert answer.status_code == 401
+        assert as_problem(answer)["detail"] == "the name or the password is wrong"
+        assert "set-cookie" not in answer.headers
 
 
 async def test_after_many_wrong_logins_one_has_to_wait_also_with_the_right_password(
@@ -165,28 +160,26 @@ async def test_a_login_that_is_over_is_no_worse_than_none_on_this_computer(servi
     assert answer.status_code == 200
 
 
-@pytest.mark.parametrize(
-    ("headers", "status"),
-    [
-        ({"Origin": "http://padwatch"}, 404),
-        ({"Sec-Fetch-Site": "same-origin"}, 404),
-        ({"Origin": "https://padwatch"}, 404),
-        ({}, 403),
-        ({"Origin": "null"}, 403),
-        ({"Origin": "http://padwatch.evil.example"}, 403),
-        ({"Origin": "http://padwatch:81"}, 403),
-        ({"Origin": "http://[::1"}, 403),
-        ({"Origin": "http://padwatch", "Sec-Fetch-Site": "cross-site"}, 403),
-        ({"Sec-Fetch-Site": "same-site"}, 403),
-    ],
+PAGES = (
+    ({"Origin": "http://padwatch"}, 404),
+    ({"Sec-Fetch-Site": "same-origin"}, 404),
+    ({"Origin": "https://padwatch"}, 404),
+    ({}, 403),
+    ({"Origin": "null"}, 403),
+    ({"Origin": "http://padwatch.evil.example"}, 403),
+    ({"Origin": "http://padwatch:81"}, 403),
+    ({"Origin": "http://[::1"}, 403),
+    ({"Origin": "http://padwatch", "Sec-Fetch-Site": "cross-site"}, 403),
+    ({"Sec-Fetch-Site": "same-site"}, 403),
 )
-async def test_with_a_cookie_only_the_dashboard_itself_acts(
-    access: Any, anna: str, headers: dict[str, str], status: int
-) -> None:
-    async with access.client(**cookie(anna), **headers) as client:
-        answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
+"""What a browser says of the page that asks, and what comes of it."""
 
-    assert answer.status_code == status
+
+async def test_with_a_cookie_only_the_dashboard_itself_acts(access: Any, anna: str) -> None:
+    for headers, status in PAGES:
+        async with access.client(**cookie(anna), **headers) as client:
+            answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
+        assert answer.status_code == status, headers
 
 
 async def test_a_key_acts_wherever_it_is_sent_from(access: Any) -> None:

@@ -1,0 +1,136 @@
+"""Accounts and keys as admins change them, and what the audit trail says of it."""
+
+from collections.abc import AsyncIterator
+from typing import Any
+
+import httpx2
+import pytest
+
+from service.security.roles import Role
+
+ACCOUNTS, KEYS = "/api/v1/accounts", "/api/v1/keys"
+PASSWORD = "the river is high in may"  # noqa: S105
+OTHER = "the river is low in august"
+BERT = {"name": "Bert", "role": "viewer", "password": PASSWORD}
+
+
+@pytest.fixture
+async def admin(access: Any) -> AsyncIterator[httpx2.AsyncClient]:
+    """A browser in which an admin has logged in."""
+    await access.account("anna", Role.ADMIN)
+    token = await access.session("anna")
+    headers = {"Cookie": f"__Host-padwatch={token}", "Origin": "http://padwatch"}
+    async with access.client(**headers) as client:
+        yield client
+
+
+async def test_an_account_is_added_changed_and_removed(
+    access: Any, admin: httpx2.AsyncClient
+) -> None:
+    added = await admin.post(ACCOUNTS, json=BERT)
+    raised = await admin.put(f"{ACCOUNTS}/bert/role", json={"role": "operator"})
+    listed = (await admin.get(ACCOUNTS)).json()
+    token = await access.session("bert")
+    changed = await admin.put(f"{ACCOUNTS}/bert/password", json={"password": OTHER})
+    async with access.client(Cookie=f"__Host-padwatch={token}") as client:
+        after = await client.get("/api/v1/units")
+    removed = await admin.delete(f"{ACCOUNTS}/bert")
+
+    assert (added.status_code, added.json()["name"]) == (201, "bert")
+    assert raised.json()["role"] == "operator"
+    assert [(a["name"], a["role"]) for a in listed] == [("anna", "admin"), ("bert", "operator")]
+    assert (changed.status_code, after.status_code, removed.status_code) == (200, 401, 204)
+    assert [a["name"] for a in (await admin.get(ACCOUNTS)).json()] == ["anna"]
+
+
+async def test_what_does_not_fit_is_refused_and_said(admin: httpx2.AsyncClient) -> None:
+    await admin.post(ACCOUNTS, json=BERT)
+    refused = [
+        (await admin.post(ACCOUNTS, json=BERT), 409, None),
+        (await admin.post(ACCOUNTS, json={**BERT, "name": "x y"}), 422, "name"),
+        (await admin.post(ACCOUNTS, json={**BERT, "name": "c", "password": "a"}), 422, "password"),
+        (await admin.post(ACCOUNTS, json={**BERT, "role": "owner"}), 422, "role"),
+        (await admin.put(f"{ACCOUNTS}/anna/role", json={"role": "viewer"}), 409, None),
+        (await admin.put(f"{ACCOUNTS}/none/role", json={"role": "viewer"}), 404, None),
+        (await admin.delete(f"{ACCOUNTS}/anna"), 409, None),
+        (await admin.delete(f"{ACCOUNTS}/none"), 404, None),
+        (await admin.post(KEYS, json={"name": "k", "role": "admin", "units": ["U1"]}), 409, None),
+        (
+            await admin.post(KEYS, json={"name": "k", "role": "viewer", "units": ["U9"]}),
+            422,
+            "units",
+        ),
+        (await admin.post(KEYS, json={"name": "k", "role": "viewer", "days": 0}), 422, "days"),
+        (await admin.delete(f"{KEYS}/none"), 404, None),
+    ]
+    for answer, status, parameter in refused:
+        assert answer.status_code == status, answer.text
+        errors = [error["parameter"] for error in answer.json()["errors"]]
+        assert errors == ([] if parameter is None else [parameter])
+
+
+async def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
+    access: Any, admin: httpx2.AsyncClient
+) -> None:
+    made = await admin.post(KEYS, json={"name": "historian", "role": "viewer", "units": ["U1"]})
+    key = made.json()["key"]
+    async with access.client(Authorization=f"Bearer {key}") as client:
+        seen = await client.get("/api/v1/units/U1")
+        listed = (await admin.get(KEYS)).json()
+        revoked = [(await admin.delete(f"{KEYS}/{made.json()['id']}")).status_code for _ in "12"]
+        after = await client.get("/api/v1/units/U1")
+
+    assert (made.status_code, seen.status_code, after.status_code) == (201, 200, 401)
+    assert revoked == [204, 204]
+    [one] = listed
+    assert (one["state"], one["units"], one["role"]) == ("valid", ["U1"], "viewer")
+    assert one["used"] is not None
+    assert key not in str(listed)
+
+
+async def test_who_changed_what_is_told_without_any_secret(
+    access: Any, admin: httpx2.AsyncClient
+) -> None:
+    await admin.post(ACCOUNTS, json=BERT)
+    key = (await admin.post(KEYS, json={"name": "k", "role": "viewer"})).json()["key"]
+    await admin.put(f"{ACCOUNTS}/bert/password", json={"password": OTHER})
+    told = (await admin.get("/api/v1/audit", params={"actor": "anna"})).json()["entries"]
+
+    assert [entry["action"] for entry in told] == [
+        *("account.password_set", "key.created", "account.added", "session.begun"),
+    ]
+    assert {entry["peer"] for entry in told} == {"192.0.2.7"}
+    for secret in (PASSWORD, OTHER, key, key.rpartition("_")[2]):
+        assert secret not in str(told)
+    assert access
+
+
+async def test_where_nobody_has_to_log_in_the_place_is_told(service: Any) -> None:
+    made = await service.client.post(KEYS, json={"name": "k", "role": "viewer"})
+    [told] = (await service.json("/api/v1/audit"))["entries"]
+
+    assert made.status_code == 201
+    assert (told["actor"], told["action"]) == ("local", "key.created")
+
+
+async def test_beside_an_action_stands_who_has_logged_in_whatever_the_body_says(
+    access: Any, admin: httpx2.AsyncClient
+) -> None:
+    service = access.service
+    service.alarms.link("U1", False, "no route")
+    service.clock.s += 60.0
+    service.clock.ns += 60_000_000_000
+    service.alarms.tick()
+    [alarm] = [a.identity.id for a in service.alarms.alarms if a.level is not None]
+    key = access.key(Role.OPERATOR)
+    async with access.client(Authorization=f"Bearer {key}") as client:
+        await client.post(
+            f"/api/v1/alarms/{alarm}/comment", json={"actor": "somebody else", "text": "first"}
+        )
+    await admin.post(f"/api/v1/alarms/{alarm}/comment", json={"text": "second"})
+    told = (await admin.get("/api/v1/audit", params={"object": alarm})).json()["entries"]
+
+    assert [(e["actor"], e["reason"]) for e in told] == [
+        ("anna", "second"),
+        ("key:key-operator", "first"),
+    ]

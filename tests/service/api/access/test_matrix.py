@@ -1,0 +1,238 @@
+"""Every operation × role × state of what is shown: let in is exactly who is declared here."""
+
+from collections.abc import Awaitable, Callable
+from typing import Any, NamedTuple
+
+import pytest
+
+from service.security.roles import Role
+from service.security.tokens import new_key, new_token
+
+ROLES = ("viewer", "operator", "engineer", "admin")
+OPEN = None
+UNIT, PLANT, NO_UNIT = "unit", "plant", "no unit"
+
+
+class Row(NamedTuple):
+    """Who may do an operation: the lowest role, and what of the plant it is about."""
+
+    role: str | None
+    about: str = UNIT
+
+
+FILM = "/api/v1/units/{unit}/bearings/{bearing}"
+ALARM = "/api/v1/alarms/{alarm}"
+RECORDING = "/api/v1/recordings/{recording}"
+
+TABLE = {
+    "GET /livez": Row(OPEN),
+    "GET /readyz": Row(OPEN),
+    "GET /api/v1/session": Row(OPEN),
+    "POST /api/v1/session": Row(OPEN),
+    "DELETE /api/v1/session": Row(OPEN),
+    "POST /api/v1/session/password": Row("viewer", NO_UNIT),
+    "POST /api/v1/set-up": Row(OPEN),
+    "GET /api/v1/overview": Row("viewer", PLANT),
+    "GET /api/v1/units": Row("viewer", PLANT),
+    "GET /api/v1/units/{unit}": Row("viewer"),
+    "GET /api/v1/units/{unit}/channels": Row("viewer"),
+    "GET /api/v1/units/{unit}/waveform": Row("viewer"),
+    "GET /api/v1/units/{unit}/gaps": Row("viewer"),
+    "GET /api/v1/units/{unit}/bearings": Row("viewer"),
+    "GET /api/v1/quantities": Row("viewer", NO_UNIT),
+    "GET /api/v1/sources": Row("viewer", PLANT),
+    "GET /api/v1/configuration": Row("viewer", PLANT),
+    "GET /api/v1/configuration/schema": Row("viewer", NO_UNIT),
+    "GET /api/v1/delivery": Row("viewer", NO_UNIT),
+    "GET /api/v1/audit": Row("engineer", PLANT),
+    f"GET {FILM}": Row("viewer"),
+    f"GET {FILM}/latest": Row("viewer"),
+    f"GET {FILM}/budgets/{{quantity}}": Row("viewer"),
+    f"GET {FILM}/spectrum": Row("viewer"),
+    f"GET {FILM}/orbit": Row("viewer"),
+    f"GET {FILM}/trends": Row("viewer"),
+    f"GET {FILM}/spectra": Row("viewer"),
+    f"GET {FILM}/motion": Row("viewer"),
+    f"GET {FILM}/shaft-centre": Row("viewer"),
+    f"GET {FILM}/references": Row("viewer"),
+    f"GET {FILM}/film": Row("viewer"),
+    f"GET {FILM}/film/readings": Row("viewer"),
+    f"GET {FILM}/baselines": Row("viewer"),
+    f"GET {FILM}/baselines/{{version}}": Row("viewer"),
+    f"GET {FILM}/baselines/{{version}}/export": Row("viewer"),
+    f"POST {FILM}/baselines/{{version}}/accept": Row("engineer"),
+    f"POST {FILM}/baselines/{{version}}/reject": Row("engineer"),
+    f"POST {FILM}/baselines/freeze": Row("engineer"),
+    f"POST {FILM}/baselines/thaw": Row("engineer"),
+    f"POST {FILM}/baselines/renew": Row("engineer"),
+    f"GET {FILM}/order1-references": Row("viewer"),
+    f"POST {FILM}/order1-references": Row("engineer"),
+    "GET /api/v1/alarms": Row("viewer", PLANT),
+    "GET /api/v1/alarms/events": Row("viewer", PLANT),
+    "GET /api/v1/alarms/rates": Row("viewer", PLANT),
+    f"GET {ALARM}": Row("viewer"),
+    f"GET {ALARM}/evidence": Row("viewer"),
+    f"GET {ALARM}/evidence/{{occurrence}}": Row("viewer"),
+    f"GET {ALARM}/evidence/{{occurrence}}/report": Row("viewer"),
+    f"GET {ALARM}/evidence/{{occurrence}}/bundle.zip": Row("viewer"),
+    f"POST {ALARM}/acknowledge": Row("operator"),
+    f"POST {ALARM}/shelve": Row("operator"),
+    f"POST {ALARM}/unshelve": Row("operator"),
+    f"POST {ALARM}/reset": Row("operator"),
+    f"POST {ALARM}/comment": Row("operator"),
+    f"POST {ALARM}/out-of-service": Row("engineer"),
+    f"POST {ALARM}/return-to-service": Row("engineer"),
+    "GET /api/v1/recordings": Row("viewer", PLANT),
+    f"GET {RECORDING}": Row("viewer", PLANT),
+    f"GET {RECORDING}/files.zip": Row("viewer", PLANT),
+    f"GET {RECORDING}/samples.csv": Row("viewer", PLANT),
+    f"GET {RECORDING}/motion": Row("viewer", PLANT),
+    "GET /api/v1/accounts": Row("admin", NO_UNIT),
+    "POST /api/v1/accounts": Row("admin", NO_UNIT),
+    "PUT /api/v1/accounts/{name}/role": Row("admin", NO_UNIT),
+    "PUT /api/v1/accounts/{name}/password": Row("admin", NO_UNIT),
+    "DELETE /api/v1/accounts/{name}": Row("admin", NO_UNIT),
+    "GET /api/v1/keys": Row("admin", NO_UNIT),
+    "POST /api/v1/keys": Row("admin", NO_UNIT),
+    "DELETE /api/v1/keys/{key}": Row("admin", NO_UNIT),
+    "GET /metrics": Row("viewer", PLANT),
+}
+"""A new operation needs a row here."""
+
+ELSEWHERE = {"/", "/static/app.js", "/static/plotly.min.js", "/api/v1/openapi.json"}
+"""What is not in the published description, and open."""
+
+PLACES = {
+    "bearing": "UJB",
+    "quantity": "oil_temperature_c",
+    "version": "1",
+    "occurrence": "1",
+    "recording": "none",
+    "name": "nobody",
+    "key": "0123456789ab",
+}
+
+IDLE_NS = 31 * 60 * 1_000_000_000
+WAYS = ("session", "key")
+
+Headers = dict[str, str]
+Show = Callable[..., Awaitable[Headers]]
+
+
+@pytest.fixture
+def show(access: Any) -> Show:
+    """Headers of somebody with a role, by one of the ways to show it, in one of its states."""
+
+    async def shown(way: str, state: str, role: str = "admin", *units: str) -> Headers:
+        if way == "key":
+            key = new_key()[1] if state == "wrong" else access.key(Role(role), *units)
+            if state == "revoked":
+                access.service.store.access.keys.revoke(key.split("_")[1], access.service.clock.ns)
+            if state == "expired":
+                access.service.clock.ns += 25 * 3600 * 1_000_000_000
+            return {"Authorization": f"Bearer {key}"}
+        await access.account(f"an.{role}", Role(role))
+        token = new_token() if state == "wrong" else await access.session(f"an.{role}")
+        if state == "revoked":
+            await access.desk.log_out(token)
+        if state == "expired":
+            access.service.clock.ns += IDLE_NS
+        return {"Cookie": f"__Host-padwatch={token}", "Origin": "http://padwatch"}
+
+    return shown
+
+
+async def answers(access: Any, headers: Headers, unit: str = "U1") -> dict[str, int]:
+    """Status of every operation; logging out comes last."""
+    found = {}
+    async with access.client(**headers) as client:
+        for operation in sorted(TABLE, key=lambda name: name == "DELETE /api/v1/session"):
+            method, path = operation.split()
+            alarm = f"{unit}:ujb_shaft_x:channel_not_ok"
+            path = path.format(unit=unit, alarm=alarm, **PLACES)
+            body = {} if method in ("GET", "DELETE") else {"json": {}}
+            found[operation] = (await client.request(method, path, **body)).status_code
+    return found
+
+
+def let_in(status: int) -> bool:
+    assert status < 500 or status == 503, status
+    return status not in (401, 403)
+
+
+def test_the_table_has_a_row_for_each_operation_and_the_description_says_the_same(
+    access: Any,
+) -> None:
+    least = {"read": 0, "act_on_alarms": 1, "change_measuring": 2, "read_audit": 2}
+    described = {
+        f"{method.upper()} {path}": operation["x-padwatch-needs"]
+        for path, methods in access.app.openapi()["paths"].items()
+        for method, operation in methods.items()
+    }
+    roles = {
+        name: None if needed is None else ROLES[least.get(needed, 3)]
+        for name, needed in described.items()
+    }
+
+    assert roles == {name: row.role for name, row in TABLE.items()}
+
+
+def test_there_is_nothing_open_beside_it(access: Any) -> None:
+    undescribed = {each.path for name, each in access.app.declared.items() if name not in TABLE}
+
+    assert undescribed == {
+        *("/", "/static/{path:path}", "/static/plotly.min.js", "/api/v1/openapi.json"),
+    }
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("state", ["wrong", "expired", "revoked"])
+async def test_what_is_no_longer_or_never_was_good_opens_nothing(
+    access: Any, show: Show, way: str, state: str
+) -> None:
+    headers = await show(way, state)
+    for operation, status in (await answers(access, headers)).items():
+        expected = TABLE[operation].role is OPEN
+        assert let_in(status) == expected, f"{operation}: {status}"
+        assert expected or status == 401, f"{operation}: {status}"
+
+
+async def test_who_shows_nothing_sees_nothing(access: Any) -> None:
+    for operation, status in (await answers(access, {})).items():
+        assert status != 403, operation
+        assert let_in(status) == (TABLE[operation].role is OPEN), f"{operation}: {status}"
+    async with access.client() as client:
+        for path in sorted(ELSEWHERE):
+            assert (await client.get(path)).status_code == 200, path
+        assert (await client.get("/api/v1/no-such-thing")).status_code == 401
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("role", ROLES)
+async def test_each_role_may_what_is_declared_and_nothing_else(
+    access: Any, show: Show, way: str, role: str
+) -> None:
+    headers = await show(way, "good", role)
+    for operation, status in (await answers(access, headers)).items():
+        least = TABLE[operation].role
+        expected = least is OPEN or ROLES.index(role) >= ROLES.index(least)
+        if (way, operation) == ("session", "POST /api/v1/session/password"):
+            assert status == 422, status  # a wrong password would be a 401, too
+        assert let_in(status) == expected, f"{operation}: {status}"
+        assert expected or status == 403, f"{operation}: {status}"
+
+
+@pytest.mark.parametrize("role", ["viewer", "operator", "engineer"])
+async def test_a_key_for_some_units_opens_those_and_what_belongs_to_none(
+    access: Any, show: Show, role: str
+) -> None:
+    headers = await show("key", "good", role, "U1")
+    for unit in ("U1", "U2"):
+        for operation, status in (await answers(access, headers, unit)).items():
+            row = TABLE[operation]
+            expected = row.role is OPEN or (
+                ROLES.index(role) >= ROLES.index(row.role)
+                and (row.about == NO_UNIT or (row.about == UNIT and unit == "U1"))
+            )
+            assert let_in(status) == expected, f"{operation}: {status}"
+            assert expected or status == 403, f"{operation}: {status}"
