@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,7 +43,9 @@ class Fuzzed:
 
 
 @contextmanager
-def fuzzed_service(folder: Path, past_years: float, live: bool) -> Iterator[Fuzzed]:
+def fuzzed_service(
+    folder: Path, past_years: float, live: bool, roles: Sequence[str] = ROLES
+) -> Iterator[Fuzzed]:
     """Start a DAQ, if it is to be live, and the service; both end with the context."""
     running: list[Process] = []
     plant = write_plant(folder, 1)
@@ -54,7 +56,7 @@ def fuzzed_service(folder: Path, past_years: float, live: bool) -> Iterator[Fuzz
             write_plant(folder, json.loads(_line(running[0]))["U1"]["port"])
         if past_years:
             _fill(plant, past_years)
-        keys = {role: _key(plant, role) for role in ROLES}
+        keys = {role: _key(plant, role) for role in roles if role in ROLES}
         running.append(_start(("run", str(plant), "--port", "0"), log))
         url = _line(running[-1]).removeprefix("padwatch: ").strip().rstrip("/")
         yield Fuzzed(url, running[-1].pid, keys, log)
