@@ -146,6 +146,18 @@ async def test_an_address_restores_what_was_shown(living_plant, page) -> None:
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
 
 
+async def test_the_page_of_a_bearing_leads_to_its_trends(living_plant, page) -> None:
+    await page.goto(living_plant.url + "#/units/U1/bearings/LJB")
+    await page.get_by_role("radio", name="1 y").check(timeout=DATA_MS)
+    await page.get_by_role("link", name="Compare in Trends").click()
+
+    await await_curve(page)
+    await expect(page.get_by_role("radio", name="Year")).to_be_checked()
+    await expect(page.locator("summary").first).to_have_text("Bearings: 1")
+    assert "b=U1%2FLJB" in page.url
+    assert "order1_shaft_x_um_pk" in page.url
+
+
 async def test_an_address_from_elsewhere_is_complained_of_in_words(living_plant, page) -> None:
     address = "#/trends?b=U1/UJB&b=U9/XYZ&q=stiffness_xx_n_per_m&q=warp_factor&last=2592000"
     await page.goto(living_plant.url + address)

@@ -22,6 +22,7 @@ export const STATES = ["standstill", "run_up", "speed_no_load", "part_load", "fu
 /** What is shown to whoever comes without an address. */
 const USUAL = ["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"];
 const A_DAY_S = 86400;
+const MOST_SPAN_S = 10 * 365 * 86400;
 const SHORTEST_MS = 10_000;
 
 /** Out of an address; what cannot be read in it is as usual. */
@@ -33,7 +34,7 @@ export function stateOf(hash) {
   return {
     quantities: query.has("q") ? query.getAll("q").filter(Boolean).slice(0, MOST_QUANTITIES) : USUAL,
     bearings: query.getAll("b").map((one) => one.split("/")).filter((parts) => parts.length === 2).slice(0, MOST_BEARINGS),
-    spanS: fixed ? null : SPANS.some(([one]) => one === spanS) ? spanS : A_DAY_S,
+    spanS: fixed ? null : spanS >= 60 && spanS <= MOST_SPAN_S ? spanS : A_DAY_S,
     ...(fixed ?? { fromMs: null, toMs: null }),
     state: query.get("state") ?? "",
     colour: COLOURS.some(([name]) => name === colour) ? colour : "",
@@ -45,8 +46,8 @@ function fixedRange(query) {
   return fromMs < toMs ? { fromMs, toMs } : null;
 }
 
-/** The address of a state. */
-export function addressOf({ quantities, bearings, spanS, fromMs, toMs, state, colour }) {
+/** The address of a state; what is not given is as usual. */
+export function addressOf({ quantities, bearings, spanS = A_DAY_S, fromMs, toMs, state, colour }) {
   const pairs = bearings.map((one) => ["b", one.join("/")]);
   pairs.push(...(quantities.length ? quantities : [""]).map((name) => ["q", name]));
   if (spanS === null) pairs.push(["from", new Date(fromMs).toISOString()], ["to", new Date(toMs).toISOString()]);

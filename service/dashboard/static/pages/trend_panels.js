@@ -4,11 +4,12 @@ import { amplitudeUnit } from "../amplitudes.js";
 import { NotReachable, ask } from "../api.js";
 import { panel } from "../charts/panel.js";
 import { doubtTrace, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
-import { element } from "../dom.js";
+import { element, setAttribute } from "../dom.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
 import { poll } from "../poll.js";
 import { reasonWords } from "../words.js";
+import { addressOf } from "./explorer_state.js";
 
 const SHORTEST_PERIOD_S = 5;
 const LONGEST_PERIOD_S = 60;
@@ -47,7 +48,10 @@ export function trendPanels(path) {
   let view = null;
   let latest = null;
   let trends = null;
-  const refresh = () => questions.again();
+  const refresh = () => {
+    aim();
+    questions.again();
+  };
   const span = choice("Span", SPANS, 900, refresh);
   const scale = choice("Scale", SCALES, "tozero", refresh);
   const which = choice("Estimate", STIFFNESSES, "stiffness", refresh);
@@ -55,6 +59,14 @@ export function trendPanels(path) {
   const stiffness = panel("Film stiffness", "stiffness-trend", which.node);
   const amplitude = panel("Vibration amplitude", "amplitude-trend", order.node);
   const boxes = [stiffness, amplitude];
+  const more = element("a", {}, "Compare in Trends");
+
+  /** Lead to the trend explorer with what is shown here. */
+  function aim() {
+    const names = [...stiffnessLines(which.value()), ...amplitudeLines(order.value())].map(([name]) => name);
+    setAttribute(more, "href", addressOf({ quantities: names, bearings: [[path[1], path[3]]], spanS: span.value() }));
+  }
+  aim();
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
@@ -72,7 +84,7 @@ export function trendPanels(path) {
   }, () => periodS(trends));
 
   return {
-    nodes: [element("div", { class: "choices" }, span.node, scale.node, hint()), ...boxes.map((box) => box.node)],
+    nodes: [element("div", { class: "choices" }, span.node, scale.node, more, hint()), ...boxes.map((box) => box.node)],
     draw(newest, now, notCurrent) {
       const first = view?.serviceTimeMs == null && now.serviceTimeMs !== null;
       [latest, view] = [newest, now];
