@@ -77,12 +77,16 @@ def _chunks(
         while rows := found.fetchmany(ROWS_AT_ONCE):
             left -= len(rows)
             if left < 0:
-                raise QueryTooLargeError(
-                    f"more than {MAX_ROWS} single readings would have to be read: ask for a"
-                    " shorter time, for fewer points, or for bounds of eccentricity and oil"
-                    " temperature at whole cells"
-                )
+                raise too_large()
             yield rows
+
+
+def too_large() -> QueryTooLargeError:
+    """Build the refusal to read all that would be needed."""
+    return QueryTooLargeError(
+        f"more than {MAX_ROWS} single readings would have to be read: ask for a shorter time, for"
+        " fewer points, or for bounds of eccentricity and oil temperature at whole cells"
+    )
 
 
 def select_layouts(reader: sqlite3.Connection) -> dict[int, Layout]:

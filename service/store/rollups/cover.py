@@ -13,10 +13,13 @@ from service.store.rollups.rolling import select_mark
 from service.store.rollups.rows import ANYTHING, select_cells
 from service.store.rollups.widths import HOUR_NS
 from service.store.summaries import IntArray, Summaries
-from service.store.trends import Span, arguments
+from service.store.trends import Span, arguments, too_large
 
 MAX_SPANS = 4096
 """That many are read at a time, so that no range needs more memory than another."""
+
+MAX_CUT_SPANS = 100_000
+"""Finer roll-ups that are looked at because bounds cut through wider ones; a second or two."""
 
 REDONE = """
     SELECT start_ns FROM rollup_redo
@@ -55,6 +58,8 @@ def covered(
 ) -> Cover:
     """Cover a range of time.
 
+    Raises `QueryTooLargeError` if bounds of conditions cut through too much of it.
+
     Parameters
     ----------
     widths_ns
@@ -82,6 +87,7 @@ class _Covering:
         self._mark_ns = select_mark(reader, series)
         conditions = arguments(query)
         self._asked = {name: conditions[name] for name in ANYTHING}
+        self._n_cut = 0
         self.cover = Cover()
 
     def take(self, span: Span, widths_ns: Sequence[int]) -> None:
@@ -116,6 +122,9 @@ class _Covering:
         is_cut = np.isin(time_ns, time_ns[self._cut(cells.conditions)])
         self._use(cells, ~is_redone & ~is_cut, width_ns)
         for cut in _runs(np.unique(time_ns[is_cut & ~is_redone]), width_ns):
+            self._n_cut += (cut[1] - cut[0]) // finer_ns[-1] if finer_ns else 0
+            if self._n_cut > MAX_CUT_SPANS:
+                raise too_large()
             self.take(cut, finer_ns)
 
     def _redone(self, inner: Span) -> list[int]:

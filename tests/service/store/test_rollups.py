@@ -16,7 +16,7 @@ from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.quality import GOOD, Level, Reading, Reason, missing, uncertain
 from service.store import trends
-from service.store.port import StoreError, Trend, TrendQuery
+from service.store.port import QueryTooLargeError, StoreError, Trend, TrendQuery
 from service.store.rollups import cover, rolling
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
@@ -297,6 +297,17 @@ def test_few_readings_of_a_long_time_stay_single(rolled: SqliteStore, plain: Sql
     assert rolled.trend(few).bucket_ns is None
     assert len(rolled.trend(few).time_ns) > 100
     require_same(rolled.trend(few), plain.trend(few))
+
+
+def test_bounds_that_cut_through_too_many_cells_are_refused_before_they_are_all_read(
+    rolled: SqliteStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cover, "MAX_CUT_SPANS", 5)
+    whole_cells = replace(WHOLE, eccentricity_ratio=ValueRange(0.3, 0.4 - 1e-9))
+
+    assert rolled.trend(whole_cells).time_ns
+    with pytest.raises(QueryTooLargeError, match="at whole cells"):
+        rolled.trend(replace(WHOLE, eccentricity_ratio=ValueRange(0.333, 0.367)))
 
 
 @pytest.mark.parametrize("reach", [2**63, 2**63 - 1, 10**21])

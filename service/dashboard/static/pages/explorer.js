@@ -37,6 +37,8 @@ export function explorerPage(main) {
   const looks = element("div", { class: "choices" }, colour.node, states, hint());
   main.append(element("div", { class: "explorer" }, element("h1", {}, "Trends"), pickers, time.node, looks, note, charts.node, files.node));
 
+  charts.explain("Asking the service.");
+
   const nowMs = () => view?.serviceTimeMs ?? Date.now();
   const depth = () => history.state?.depth ?? 0;
 
