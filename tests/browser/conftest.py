@@ -41,7 +41,7 @@ link_lost_after_s = 2.0
 OWN_TABLES = re.compile(r"^\[(?:analysis|alarms)\]\n(?:[^\[\n].*\n|\n)*", re.MULTILINE)
 """What an example itself says of these."""
 
-ROLES = ("viewer", "operator", "engineer")
+ROLES = ("viewer", "operator", "engineer", "admin")
 PASSWORD = "the river is high in may"  # noqa: S105 - of accounts that exist in tests alone
 
 CHROMIUM = next(

@@ -8,6 +8,7 @@
  * who have it.
  */
 
+import { accessPage } from "./pages/access.js";
 import { alarmsPage } from "./pages/alarms.js";
 import { auditPage } from "./pages/audit.js";
 import { bearingPage } from "./pages/bearing.js";
@@ -26,6 +27,7 @@ export const PAGES = [
   { pattern: "#/sources", title: "source health", nav: "Sources", open: sourcesPage },
   { pattern: "#/recordings", title: "recordings and reports", nav: "Recordings", open: recordingsPage },
   { pattern: "#/audit", title: "audit trail", nav: "Audit", permission: "read_audit", open: auditPage },
+  { pattern: "#/access", title: "access", nav: "Access", permission: "change_access", open: accessPage },
   { pattern: "#/units/:unit", title: (unit) => unit, open: unitPage },
   { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },
   { pattern: "#/units/:unit/bearings/:bearing/film", title: (unit, bearing) => `film of ${unit} ${bearing}`, open: filmPage },

@@ -1,0 +1,48 @@
+/** A question below a row before something is done that cannot be taken back; Escape leaves it. */
+
+import { element, setText } from "../dom.js";
+
+/**
+ * Returns `{ node, open(opener) }`; `fields` stand before the button that carries `act` out.
+ *
+ * `act` throws why not; `done` hears that it was done.
+ */
+export function question(sentence, words, fields, act, done) {
+  const failure = element("span", { class: "action-failure", role: "alert" });
+  const send = element("button", { type: "submit" }, words);
+  const cancel = element("button", { type: "button" }, "Cancel");
+  const node = element("form", { class: "asking question", hidden: "" }, element("strong", {}, sentence), ...fields, send, cancel, failure);
+  let opener = null;
+
+  function close() {
+    node.hidden = true;
+    node.reset();
+    if (opener?.isConnected) opener.focus();
+  }
+
+  node.addEventListener("submit", async (submitted) => {
+    submitted.preventDefault();
+    send.disabled = true;
+    setText(failure, "");
+    try {
+      await act();
+      close();
+      done();
+    } catch (error) {
+      setText(failure, error.message);
+    } finally {
+      send.disabled = false;
+    }
+  });
+  node.addEventListener("keydown", (key) => key.key === "Escape" && close());
+  cancel.addEventListener("click", close);
+  return {
+    node,
+    open(from) {
+      opener = from;
+      setText(failure, "");
+      node.hidden = false;
+      (node.querySelector("input, select") ?? send).focus();
+    },
+  };
+}

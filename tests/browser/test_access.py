@@ -1,0 +1,100 @@
+"""The page of accounts and keys: an admin lets people and machines in, and shuts them out again."""
+
+from playwright.async_api import Page, expect
+
+ACCESS = "#/access"
+FIRST_MS = 60_000
+NEW = "[data-account=newcomer]"
+
+
+async def open_access(page: Page, url: str, password: str) -> None:
+    await page.goto(url + ACCESS)
+    await page.get_by_label("Name", exact=True).fill("admin")
+    await page.get_by_label("Password", exact=True).fill(password)
+    await page.keyboard.press("Enter")
+    await expect(page.locator("[data-account=admin]")).to_be_visible(timeout=FIRST_MS)
+
+
+async def test_an_admin_adds_changes_and_removes_an_account_by_keys_alone(
+    guarded_plant, remote_page, password, complaints_of, picture_of
+) -> None:
+    page = remote_page
+    await open_access(page, guarded_plant.url, password)
+    complaints = complaints_of(page)
+    shown = await page.locator(".accounts tbody th").all_inner_texts()
+    assert shown == ["admin", "engineer", "operator", "viewer"]
+    await page.get_by_role("button", name="Add somebody…").press("Enter")
+    form = page.locator(".accounts > form")
+    await expect(form.get_by_label("Name")).to_be_focused()
+    await page.keyboard.type("newcomer")
+    await form.get_by_label("Password").fill(password)
+    await page.keyboard.press("Enter")
+    await expect(page.locator(NEW)).to_contain_text("viewer")
+    await expect(page.get_by_role("button", name="Add somebody…")).to_be_focused()
+
+    await page.get_by_role("button", name="Role newcomer").press("Enter")
+    await page.locator(".question:visible select").select_option("operator")
+    await page.get_by_role("button", name="Set role").press("Enter")
+    await expect(page.locator(NEW)).to_contain_text("operator")
+    await picture_of(page, "accounts")
+
+    await page.get_by_role("button", name="Remove newcomer").press("Enter")
+    await page.keyboard.press("Escape")
+    await expect(page.locator(".question:visible")).to_have_count(0)
+    await page.get_by_role("button", name="Remove newcomer").press("Enter")
+    await page.get_by_role("button", name="Remove", exact=True).press("Enter")
+    await expect(page.locator(NEW)).to_have_count(0)
+    assert complaints == []
+
+
+async def test_what_the_service_does_not_accept_is_said_in_its_words(
+    guarded_plant, remote_page, password
+) -> None:
+    page = remote_page
+    await open_access(page, guarded_plant.url, password)
+    await page.get_by_role("button", name="Remove admin").click()
+    await page.get_by_role("button", name="Remove", exact=True).click()
+    await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("his own account")
+    await page.get_by_role("button", name="Add somebody…").click()
+    form = page.locator(".accounts > form")
+    await form.get_by_label("Name").fill("newcomer")
+    await form.get_by_label("Password").fill("short")
+    await page.keyboard.press("Enter")
+    await expect(form.get_by_role("alert")).not_to_be_empty()
+    await expect(page.locator(NEW)).to_have_count(0)
+
+
+async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
+    guarded_plant, remote_page, password, picture_of
+) -> None:
+    page = remote_page
+    await open_access(page, guarded_plant.url, password)
+    await page.get_by_role("button", name="Create a key…").press("Enter")
+    await page.get_by_label("What it is for").fill("historian")
+    await page.keyboard.press("Enter")
+    shown = page.get_by_label("The new key")
+    await expect(shown).to_be_visible()
+    await expect(shown).to_be_focused()
+    key = await shown.input_value()
+    row = page.locator("[data-key]", has_text="historian")
+    await expect(row).to_contain_text("Valid")
+    await expect(row).to_contain_text("never")
+    await picture_of(page, "key")
+
+    asked = await page.context.browser.new_context(
+        extra_http_headers={"Authorization": f"Bearer {key}", "X-Forwarded-For": "192.0.2.7"}
+    )
+    assert (await asked.request.get(f"{guarded_plant.url}api/v1/overview")).status == 200
+    await page.get_by_role("button", name="Revoke historian").press("Enter")
+    await page.get_by_role("button", name="Revoke", exact=True).press("Enter")
+    await expect(row).to_contain_text("Revoked")
+    assert (await asked.request.get(f"{guarded_plant.url}api/v1/overview")).status == 401
+    await page.reload()
+    await expect(row).to_contain_text("Revoked")
+    await expect(page.get_by_label("The new key")).to_be_hidden()
+
+
+async def test_a_plant_that_nobody_needs_to_log_in_to_says_so(running_plant, page) -> None:
+    await page.goto(running_plant.url + ACCESS)
+    await expect(page.locator(".accounts")).to_contain_text("No account yet", timeout=FIRST_MS)
+    await expect(page.locator(".keys")).to_contain_text("No key yet")
