@@ -25,6 +25,7 @@ from service.api.baseline_views import (
 from service.api.context import BearingId, Context, UnitId
 from service.api.film_routes import watched_place
 from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.rendering import rendered, worked
 from service.api.times import ns_from_datetime, rfc3339
 from service.films.actions import (
     Accept,
@@ -74,17 +75,27 @@ def baseline_router(context: Context) -> APIRouter:
         dependencies=[needs(Permission.READ)],
     )
 
-    @router.get("", summary="Baselines of a bearing", responses=problem_responses(404, 503))
-    async def baselines(unit: UnitId, bearing: BearingId) -> BaselinesModel:
+    @router.get(
+        "",
+        summary="Baselines of a bearing",
+        response_model=BaselinesModel,
+        responses=problem_responses(404, 503),
+    )
+    async def baselines(unit: UnitId, bearing: BearingId) -> Response:
         """Every version, which of them is in force, what was done, and how far learning is."""
         context.bearing(unit, bearing)
-        return await asyncio.to_thread(_baselines, context, unit, bearing)
+        return await rendered(lambda: _baselines(context, unit, bearing))
 
-    @router.get("/{version}", summary="One baseline", responses=READING_PROBLEMS)
-    async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> BaselineModel:
+    @router.get(
+        "/{version}",
+        summary="One baseline",
+        response_model=BaselineModel,
+        responses=READING_PROBLEMS,
+    )
+    async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Its cells by column: bounds, stiffness, scatter, and whether readings count there."""
         context.bearing(unit, bearing)
-        return await asyncio.to_thread(_baseline, context, unit, bearing, version)
+        return await rendered(lambda: _baseline(context, unit, bearing, version))
 
     @router.get(
         "/{version}/export",
@@ -95,10 +106,10 @@ def baseline_router(context: Context) -> APIRouter:
     async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """The whole baseline, with its surface, as a file that padwatch reads back to the bit."""
         context.bearing(unit, bearing)
-        found = await asyncio.to_thread(_stored, context, unit, bearing, version)
+        found = await worked(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-        return Response(to_json(found), headers=headers, media_type="application/json")
+        return Response(found, headers=headers, media_type="application/json")
 
     return router
 

@@ -4,7 +4,7 @@ import asyncio
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BeforeValidator
 
 from core.estimators import STIFFNESS_OF
@@ -16,6 +16,7 @@ from service.api.budget_models import BudgetModel
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.models import LatestModel
 from service.api.problems import ProblemError, problem_responses
+from service.api.rendering import Renderings, rendered
 from service.api.series_models import GapModel, OrbitModel, SpectrumModel
 from service.api.times import ns_from_datetime, require_order, rfc3339, written_as_date
 from service.api.views import (
@@ -77,6 +78,7 @@ def bearing_router(context: Context) -> APIRouter:
         dependencies=[needs(Permission.READ)],
     )
     unknown, no_result = problem_responses(404), problem_responses(404, 409)
+    spectra, orbits = Renderings(), Renderings()
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
     async def bearings(unit: UnitId) -> list[BearingModel]:
@@ -88,11 +90,16 @@ def bearing_router(context: Context) -> APIRouter:
         """Bracket, clearance, channels, and the reference in force with where it comes from."""
         return _bearing(context, unit, bearing)
 
-    @router.get("/{bearing}/latest", summary="One bearing now", responses=unknown)
-    async def latest(unit: UnitId, bearing: BearingId) -> LatestModel:
+    @router.get(
+        "/{bearing}/latest",
+        summary="One bearing now",
+        response_model=LatestModel,
+        responses=unknown,
+    )
+    async def latest(unit: UnitId, bearing: BearingId) -> Response:
         """The newest result, without numbers where they are not current."""
         context.bearing(unit, bearing)
-        return latest_model(context.live, unit, bearing)
+        return await rendered(lambda: latest_model(context.live, unit, bearing))
 
     @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
     async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
@@ -107,23 +114,28 @@ def bearing_router(context: Context) -> APIRouter:
             raise ProblemError(409, "No result", detail)
         return found
 
-    @router.get("/{bearing}/spectrum", summary="Spectra", responses=no_result)
-    async def spectrum(unit: UnitId, bearing: BearingId) -> SpectrumModel:
+    @router.get(
+        "/{bearing}/spectrum",
+        summary="Spectra",
+        response_model=SpectrumModel,
+        responses=no_result,
+    )
+    async def spectrum(unit: UnitId, bearing: BearingId) -> Response:
         """Averaged amplitude spectra of the newest result, all channels as displacement."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
         if assessment is None:
             raise _no_result(unit, bearing)
-        return spectrum_model(assessment)
+        return await spectra.of((unit, bearing), assessment, spectrum_model)
 
-    @router.get("/{bearing}/orbit", summary="Orbit", responses=no_result)
-    async def orbit(unit: UnitId, bearing: BearingId) -> OrbitModel:
+    @router.get("/{bearing}/orbit", summary="Orbit", response_model=OrbitModel, responses=no_result)
+    async def orbit(unit: UnitId, bearing: BearingId) -> Response:
         """The newest turns of the shaft relative to the bearing."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
         if assessment is None or assessment.orbit is None:
             raise _no_result(unit, bearing)
-        return orbit_model(assessment.orbit)
+        return await orbits.of((unit, bearing), assessment.orbit, orbit_model)
 
     return router
 

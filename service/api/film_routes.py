@@ -50,14 +50,16 @@ def film_router(context: Context) -> APIRouter:
         dependencies=[needs(Permission.READ)],
     )
 
-    @router.get("", summary="A film now", responses=problem_responses(404))
-    async def film(unit: UnitId, bearing: BearingId) -> FilmModel:
+    @router.get(
+        "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
+    )
+    async def film(unit: UnitId, bearing: BearingId) -> Response:
         """Verdict, change with its uncertainty, cause and condition, by direction.
 
         A film that cannot be judged is never called normal: the verdict says why not.
         """
         context.bearing(unit, bearing)
-        return film_model(context, unit, bearing)
+        return await rendered(lambda: film_model(context, unit, bearing))
 
     @router.get(
         "/readings",

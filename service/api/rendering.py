@@ -1,7 +1,7 @@
 """Large answers are put together in a thread: the event loop only sends the bytes."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Protocol, TypeVar
 
 from fastapi import Response
@@ -51,9 +51,38 @@ async def rendered_now(make: Callable[[], Dated]) -> Response:
     return await asyncio.to_thread(lambda: _dated(make()))
 
 
+class Renderings:
+    """Large answers about what seldom changes, each rendered once for all who ask.
+
+    Parameters
+    ----------
+    n_kept
+        Most that are kept; the one asked for longest ago goes first.
+    """
+
+    def __init__(self, n_kept: int = 16) -> None:
+        self._n_kept = n_kept
+        self._kept: dict[Hashable, tuple[object, bytes, str]] = {}
+
+    async def of(self, place: Hashable, told: T, make: Callable[[T], BaseModel]) -> Response:
+        """What is told in a place, by the object that it is told of: another one is news."""
+        kept = self._kept.pop(place, None)
+        if kept is None or kept[0] is not told:
+            kept = (told, *await worked(lambda: _content(make(told))))
+        self._kept[place] = kept
+        while len(self._kept) > self._n_kept:
+            del self._kept[next(iter(self._kept))]
+        return Response(kept[1], media_type=JSON, headers={"ETag": kept[2]})
+
+
 def _json(model: BaseModel) -> Response:
+    content, tag = _content(model)
+    return Response(content, media_type=JSON, headers={"ETag": tag})
+
+
+def _content(model: BaseModel) -> tuple[bytes, str]:
     content = model.model_dump_json().encode()
-    return Response(content, media_type=JSON, headers={"ETag": tag_of(digest_of(content))})
+    return content, tag_of(digest_of(content))
 
 
 def _dated(model: Dated) -> Response:
