@@ -187,7 +187,13 @@ class Store(Protocol):
         ...
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> Sequence[Gap]:
-        """Read the recorded gaps whose end lies in a range of time, oldest first."""
+        """Read the recorded gaps whose end lies in a range of time, oldest first.
+
+        Raises
+        ------
+        QueryTooLargeError
+            If they are too many.
+        """
         ...
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:

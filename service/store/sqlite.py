@@ -29,6 +29,7 @@ from service.store.outbox import SqliteOutbox
 from service.store.outbox_port import Address, nobody
 from service.store.port import (
     AlarmQuery,
+    QueryTooLargeError,
     StoredEvent,
     StoredReadings,
     StoreError,
@@ -46,6 +47,9 @@ from service.store.trends import storable
 from service.store.vector_references import SqliteVectorReferences
 
 BUSY_TIMEOUT_S = 5.0
+MAX_GAPS = 5000
+"""Most gaps that are handed out at once."""
+
 LOOK_AFTER_STEPS = 20_000
 """Steps of the database's machine, some tens of microseconds, after which a read looks whether
 anybody still waits for it."""
@@ -148,10 +152,14 @@ class SqliteStore:
         with self._reader() as reader:
             rows = reader.execute(
                 "SELECT epoch, first_index, n_samples, stop_ns FROM gap"
-                " WHERE unit = ? AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index",
-                (unit, storable(start_ns), storable(end_ns)),
+                " WHERE unit = ? AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index"
+                " LIMIT ?",
+                (unit, storable(start_ns), storable(end_ns), MAX_GAPS + 1),
             )
-            return [Gap(*row) for row in rows]
+            found = [Gap(*row) for row in rows]
+        if len(found) > MAX_GAPS:
+            raise QueryTooLargeError(f"more than {MAX_GAPS} gaps: ask for a shorter time")
+        return found
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:
         """Read the newest readings of a bearing; None if there are none."""

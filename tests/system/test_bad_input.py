@@ -1,6 +1,7 @@
 """What is sent to the real service to break it ends in the right 4xx, and costs it nothing."""
 
 import csv
+import io
 import json
 import re
 import signal
@@ -24,6 +25,12 @@ MOST_GROWTH = 64 * MIB
 
 COMMENT = "/api/v1/alarms/U1:link:link_lost/comment"
 TRENDS = "/api/v1/units/U1/bearings/UJB/trends"
+GOOD = {
+    "quantity": "speed_rpm",
+    "start": "2026-01-01T00:00:00Z",
+    "end": "2026-01-02T00:00:00Z",
+}
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 NASTY = [
     "'; DROP TABLE assessment; --",
     '<script>alert("1")</script>',
@@ -175,7 +182,8 @@ def test_a_number_that_is_none_is_refused(service: Service, number: str) -> None
 )
 def test_a_range_that_is_none_is_refused(service: Service, asked: dict[str, str]) -> None:
     with service.client() as client:
-        answer = client.get(TRENDS, params={"quantity": "speed_rpm", **asked})
+        assert client.get(TRENDS, params=GOOD).status_code == 200
+        answer = client.get(TRENDS, params={**GOOD, **asked})
 
     refused(answer, 422)
 
@@ -183,7 +191,7 @@ def test_a_range_that_is_none_is_refused(service: Service, asked: dict[str, str]
 def test_a_range_of_all_time_is_answered(service: Service) -> None:
     whole = {"start": "0001-01-01T00:00:00Z", "end": "9999-12-31T23:59:59Z"}
     with service.client() as client:
-        answer = client.get(TRENDS, params={"quantity": "speed_rpm", **whole})
+        answer = client.get(TRENDS, params={**GOOD, **whole})
 
     assert answer.status_code == 200
 
@@ -209,14 +217,19 @@ def test_words_with_code_in_them_stay_words(service: Service, words: str) -> Non
     assert audit.json()["entries"][0]["reason"] == words
 
 
-def test_no_cell_of_a_csv_file_is_a_formula(service: Service) -> None:
+@pytest.mark.parametrize("path", [TRENDS, "/api/v1/alarms/events", "/api/v1/audit"])
+def test_no_cell_of_a_csv_file_is_a_formula(service: Service, path: str) -> None:
+    for words in NASTY:
+        service.post(COMMENT, json.dumps({"actor": words, "text": words}).encode())
+    asked = {"format": "csv"} | (GOOD if path == TRENDS else {})
     with service.client() as client:
-        answer = client.get(TRENDS, params={"quantity": "speed_rpm", "format": "csv"})
-    cells = [cell for row in csv.reader(answer.text.splitlines()) for cell in row]
+        answer = client.get(path, params=asked)
+    cells = [cell for row in csv.reader(io.StringIO(answer.text)) for cell in row]
 
-    assert cells
+    assert answer.headers["content-type"].startswith("text/csv")
+    assert (f"'{NASTY[2]}" in cells) == (path != TRENDS)
     number = re.compile(r"-?\d[\d.e+-]*")
-    assert not [c for c in cells if c.startswith(("=", "+", "-", "@")) and not number.fullmatch(c)]
+    assert not [c for c in cells if c.startswith(FORMULA_STARTS) and not number.fullmatch(c)]
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,10 @@
-"""A read that nobody waits for any more is given up."""
+"""No read goes on for nobody, and none hands out without limit."""
 
 import pytest
 
 from service.asker import ASKER, Asker
 from service.store import sqlite
-from service.store.port import StoreError
+from service.store.port import QueryTooLargeError, StoreError
 from service.store.sqlite import SqliteStore
 
 
@@ -22,3 +22,12 @@ def test_a_read_ends_when_its_asker_has_gone(store: SqliteStore, query, monkeypa
     finally:
         ASKER.reset(before)
     assert store.trend(query()).time_ns == []
+
+
+def test_more_gaps_than_anybody_reads_are_refused(store: SqliteStore, gap, monkeypatch) -> None:
+    monkeypatch.setattr(sqlite, "MAX_GAPS", 2)
+    store.append([], [gap(stop_ns, first_index=stop_ns) for stop_ns in (1, 2, 3)])
+
+    assert len(store.gaps("U1", 0, 3)) == 2
+    with pytest.raises(QueryTooLargeError, match="more than 2 gaps"):
+        store.gaps("U1", 0, 4)
