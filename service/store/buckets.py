@@ -104,7 +104,10 @@ def _bucket_series(summed: Summaries, column: int, filled: IntArray, n_buckets: 
 
 
 def _listed(values: FloatArray) -> list[float | None]:
-    return [None if np.isnan(value) else value for value in values.tolist()]
+    listed = values.astype(object)
+    listed[np.isnan(values)] = None
+    found: list[float | None] = listed.tolist()
+    return found
 
 
 def _levels(levels: IntArray) -> list[Level | None]:

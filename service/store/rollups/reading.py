@@ -1,13 +1,15 @@
 """Trends out of roll-ups and rows: as buckets, or as single readings where they are few."""
 
 import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from service.store.buckets import bucket_width_ns, bucketed, page, single_points
 from service.store.port import Trend, TrendQuery
 from service.store.rollups.cover import Cover, covered
 from service.store.rollups.widths import WIDTHS_NS
 from service.store.summaries import Summaries
-from service.store.trends import select_page, select_readings, storable
+from service.store.trends import Span, select_page, select_readings, storable
 
 
 def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
@@ -22,8 +24,12 @@ def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
         return page(select_page(reader, query), query.max_points, query.hole_ns)
     whole = (storable(query.start_ns), storable(query.end_ns))
     width_ns = bucket_width_ns(*whole, query.max_points)
+    with _one_state(reader):
+        return _read(reader, query, whole, width_ns)
+
+
+def _read(reader: sqlite3.Connection, query: TrendQuery, whole: Span, width_ns: int) -> Trend:
     fitting_ns = [width for width in WIDTHS_NS if width_ns % width == 0]
-    reader.execute("BEGIN")  # one state of the database for all that is read
     cover = covered(reader, query, whole, fitting_ns, width_ns)
     n_single, singles = select_readings(reader, query, cover.spans, width_ns)
     if cover.n_rolled + n_single > query.max_points:
@@ -33,5 +39,16 @@ def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
     return single_points(singles, query.hole_ns)
 
 
-def _all_spans(cover: Cover) -> list[tuple[int, int]]:
+@contextmanager
+def _one_state(reader: sqlite3.Connection) -> Iterator[None]:
+    """Read all from one state of the database, whatever is written meanwhile."""
+    reader.execute("BEGIN")
+    try:
+        yield
+    finally:
+        if reader.in_transaction:  # some errors have ended it already
+            reader.execute("ROLLBACK")
+
+
+def _all_spans(cover: Cover) -> list[Span]:
     return sorted([*cover.spans, *cover.rolled_spans])
