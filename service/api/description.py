@@ -5,6 +5,7 @@ from typing import Any
 from service.api.examples import Examples
 from service.api.origin_header import HEADER as ORIGIN_HEADER
 from service.api.revalidation import TIME_HEADER
+from service.dashboard.edition import HEADER as EDITION_HEADER
 
 JSON = "application/json"
 
@@ -17,12 +18,13 @@ IF_NONE_MATCH: dict[str, Any] = {
     "example": 'W/"1f2e3d4c5b6a79880716253f"',
 }
 
+ETAG = {
+    "description": "Names what the answer says; ages and the present time count for nothing.",
+    "schema": {"type": "string"},
+    "example": IF_NONE_MATCH["example"],
+}
+
 HEADERS = {
-    "ETag": {
-        "description": "Names what the answer says; ages and the present time count for nothing.",
-        "schema": {"type": "string"},
-        "example": IF_NONE_MATCH["example"],
-    },
     TIME_HEADER: {
         "description": "When it was given: by it, ages in an answer that was kept are counted on.",
         "schema": {"type": "string"},
@@ -33,9 +35,18 @@ HEADERS = {
         "schema": {"type": "string", "enum": ["live", "replay"]},
         "example": "live",
     },
+    EDITION_HEADER: {
+        "description": "Which program gave it: another one after an upgrade.",
+        "schema": {"type": "string"},
+        "example": "1.0.0-1f2e3d4c",
+    },
 }
+"""Of every answer of the API."""
 
-NOT_MODIFIED = {"description": "Nothing is new since the answer of that `ETag`", "headers": HEADERS}
+NOT_MODIFIED = {
+    "description": "Nothing is new since the answer of that `ETag`",
+    "headers": {"ETag": ETAG, **HEADERS},
+}
 
 
 def describe_answers(document: dict[str, Any]) -> None:
@@ -45,6 +56,8 @@ def describe_answers(document: dict[str, Any]) -> None:
         for method, operation in methods.items():
             operation["operationId"] = operation_id(method, path)
             _add_examples(operation, examples)
+            if path.startswith("/api/"):
+                _add_headers(operation)
             if method == "get" and path.startswith("/api/"):
                 _add_tags(operation)
 
@@ -63,9 +76,15 @@ def _add_examples(operation: dict[str, Any], examples: Examples) -> None:
             content["example"] = examples.of(content["schema"])
 
 
+def _add_headers(operation: dict[str, Any]) -> None:
+    for status, answer in operation["responses"].items():
+        if status.startswith("2"):
+            answer["headers"] = {**HEADERS, **answer.get("headers", {})}
+
+
 def _add_tags(operation: dict[str, Any]) -> None:
     answer = operation["responses"]["200"]
     if JSON in answer.get("content", {}):
         operation.setdefault("parameters", []).append(IF_NONE_MATCH)
         operation["responses"]["304"] = NOT_MODIFIED
-        answer["headers"] = {**HEADERS, **answer.get("headers", {})}
+        answer["headers"] = {"ETag": ETAG, **answer["headers"]}
