@@ -35,8 +35,12 @@ n_segments = 6
 
 [alarms]
 link_lost_after_s = 2.0
+
+[spectra]
+dense_every_s = 1.0
 """
-"""The first result after seven seconds, then one every 3.4; the plant's own are 14 and 12."""
+"""The first result after seven seconds, then one every 3.4, each with its spectrum; the plant's own
+are 14 and 12."""
 
 OWN_TABLES = re.compile(r"^\[(?:analysis|alarms)\]\n(?:[^\[\n].*\n|\n)*", re.MULTILINE)
 """What an example itself says of these."""

@@ -14,11 +14,13 @@ import { auditPage } from "./pages/audit.js";
 import { bearingPage } from "./pages/bearing.js";
 import { explorerPage } from "./pages/explorer.js";
 import { filmPage } from "./pages/film.js";
+import { orbitsPage } from "./pages/orbits.js";
 import { overviewPage } from "./pages/overview.js";
 import { recordingsPage } from "./pages/recordings.js";
 import { sourcesPage } from "./pages/sources.js";
 import { unitPage } from "./pages/unit.js";
 import { unknownPage } from "./pages/unknown.js";
+import { waterfallPage } from "./pages/waterfall.js";
 
 export const PAGES = [
   { pattern: "#/", title: "overview", nav: "Plant", open: overviewPage },
@@ -31,6 +33,8 @@ export const PAGES = [
   { pattern: "#/units/:unit", title: (unit) => unit, open: unitPage },
   { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },
   { pattern: "#/units/:unit/bearings/:bearing/film", title: (unit, bearing) => `film of ${unit} ${bearing}`, open: filmPage },
+  { pattern: "#/units/:unit/bearings/:bearing/waterfall", title: (unit, bearing) => `spectra over time of ${unit} ${bearing}`, open: waterfallPage },
+  { pattern: "#/units/:unit/bearings/:bearing/orbits", title: (unit, bearing) => `orbits of ${unit} ${bearing}`, open: orbitsPage },
 ];
 
 /** What an address leads to that none of the pages has. */

@@ -14,6 +14,16 @@ export function bearingAddress(unit, bearing) {
   return `#/units/${encodeURIComponent(unit)}/bearings/${encodeURIComponent(bearing)}`;
 }
 
+/** Address of the spectra of a bearing over time. */
+export function waterfallAddress(unit, bearing) {
+  return `${bearingAddress(unit, bearing)}/waterfall`;
+}
+
+/** Address of the player of a bearing’s orbits. */
+export function orbitAddress(unit, bearing) {
+  return `${bearingAddress(unit, bearing)}/orbits`;
+}
+
 /** Address of the page of a bearing's film. */
 export function filmAddress(unit, bearing) {
   return `${bearingAddress(unit, bearing)}/film`;

@@ -9,6 +9,7 @@ import { formatFixed } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
 import { poll } from "../poll.js";
+import { orbitAddress, waterfallAddress } from "../route.js";
 import { NOT_CURRENT, reasonSentence, reasonWords } from "../words.js";
 import { centreTrail, trendPanels } from "./trend_panels.js";
 
@@ -55,7 +56,7 @@ function asking(box, path, show, absence = () => null) {
 }
 
 function orbitChart(path) {
-  const box = panel("Orbit", "orbit");
+  const box = panel("Orbit", "orbit", element("a", { href: orbitAddress(path[1], path[3]) }, "Orbit player"));
   return resultChart(box, [...path, "orbit"], (orbit) =>
     box.show(orbitTraces(orbit), orbitLayout(orbit), orbitCaption(orbit)),
   );
@@ -95,7 +96,8 @@ function spectrumChart(path) {
   };
   const spans = [[3, "0–3 Hz"], [25, "0–25 Hz"]];
   const span = choice("Range", spans, 3, () => spectrum && show());
-  const box = panel("Spectrum", "spectrum", span.node);
+  const overTime = element("a", { href: waterfallAddress(path[1], path[3]) }, "Spectra over time");
+  const box = panel("Spectrum", "spectrum", overTime, span.node);
   return resultChart(box, [...path, "spectrum"], (answer) => {
     spectrum = answer;
     return show();

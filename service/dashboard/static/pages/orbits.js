@@ -1,0 +1,165 @@
+/** The orbit player: a shaft's motion as it is now, or at any moment of a recording. */
+
+import { NotReachable } from "../api.js";
+import { reachOf } from "../charts/orbit_clip.js";
+import { orbitPicture } from "../charts/orbit_picture.js";
+import { timebasePicture } from "../charts/timebase_picture.js";
+import { element, setText } from "../dom.js";
+import { STOPPED, advanced, moved } from "../parts/playhead.js";
+import { poll } from "../poll.js";
+import { onTheme } from "../theme.js";
+import { bearingHead } from "./bearing_head.js";
+import { orbitChoices } from "./orbit_choices.js";
+import { orbitControls } from "./orbit_controls.js";
+import { orbitFacts } from "./orbit_facts.js";
+import { liveSource, recordedSource } from "./orbit_source.js";
+
+const PERIOD_S = 2;
+
+/** How far behind the newest sample live motion is played, so that it never has to wait for one, s. */
+const LAG_S = 3.5;
+
+/** Longest step of the picture: a tab that slept does not leap, s. */
+const LONGEST_STEP_S = 0.25;
+
+/** Returns `{ draw(view), close() }`. */
+export function orbitsPage(main, unit, bearing) {
+  const path = ["units", unit, "bearings", bearing];
+  const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const head = bearingHead(unit, bearing, "orbit player", "orbits");
+  const choices = orbitChoices(unit, bearing, choose, paint);
+  const controls = orbitControls({ play, step, seek, hasten });
+  const [orbit, timebase, facts] = [orbitPicture(), timebasePicture(), orbitFacts()];
+  const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
+  const pictures = element("div", { class: "orbit-pictures", hidden: "" }, orbit.node, timebase.node);
+  const player = element("section", { class: "panel player", "aria-label": "Player" }, sentence, pictures, controls.node, facts.node);
+  main.append(element("div", { class: "bearing orbit-page" }, head.node, choices.node, player));
+
+  let source = liveSource(path);
+  let clip = null;
+  let at = { ...STOPPED, isPlaying: !isStill };
+  let trouble = null;
+  let shownMs = null;
+  let hasSamples = false;
+  let absence = "Asking the service.";
+
+  const follows = () => source.isLive && at.isPlaying && at.speed === 1;
+  function wants() {
+    if (source.isLive) return hasSamples && (clip === null || follows());
+    return clip === null || source.needs(clip, at.atS);
+  }
+
+  const questions = poll(async (signal) => {
+    if (!wants()) return;
+    const asked = source;
+    try {
+      const found = await asked.clip(at.atS, signal);
+      if (asked === source) take(found);
+    } catch (failure) {
+      if (signal.aborted) return;
+      trouble = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
+      paint();
+    }
+  }, () => PERIOD_S);
+
+  /** A new piece is here: stay at the same moment, unless that is gone. */
+  function take(found) {
+    const isNew = clip === null || (source.isLive && clip.epoch !== found.epoch);
+    [clip, trouble] = [{ ...found, reach: reachOf(found) }, null];
+    const isGone = at.atS < clip.startS || at.atS > clip.endS;
+    const isLate = isNew || isGone || at.atS < clip.endS - 2 * LAG_S;
+    if (source.isLive && isLate) at = moved(at, clip.endS - LAG_S, clip);
+    if (!source.isLive && at.atS < clip.startS) at = { ...at, atS: clip.startS }; // nothing is in between
+    paint();
+  }
+
+  function choose(recording) {
+    source = recording === null ? liveSource(path) : recordedSource(recording, bearing);
+    clip = null;
+    at = { ...at, atS: 0, isPlaying: !isStill };
+    setText(sentence, "Asking the service.");
+    questions.again();
+    paint();
+  }
+  function play(isPlaying = !at.isPlaying) {
+    const isOver = clip !== null && !source.isLive && at.atS >= clip.total_s - 0.05;
+    at = { ...at, isPlaying, atS: isPlaying && isOver ? 0 : at.atS };
+    questions.again();
+    paint();
+  }
+  function step(turns) {
+    if (clip === null) return;
+    at = { ...at, isPlaying: false };
+    seek(at.atS + turns * (clip.turnS ?? 1));
+  }
+  function seek(toS) {
+    if (clip === null) return;
+    at = moved(at, toS, source.isLive ? clip : { startS: 0, endS: clip.total_s });
+    if (wants()) questions.again();
+    paint();
+  }
+  function hasten(speed) {
+    at = { ...at, speed };
+    if (follows()) questions.again();
+    paint();
+  }
+
+  function frame(nowMs) {
+    timer = requestAnimationFrame(frame);
+    const elapsedS = shownMs === null ? 0 : Math.min((nowMs - shownMs) / 1000, LONGEST_STEP_S);
+    shownMs = nowMs;
+    if (!at.isPlaying || clip === null) return;
+    at = advanced(at, elapsedS, clip, source.isLive && !follows());
+    if (!source.isLive && at.atS >= clip.total_s - 0.02) at = { ...at, isPlaying: false };
+    paint();
+  }
+
+  function paint() {
+    const isThere = clip !== null && at.atS >= clip.startS - 1e-6 && at.atS <= clip.endS + 1e-6;
+    const words = trouble ?? (isThere ? null : waitingWords(clip, source, absence));
+    sentence.hidden = words === null;
+    if (words !== null) setText(sentence, words);
+    pictures.hidden = clip === null;
+    controls.draw(at, clip, source);
+    facts.draw(isThere ? clip : null, at, source, choices.how());
+    if (!isThere) return;
+    for (const picture of [orbit, timebase]) picture.draw(clip, at.atS, choices.how());
+  }
+
+  const onResize = () => paint();
+  const stopTheme = onTheme(paint);
+  window.addEventListener("resize", onResize);
+  let timer = requestAnimationFrame(frame);
+  return {
+    draw(view) {
+      head.draw(view);
+      const had = hasSamples;
+      absence = absenceWords(view, unit, bearing);
+      hasSamples = absence === null;
+      if (hasSamples && !had) questions.again();
+      if (clip === null) paint();
+    },
+    close() {
+      cancelAnimationFrame(timer);
+      questions.stop();
+      controls.close();
+      stopTheme();
+      window.removeEventListener("resize", onResize);
+    },
+  };
+}
+
+/** Why there is nothing live to play; null if there is. */
+function absenceWords(view, unitId, bearingId) {
+  if (view.silenceS === null) return "Asking the service.";
+  const unit = view.units.find(({ id }) => id === unitId);
+  if (!unit?.bearings.some(({ bearing }) => bearing === bearingId)) return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
+  return unit.source.data_age_s === null ? "No sample of this unit has arrived since the service started." : null;
+}
+
+function waitingWords(clip, source, absence) {
+  if (clip === null && source.isLive && absence !== null) return absence;
+  if (clip === null) return "Asking the service.";
+  if (source.isLive) return "Waiting for newer samples.";
+  return "Fetching this part of the recording; where samples are missing there is nothing to play.";
+}

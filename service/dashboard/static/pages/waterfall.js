@@ -1,0 +1,149 @@
+/** Spectra of a bearing over time, and the one of a chosen moment. */
+
+import { NotReachable, ask } from "../api.js";
+import { changeWords, kindWords } from "../alarm_words.js";
+import { momentCaption, momentLayout, momentTraces } from "../charts/moment_spectrum.js";
+import { panel } from "../charts/panel.js";
+import { alarmTraces, lineTraces, mapTraces, markTraces, nLines, waterfallLayout } from "../charts/waterfall.js";
+import { alongOrders, ordersOf, rowsOf } from "../charts/waterfall_rows.js";
+import { highest } from "../charts/waterfall_scale.js";
+import { element } from "../dom.js";
+import { formatTime } from "../format.js";
+import { poll } from "../poll.js";
+import { onTheme } from "../theme.js";
+import { bearingHead } from "./bearing_head.js";
+import { momentSlider } from "./waterfall_moment.js";
+import { waterfallChoices } from "./waterfall_choices.js";
+
+const MAX_SPECTRA = 240;
+const MAX_ALARMS = 200;
+const PERIOD_S = 30;
+
+/** Returns `{ draw(view), close() }`. */
+export function waterfallPage(main, unit, bearing) {
+  const path = ["units", unit, "bearings", bearing];
+  const head = bearingHead(unit, bearing, "spectra over time", "waterfall");
+  const choices = waterfallChoices(() => questions.again(), show);
+  const map = panel("Spectra over time", "waterfall");
+  const single = panel("Spectrum of the moment", "moment");
+  const moment = momentSlider(show);
+  main.append(element("div", { class: "bearing waterfall-page" }, head.node, choices.node, map.node, moment.node, single.node));
+  let found = null;
+  let view = null;
+
+  const questions = poll(async (signal) => {
+    if (view?.serviceTimeMs == null) return;
+    const range = choices.range(view.serviceTimeMs);
+    try {
+      found = await askSpectra(path, choices.place(), range, signal);
+      await show();
+    } catch (failure) {
+      if (signal.aborted) return;
+      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
+      for (const box of [map, single]) box.trouble(words);
+    }
+  }, () => PERIOD_S);
+
+  async function show() {
+    if (found === null) return;
+    const absence = absenceWords(found, choices);
+    moment.offer(found.spectra, absence === null);
+    if (absence !== null) {
+      for (const box of [map, single]) box.explain(absence);
+      return;
+    }
+    const drawn = drawnOf(found, choices);
+    await showMap(map, drawn, found, moment);
+    await showMoment(single, drawn, found.spectra, moment.index());
+  }
+
+  const stopTheme = onTheme(() => show()); // shades of a map are colours, not names of colours
+  return {
+    draw(now) {
+      const first = view?.serviceTimeMs == null && now.serviceTimeMs !== null;
+      view = now;
+      head.draw(now);
+      if (first) questions.again();
+      for (const box of [map, single]) box.draw(null, null);
+    },
+    close() {
+      questions.stop();
+      stopTheme();
+    },
+  };
+}
+
+async function askSpectra(path, place, { startMs, endMs }, signal) {
+  const times = [["start", new Date(startMs).toISOString()], ["end", new Date(endMs).toISOString()]];
+  const query = [...times, ["channel", place], ["max_spectra", String(MAX_SPECTRA)]];
+  const spectra = await ask([...path, "spectra"], query, signal);
+  const [, unit, , bearing] = path;
+  const { events } = await ask(["alarms", "events"], [...times, ["unit", unit], ["limit", String(MAX_ALARMS)]], signal);
+  const alarms = events
+    .filter(({ subject, change }) => subject === bearing && ["raised", "escalated"].includes(change))
+    .map(({ time, kind, change }) => ({ timeS: Date.parse(time) / 1000, words: `${kindWords(kind)} ${changeWords(change)}` }));
+  return { spectra, alarms, place, startS: startMs / 1000, endS: endMs / 1000 };
+}
+
+/** What is drawn, with the choices put in. */
+function drawnOf({ spectra, place, startS, endS }, choices) {
+  const inOrders = choices.inOrders();
+  const plain = rowsOf(spectra, place);
+  const abscissa = inOrders ? ordersOf(plain, spectra.frequency_hz) : spectra.frequency_hz;
+  const rows = inOrders ? alongOrders(plain, spectra.frequency_hz, abscissa) : plain;
+  const turns = plain.map(({ order1Hz }) => order1Hz).filter(Boolean);
+  const turnHz = turns.at(-1) ?? null;
+  const toUpper = Math.min(choices.toOrder() * (inOrders ? 1 : (turnHz ?? Infinity)), abscissa.at(-1));
+  const common = { rows, abscissa, inOrders, turnHz, toUpper, isLog: choices.isLog(), unit: inOrders ? "×" : "Hz" };
+  return { ...common, startS, endS, headroom: choices.asLines(), revision: choices.revision() };
+}
+
+function absenceWords({ spectra, place }, choices) {
+  const simulated = spectra.simulated_until && Date.parse(spectra.simulated_until);
+  const past = simulated ? ` What is older than ${formatTime(simulated)} is simulated: readings without spectra.` : "";
+  if (spectra.first === null) {
+    return `No spectrum of this bearing is kept yet. The first is kept with its first result from samples.${past}`;
+  }
+  if (spectra.time.length === 0) {
+    const first = formatTime(Date.parse(spectra.first));
+    return `No spectrum is kept of this time. The oldest that is kept is of ${first}.${past}`;
+  }
+  if (!spectra.channels[place].amplitude.some(Boolean)) return "This channel was not usable at any time of this range.";
+  if (choices.inOrders() && !spectra.order1_hz.some(Boolean)) {
+    return "The running speed was not known in this range: there are no multiples of it. Choose the axis in Hz.";
+  }
+  return null;
+}
+
+async function showMap(box, drawn, found, moment) {
+  const { spectra, alarms } = found;
+  const traces = [...(drawn.headroom ? lineTraces(drawn) : mapTraces(drawn)), ...markTraces(drawn), ...alarmTraces(alarms, drawn.toUpper)];
+  await box.show(traces, waterfallLayout(drawn, spectra.time[moment.index()]), mapCaption(drawn, found));
+  moment.hear(box.node.querySelector(".chart"), spectra);
+}
+
+function mapCaption(drawn, { spectra, alarms }) {
+  const from = formatTime(spectra.time[0] * 1000);
+  const n = drawn.headroom ? nLines(drawn.rows) : spectra.time.length;
+  const thinned = spectra.n_found > n ? `${n} of ${spectra.n_found}` : String(n);
+  const { n_other_resolution: nOther, damaged, simulated_until: simulated } = spectra;
+  const sentences = [
+    `${thinned} spectra from ${from} on, each of its moment.`,
+    "Dotted: 1× and vortex. Empty: no samples, or the channel failed.",
+    alarms.length ? "Triangles: alarms of this bearing." : "",
+    nOther ? `${nOther} with other lines, from before the analysis was set up anew, are left out.` : "",
+    damaged.length ? `${damaged.length} are damaged on the disk and left out.` : "",
+    simulated ? `Readings before ${formatTime(Date.parse(simulated))} are simulated and have no spectra.` : "",
+  ];
+  return sentences.filter(Boolean).join(" ");
+}
+
+async function showMoment(box, drawn, spectra, index) {
+  const row = drawn.rows[index];
+  if (!row?.amplitude) {
+    box.explain(`No spectrum of this channel at ${formatTime(spectra.time[index] * 1000)}: it was not usable.`);
+    return;
+  }
+  const traces = momentTraces({ ...drawn, row, name: "" });
+  await box.show(traces, momentLayout({ ...drawn, row, top: highest(drawn) }), momentCaption({ spectra, index }));
+}

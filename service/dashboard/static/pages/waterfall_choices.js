@@ -1,0 +1,49 @@
+/** What a waterfall shows: channel, time, scale, axis, picture. */
+
+import { element } from "../dom.js";
+import { choice } from "../parts/choice.js";
+
+const PLACES = [["shaft_x", "Shaft x"], ["shaft_y", "Shaft y"], ["bearing_x", "Bearing x"], ["bearing_y", "Bearing y"]];
+const SPANS = [[3600, "1 h"], [8 * 3600, "8 h"], [86400, "1 d"], [7 * 86400, "7 d"], [30 * 86400, "30 d"], [365 * 86400, "1 y"]];
+const SCALES = [["log", "Logarithmic"], ["linear", "Linear"]];
+const AXES = [["hz", "Hz"], ["orders", "× speed"]];
+const UPPERS = [[2.5, "2.5×"], [6, "6×"], [Infinity, "All"]];
+const PICTURES = [["map", "Map"], ["lines", "Lines"]];
+
+/** `ask` is called when other spectra are needed, `show` when those there are to be drawn otherwise. */
+export function waterfallChoices(ask, show) {
+  let shiftS = 0;
+  const renewed = () => {
+    shiftS = 0;
+    moved();
+  };
+  const place = choice("Channel", PLACES, "shaft_x", ask);
+  const span = choice("Time", SPANS, 3600, renewed);
+  const scale = choice("Amplitude", SCALES, "log", show);
+  const axis = choice("Axis", AXES, "hz", show);
+  const upper = choice("Up to", UPPERS, 6, show);
+  const picture = choice("Picture", PICTURES, "map", show);
+  const earlier = element("button", { type: "button" }, "◂ Earlier");
+  const later = element("button", { type: "button", disabled: "" }, "Later ▸");
+  const shift = (by) => () => {
+    shiftS = Math.max(0, shiftS + by * (span.value() / 2));
+    moved();
+  };
+  function moved() {
+    later.disabled = shiftS === 0;
+    ask();
+  }
+  earlier.addEventListener("click", shift(1));
+  later.addEventListener("click", shift(-1));
+  const walk = element("span", { class: "walk" }, earlier, later);
+  return {
+    node: element("div", { class: "choices" }, place.node, span.node, walk, picture.node, scale.node, axis.node, upper.node),
+    place: place.value,
+    range: (nowMs) => ({ startMs: nowMs - (shiftS + span.value()) * 1000, endMs: nowMs - shiftS * 1000 }),
+    isLog: () => scale.value() === "log",
+    inOrders: () => axis.value() === "orders",
+    toOrder: upper.value,
+    asLines: () => picture.value() === "lines",
+    revision: () => [place, span, scale, axis, upper, picture].map((one) => one.value()).join(" ") + shiftS,
+  };
+}
