@@ -1,6 +1,6 @@
 """Which methods a path has: those of the operations that fit it most closely."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 METHODS = ("get", "put", "post", "delete", "patch", "options", "head", "trace")
@@ -25,8 +25,7 @@ def allowed_methods(paths: Mapping[str, Mapping[str, Any]], path: str) -> list[s
     return [method.upper() for method in METHODS if method in paths[closest]]
 
 
-def _fits(template: Iterable[str], asked: list[str]) -> bool:
-    parts = list(template)
-    return len(parts) == len(asked) and all(
-        part.startswith("{") or part == given for part, given in zip(parts, asked, strict=True)
+def _fits(template: list[str], asked: list[str]) -> bool:
+    return len(template) == len(asked) and all(
+        part.startswith("{") or part == given for part, given in zip(template, asked, strict=True)
     )
