@@ -4,6 +4,7 @@ from typing import Any
 
 from service.api.examples import Examples
 from service.api.origin_header import HEADER as ORIGIN_HEADER
+from service.api.problems import problem_schemas
 from service.api.revalidation import TIME_HEADER
 from service.dashboard.edition import HEADER as EDITION_HEADER
 
@@ -51,7 +52,9 @@ NOT_MODIFIED = {
 
 def describe_answers(document: dict[str, Any]) -> None:
     """Complete a description with what every operation has in common."""
-    examples = Examples(document.get("components", {}).get("schemas", {}))
+    schemas = document.setdefault("components", {}).setdefault("schemas", {})
+    schemas.update(problem_schemas())
+    examples = Examples(schemas)
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
             operation["operationId"] = operation_id(method, path)

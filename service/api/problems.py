@@ -7,13 +7,15 @@ import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from service.api.methods import allowed_methods
 from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"
+
+SCHEMAS = "#/components/schemas/"
 
 WORDS = {
     404: "Unknown unit or bearing",
@@ -28,6 +30,8 @@ log = structlog.get_logger()
 class Mistake(BaseModel):
     """One wrong parameter of a request."""
 
+    model_config = ConfigDict(extra="forbid")
+
     parameter: str = Field(description="Its name.", examples=["max_points"])
     detail: str = Field(
         description="What is allowed.", examples=["Input should be less than or equal to 5000"]
@@ -36,6 +40,8 @@ class Mistake(BaseModel):
 
 class Problem(BaseModel):
     """A problem document (RFC 9457)."""
+
+    model_config = ConfigDict(extra="forbid")
 
     type: str = Field(default="about:blank", description="Always this.", examples=["about:blank"])
     title: str = Field(description="Kind of problem.", examples=["Unknown unit"])
@@ -94,10 +100,15 @@ def refuse_unknown_parameters(request: Request) -> None:
             raise ProblemError(422, "Wrong parameter", detail, name)
 
 
+def problem_schemas() -> dict[str, Any]:
+    """Schemas that the entries refer to, by name."""
+    schema = Problem.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
+    return {**schema.pop("$defs"), "Problem": schema}
+
+
 def _documented(words: str) -> dict[str, Any]:
-    schema = Problem.model_json_schema()
-    schema["properties"]["errors"]["items"] = schema.pop("$defs")["Mistake"]
-    return {"description": words, "content": {MEDIA_TYPE: {"schema": schema}}}
+    content = {"schema": {"$ref": f"{SCHEMAS}Problem"}}
+    return {"description": words, "content": {MEDIA_TYPE: content}}
 
 
 def install_problem_handlers(app: FastAPI) -> None:

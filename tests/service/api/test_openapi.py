@@ -83,7 +83,7 @@ def test_every_error_is_documented_as_a_problem(
                 continue
             [(media_type, content)] = response["content"].items()
             assert media_type == "application/problem+json", f"{name} {status}"
-            assert "instance" in content["schema"]["properties"]
+            assert content["schema"] == {"$ref": "#/components/schemas/Problem"}
 
 
 def test_every_answer_and_every_question_has_an_example_that_fits_its_schema(
@@ -101,6 +101,14 @@ def test_every_answer_and_every_question_has_an_example_that_fits_its_schema(
                 raise AssertionError(f"{name}: {problem}")
             n_checked += 1
     assert n_checked > 60
+
+
+async def test_a_problem_is_as_it_is_described(service: Any) -> None:
+    problem = await service.problem("/api/v1/units/U1/gaps", 422, start="x", end="2026-01-01Z")
+
+    schema = {"$ref": "#/components/schemas/Problem", "components": service.document["components"]}
+    Draft202012Validator(schema).validate(problem)
+    assert {mistake["parameter"] for mistake in problem["errors"]} >= {"start"}
 
 
 def test_no_example_holds_a_number_that_is_none(service: Any) -> None:
