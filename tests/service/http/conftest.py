@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import pytest
 from starlette.types import Receive, Scope, Send
 
+from service.asker import ASKER, Asker
 from service.http.config import GuardedConfig
 from service.http.protocol import GuardedProtocol
 from service.http.server import GuardedServer
@@ -26,10 +27,12 @@ class Application:
     """Answers with the length of the body; some paths are slow or large."""
 
     n_asked: int = 0
+    asker: Asker | None = None
     goes_on: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.n_asked += 1
+        self.asker = await asyncio.to_thread(ASKER.get)
         message = await receive()
         text = b"%d bytes" % len(message["body"])
         if scope["path"] == "/slow":

@@ -177,9 +177,12 @@ async def test_one_request_too_many_is_told_to_come_again(start) -> None:
 async def test_an_answer_that_does_not_come_is_given_up(start) -> None:
     running = await start(answer_s=1.0)
     client = await running.ask("/slow")
+    await running.until(lambda: running.app.asker is not None)
+    assert not running.app.asker.has_gone
 
     assert await client.status() == 503
     assert b"took too long" in client.body
+    assert running.app.asker.has_gone  # and so is what threads still read
 
 
 @pytest.mark.parametrize("what", ["silent", "head", "body", "unread", "unanswered"])
