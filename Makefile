@@ -8,7 +8,7 @@ NPM_FOLDER := tests/browser/javascript
 AXE := $(NPM_FOLDER)/node_modules/axe-core/axe.min.js
 SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-.PHONY: install run axe test check docs bench fuzz accuracy torture format lock clean
+.PHONY: install run axe test check docs screenshots bench fuzz accuracy torture format lock clean
 
 $(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
@@ -51,6 +51,9 @@ bench: install
 
 fuzz: install
 	$(BIN)/python benchmarks/fuzz.py
+
+screenshots: install
+	PYTHONPATH=benchmarks $(BIN)/python docs/_tools/take_pictures.py
 
 accuracy: install
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2

@@ -92,6 +92,7 @@ const REASONS = {
   part_load: "unit at part load",
   full_load: "unit at full load",
   restarted: "no data since the restart",
+  transient: "unit not settled",
   no_longer_watched: "no longer watched",
   stamp_regressed: "time ran backwards",
   stamp_repeated: "same time again",

@@ -75,7 +75,10 @@ function filmCell() {
     draw(latest, film, brief) {
       setText(none, brief.why_not ? `Not watched: ${brief.why_not}` : "");
       setText(limits, film?.is_watched ? `limit ${limitWords(film.limits)}` : "");
-      for (const line of lines) line.draw(brief[line.direction], film?.[line.direction] ?? null);
+      const found = lines.map((line) => film?.[line.direction] ?? null);
+      const said = found.map((one) => (one ? whyUnjudged(one) : ""));
+      if (said[0] === said[1]) said[0] = "";
+      lines.forEach((line, n) => line.draw(brief[line.direction], found[n], said[n]));
     },
   };
 }
@@ -88,13 +91,13 @@ function filmLine(direction) {
   return {
     node,
     direction,
-    draw(brief, found) {
+    draw(brief, found, why) {
       node.hidden = brief === null;
       if (brief === null) return;
       const [look, words] = verdictMark(brief);
       verdict.draw(look, `${direction} ${words.charAt(0).toLowerCase()}${words.slice(1)}`);
       setText(change, found ? changeBrief(found) : "");
-      setText(said, found ? whyUnjudged(found) : "");
+      setText(said, why);
     },
   };
 }

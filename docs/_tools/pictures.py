@@ -1,0 +1,73 @@
+"""Which pictures of the dashboard there are: every page, and some dark or on a phone."""
+
+from dataclasses import dataclass
+
+SCREEN = (1280, 800)
+PHONE = (360, 780)
+
+UNIT = "#/units/U2"
+BEARING = f"{UNIT}/bearings/LJB"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A page as somebody sees it.
+
+    Parameters
+    ----------
+    until
+        Selector of what must be there before it is taken.
+    is_remote
+        Whether it is asked for from elsewhere, where people must log in.
+    """
+
+    name: str
+    address: str
+    until: str
+    is_dark: bool = False
+    is_phone: bool = False
+    is_remote: bool = False
+
+
+PAGES = (
+    Picture("overview", "#/", "[data-unit]"),
+    Picture("unit", UNIT, ".film-line"),
+    Picture("bearing", BEARING, "[data-chart=spectrum] path.js-line"),
+    Picture("film", f"{BEARING}/film", "[data-chart=baseline-map] .heatmaplayer"),
+    Picture("alarms", "#/alarms", "[data-alarm]"),
+    Picture("trends", "#/trends?b=U2%2FLJB&b=U1%2FLJB", "path.js-line"),
+    Picture("waterfall", f"{BEARING}/waterfall", "[data-chart] svg, [data-chart] canvas"),
+    Picture("orbits", f"{BEARING}/orbits", "[data-chart] svg, [data-chart] canvas"),
+    Picture("sources", "#/sources", "[data-source]"),
+    Picture("recordings", "#/recordings", "[data-recording]"),
+    Picture("audit", "#/audit", "[data-entry]"),
+    Picture("access", "#/access", "[data-key]"),
+    Picture("login", "#/", ".door", is_remote=True),
+)
+"""All pages of a plant with an alarm, a recording, an account and a key."""
+
+TWENTY = Picture("twenty", "#/", "[data-unit=U20]")
+"""Of another plant."""
+
+
+def every_look(picture: Picture) -> list[Picture]:
+    """The same page light and dark, on a screen and on a phone."""
+    return [
+        Picture(
+            f"{picture.name}{'-phone' * is_phone}{'-dark' * is_dark}",
+            picture.address,
+            picture.until,
+            is_dark=is_dark,
+            is_phone=is_phone,
+            is_remote=picture.is_remote,
+        )
+        for is_phone in (False, True)
+        for is_dark in (False, True)
+    ]
+
+
+IN_THE_GUIDE = frozenset(
+    [picture.name for picture in (*PAGES, TWENTY)]
+    + ["unit-phone", "alarms-phone", "unit-dark", "film-dark"]
+)
+"""Those that the documentation shows; the others are for whoever works on the dashboard."""
