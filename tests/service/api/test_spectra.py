@@ -50,7 +50,8 @@ def toned(plant: PlantFile) -> list[Assessment]:
             channel_quality=(GOOD,) * len(unit.channels),
             slow={
                 **{channel.id: Reading(45.0) for channel in plant.unit[0].slow_channel},
-                "speed": Reading(92.3), "active_power": Reading(350.0),
+                "speed": Reading(92.3),
+                "active_power": Reading(350.0),
             },
         )
     )
