@@ -85,6 +85,8 @@ class AlarmEngine:
         self.chatter_rule = chatter or ChatterRule()
         self._chatter = ChatterWatch(self.chatter_rule)
         self._witness: Callable[[Sequence[AlarmNews]], None] | None = None
+        self.revision = 0
+        """Another number as soon as anything is known otherwise of any alarm."""
 
     def show(self, witness: Callable[[Sequence[AlarmNews]], None]) -> None:
         """Let somebody see all news at the moment at which it comes about."""
@@ -118,6 +120,8 @@ class AlarmEngine:
             What was decided about films by it, by alarm.
         """
         own = self._units[block.unit]
+        if assessments or films:
+            self.revision += 1
         news = own.take(block, assessments, self._clock.now_ns())
         news += own.films(films, block.stop_ns)
         self._tell(news)
@@ -127,6 +131,7 @@ class AlarmEngine:
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
         """Note whether samples of a unit arrive."""
+        self.revision += 1
         self._publish(self._units[unit].link(is_connected, reason, self._clock.now_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -202,6 +207,7 @@ class AlarmEngine:
             self._put(Findings(alarms=news))
 
     def _tell(self, news: list[AlarmNews]) -> None:
+        self.revision += bool(news)
         _log(news)
         self._count(news)
         if news and self._witness is not None:

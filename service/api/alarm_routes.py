@@ -38,7 +38,8 @@ from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.rendering import rendered, rendered_now, worked
+from service.api.rendering import rendered, worked
+from service.api.shared import SharedAnswer
 from service.api.tables import Format, table_content, table_response
 from service.api.times import ns_from_datetime, require_order
 from service.security.roles import Permission
@@ -80,13 +81,17 @@ def alarm_router(context: Context) -> APIRouter:
         prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
     )
 
+    engine, films, origin, clock = context.alarms, context.films, context.origin, context.clock
+    listed = SharedAnswer(
+        lambda: alarm_list_model(engine, films, origin, clock.now_ns()),
+        lambda: engine.revision,
+        clock,
+    )
+
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
     async def alarms() -> Response:
         """The alarm list, most urgent first, and what cannot be judged now."""
-        engine, films, origin = context.alarms, context.films, context.origin
-        return await rendered_now(
-            lambda: alarm_list_model(engine, films, origin, context.clock.now_ns())
-        )
+        return await listed.answer()
 
     @router.get(
         "/events",
@@ -194,7 +199,7 @@ def alarm_by_id_router(context: Context) -> APIRouter:
     return router
 
 
-def event_query(
+async def event_query(
     unit: Annotated[
         str | None, Query(max_length=32, description="Of this unit only.", examples=["U1"])
     ] = None,

@@ -61,7 +61,7 @@ def _answer(
     return AuditModel(entries=entries, next_before=next_before, head_error=head_error)
 
 
-def audit_query(
+async def audit_query(
     actor: Annotated[
         str | None, Query(max_length=MAX_NAME, description="Of this actor.", examples=["A. Name"])
     ] = None,

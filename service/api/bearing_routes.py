@@ -44,14 +44,14 @@ def _bound(words: str, example: float) -> Any:
     return Query(allow_inf_nan=False, description=words, examples=[example])
 
 
-def time_range(start: Start, end: End) -> tuple[int, int]:
+async def time_range(start: Start, end: End) -> tuple[int, int]:
     """Check a range of time."""
     start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
     require_order(start_ns, end_ns)
     return start_ns, end_ns
 
 
-def eccentricity_range(
+async def eccentricity_range(
     eccentricity_min: Annotated[float | None, _bound("Lowest eccentricity ratio.", 0.2)] = None,
     eccentricity_max: Annotated[float | None, _bound("Highest eccentricity ratio.", 0.4)] = None,
 ) -> ValueRange:
@@ -59,7 +59,7 @@ def eccentricity_range(
     return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
 
 
-def oil_temperature_range(
+async def oil_temperature_range(
     oil_temperature_min: Annotated[float | None, _bound("Lowest, °C.", 40.0)] = None,
     oil_temperature_max: Annotated[float | None, _bound("Highest, °C.", 50.0)] = None,
 ) -> ValueRange:

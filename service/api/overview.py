@@ -22,10 +22,14 @@ from service.api.plant_models import (
 from service.api.rendering import worked
 from service.api.times import rfc3339
 from service.api.views import latest_model, source_model
+from service.live import UnitStatus
 
 DATA_AGE, AGE, NONE = b'"data_age_s":', b'"age_s":', b"null"
 
 NO_UNITS = b'"units":[]}'
+
+COUNTERS_S = 1.0
+"""How old counts of samples may be: they change with every block, many times a second."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +40,18 @@ class UnitState:
     ----------
     values
         Another object is there as soon as anything is new.
+    status
+        Another object is there as soon as samples have come.
     ages_s
         Of its newest sample and of each bearing's newest result.
+    now_s
+        By a clock that never goes back.
     """
 
     values: Sequence[object]
+    status: UnitStatus
     ages_s: Sequence[float | None]
+    now_s: float
 
 
 @dataclass(frozen=True)
@@ -54,7 +64,10 @@ class UnitPart:
 
     def is_of(self, state: UnitState) -> bool:
         """Whether nothing has changed since; objects are compared, not what is in them."""
-        return all(mine is its for mine, its in zip(self.state.values, state.values, strict=True))
+        mine = self.state
+        if any(old is not new for old, new in zip(mine.values, state.values, strict=True)):
+            return False
+        return mine.status is state.status or state.now_s - mine.now_s < COUNTERS_S
 
     def filled(self, ages_s: Sequence[float | None]) -> bytes:
         """The JSON with these ages."""
@@ -95,11 +108,13 @@ class Overview:
         live, films = self._context.live, self._context.films
         bearings = [bearing.id for bearing in self._context.units[unit].bearing]
         found = [live.current(unit, bearing) for bearing in bearings]
-        values: list[object] = [live.status(unit)]
+        status = live.status(unit)
+        values: list[object] = [status.state, status.reason, status.stamp_fault]
         for bearing, current in zip(bearings, found, strict=True):
             values += (current.assessment, current.quality.reason, current.is_current)
             values += (films.newest(unit, bearing), films.baseline(unit, bearing))
-        return UnitState(values, [live.data_age_s(unit), *(current.age_s for current in found)])
+        ages_s = [live.data_age_s(unit), *(current.age_s for current in found)]
+        return UnitState(values, status, ages_s, self._context.clock.monotonic_s())
 
     def _is_old(self, unit: str, state: UnitState) -> bool:
         part = self._parts.get(unit)

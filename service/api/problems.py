@@ -84,7 +84,7 @@ def any_other_problem() -> dict[int | str, dict[str, Any]]:
     return {422: _documented(WORDS[422]), "default": _documented("Any other problem")}
 
 
-def refuse_unknown_parameters(request: Request) -> None:
+async def refuse_unknown_parameters(request: Request) -> None:
     """Answer 422 to a misspelt parameter, which would otherwise seem to have been obeyed.
 
     Raises

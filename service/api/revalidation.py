@@ -53,7 +53,8 @@ class _Answer:
     def _judged(self, head: Message, body: Message) -> Message:
         """Put the tag on the head; take the body away from who has it."""
         headers = MutableHeaders(scope=head)
-        headers.setdefault("ETag", tag_of(digest_of(body.get("body", b""))))
+        if "ETag" not in headers:
+            headers["ETag"] = tag_of(digest_of(body.get("body", b"")))
         headers["Cache-Control"] = CACHE_CONTROL
         if not is_known(headers["ETag"], self._named):
             return body

@@ -71,7 +71,7 @@ class Column:
         return harmless(self.name if self.unit is None else f"{self.name} [{self.unit}]")
 
 
-def wanted_format(
+async def wanted_format(
     request: Request,
     format: Annotated[  # noqa: A002  the name that callers know
         FormatName | None,

@@ -30,6 +30,9 @@ NICE_WIDTHS_S = (
     43200,
 )
 NICE_WIDTHS_NS = tuple(width * 1_000_000_000 for width in NICE_WIDTHS_S)
+LEVEL_OF: dict[int, Level | None] = {-1: None} | {int(level): level for level in Level}
+"""What a number stands for; looked up, since thousands are made into words at a time."""
+
 DAY_NS = 86_400_000_000_000
 MAX_DAYS = (2**63 - 1) // DAY_NS
 """Wider than that does not fit the nanoseconds; two of them hold all time since 1970."""
@@ -111,4 +114,4 @@ def _listed(values: FloatArray) -> list[float | None]:
 
 
 def _levels(levels: IntArray) -> list[Level | None]:
-    return [None if level < 0 else Level(level) for level in levels.tolist()]
+    return [LEVEL_OF[level] for level in levels.tolist()]

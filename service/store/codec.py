@@ -4,6 +4,7 @@ import json
 import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -45,10 +46,11 @@ class Layout:
         """Quantities and reasons as JSON, as they stand in the database."""
         return json.dumps(self.quantities), json.dumps(self.reasons)
 
-    @classmethod
-    def loads(cls, quantities: str, reasons: str) -> "Layout":
-        """Invert `dumps`."""
-        return cls(tuple(json.loads(quantities)), tuple(json.loads(reasons)))
+    @staticmethod
+    @lru_cache(maxsize=64)
+    def loads(quantities: str, reasons: str) -> "Layout":
+        """Invert `dumps`; every query reads the same few again."""
+        return Layout(tuple(json.loads(quantities)), tuple(json.loads(reasons)))
 
     def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
         """Values (NaN for none) and qualities, in the order of the layout."""

@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
@@ -12,7 +12,6 @@ from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from core.films.film_judge import FilmNews
 from core.quantities import CATALOGUE
-from service.asker import ASKER
 from service.audit.head import head_path
 from service.origin import Origin
 from service.store.access import SqliteAccess
@@ -21,6 +20,7 @@ from service.store.audit import SqliteAudit
 from service.store.audit_chain import AuditChain, begin_head, has_trail
 from service.store.audit_deeds import reference_deed
 from service.store.codec import Layout, columns_of, remember_layout
+from service.store.file_length import why_cut
 from service.store.film_readings import insert_film_news
 from service.store.films import SqliteFilms
 from service.store.gap_reference import GapReference
@@ -37,6 +37,7 @@ from service.store.port import (
     TrendQuery,
     UnitGap,
 )
+from service.store.readers import BUSY_TIMEOUT_S, Readers
 from service.store.references import insert_reference, select_history, select_in_force
 from service.store.rollups.reading import read_trend
 from service.store.rollups.sqlite import SqliteRollups
@@ -46,13 +47,8 @@ from service.store.spectra_port import SpectraLimits
 from service.store.trends import storable
 from service.store.vector_references import SqliteVectorReferences
 
-BUSY_TIMEOUT_S = 5.0
 MAX_GAPS = 5000
 """Most gaps that are handed out at once."""
-
-LOOK_AFTER_STEPS = 20_000
-"""Steps of the database's machine, some tens of microseconds, after which a read looks whether
-anybody still waits for it."""
 
 PAGE_BYTES = 8192
 """In pages of half that size, a result of all quantities would need a page of its own."""
@@ -95,6 +91,7 @@ class SqliteStore:
         self._path, self._origin, self._address = path, origin, address
         self._spectra_limits = spectra or SpectraLimits()
         self._lock = Lock()
+        self._readers = Readers(path)
         self.outbox = SqliteOutbox(self._writing, self._reader)
         self._chain = AuditChain(head_path(path))
         self.audit = SqliteAudit(self._writing, self._reader, self._chain)
@@ -106,6 +103,8 @@ class SqliteStore:
         self._layout = Layout.of(columns_of(CATALOGUE))
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
+            if (cut := why_cut(path)) is not None:
+                raise StoreError(f"{path}: {cut}")
             self._writer = sqlite3.connect(
                 path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
             )
@@ -119,6 +118,7 @@ class SqliteStore:
         """Release the file; closing twice is fine."""
         with self._lock:
             self._writer.close()
+        self._readers.close()
 
     def append(
         self,
@@ -263,14 +263,7 @@ class SqliteStore:
 
     @contextmanager
     def _reader(self) -> Iterator[sqlite3.Connection]:
-        uri = f"{self._path.absolute().as_uri()}?mode=ro"
-        with (
-            self._renamed_errors(),
-            closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader,
-        ):
-            asker = ASKER.get()
-            if asker is not None:
-                reader.set_progress_handler(lambda: asker.has_gone, LOOK_AFTER_STEPS)
+        with self._renamed_errors(), self._readers.reading() as reader:
             yield reader
 
     @contextmanager

@@ -32,7 +32,7 @@ class Needs:
     permission: Permission | None
     reach: Reach = Reach.PLANT
 
-    def __call__(self) -> None:
+    async def __call__(self) -> None:
         """Only say so: what is said is held by `service.api.access.gate`."""
 
 

@@ -80,7 +80,7 @@ def caller_of(request: Request) -> Caller:
     return caller
 
 
-def require_declared(request: Request) -> None:
+async def require_declared(request: Request) -> None:
     """Answer 401 or 403 to who lacks what a route needs; a dependency of all routes.
 
     Raises

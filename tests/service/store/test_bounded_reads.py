@@ -3,13 +3,13 @@
 import pytest
 
 from service.asker import ASKER, Asker
-from service.store import sqlite
+from service.store import readers, sqlite
 from service.store.port import QueryTooLargeError, StoreError
 from service.store.sqlite import SqliteStore
 
 
 def test_a_read_ends_when_its_asker_has_gone(store: SqliteStore, query, monkeypatch) -> None:
-    monkeypatch.setattr(sqlite, "LOOK_AFTER_STEPS", 1)
+    monkeypatch.setattr(readers, "LOOK_AFTER_STEPS", 1)
     asker = Asker()
     before = ASKER.set(asker)
     try:

@@ -1,0 +1,63 @@
+"""Connections that only read: opening one costs more than most of what is read with it."""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock
+
+from service.asker import ASKER
+
+BUSY_TIMEOUT_S = 5.0
+N_KEPT = 4
+LOOK_AFTER_STEPS = 20_000
+"""Steps of the database's machine, some tens of microseconds, after which a read looks whether
+anybody still waits for it."""
+
+
+class Readers:
+    """Read-only connections to one database; each is used by one thread at a time."""
+
+    def __init__(self, path: Path) -> None:
+        self._uri = f"{path.absolute().as_uri()}?mode=ro"
+        self._lock = Lock()
+        self._idle: list[sqlite3.Connection] = []
+        self._is_closed = False
+
+    @contextmanager
+    def reading(self) -> Iterator[sqlite3.Connection]:
+        """Borrow a connection; one with which something went wrong is not used again."""
+        reader = self._taken()
+        try:
+            asker = ASKER.get()
+            if asker is not None:
+                reader.set_progress_handler(lambda: asker.has_gone, LOOK_AFTER_STEPS)
+            yield reader
+            reader.set_progress_handler(None, 0)
+            if reader.in_transaction:
+                reader.execute("ROLLBACK")
+        except BaseException:
+            reader.close()
+            raise
+        self._put_back(reader)
+
+    def close(self) -> None:
+        """Close those that are not in use now, and the others as they are given back."""
+        with self._lock:
+            self._is_closed = True
+            idle, self._idle = self._idle, []
+        for reader in idle:
+            reader.close()
+
+    def _taken(self) -> sqlite3.Connection:
+        with self._lock:
+            if self._idle:
+                return self._idle.pop()
+        return sqlite3.connect(self._uri, uri=True, timeout=BUSY_TIMEOUT_S, check_same_thread=False)
+
+    def _put_back(self, reader: sqlite3.Connection) -> None:
+        with self._lock:
+            if not self._is_closed and len(self._idle) < N_KEPT:
+                self._idle.append(reader)
+                return
+        reader.close()
