@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query
 
 from core.alarms.alarm import PLANT
 from core.alarms.figures import DAY_NS
-from service.api.access.declared import needs
+from service.api.access.declared import Reach, needs
 from service.api.alarm_rate_models import AlarmRatesModel
 from service.api.alarm_rate_views import alarm_rates_model, counted
 from service.api.bearing_routes import Moment
@@ -27,7 +27,7 @@ RATE_PROBLEMS = described_problems(
 def alarm_rate_router(context: Context) -> APIRouter:
     """The route of alarm rates."""
     router = APIRouter(
-        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
+        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ, Reach.ASKED)]
     )
 
     @router.get("/rates", summary="How often alarms come", responses=RATE_PROBLEMS)

@@ -19,7 +19,7 @@ from core.alarms.operation import (
 )
 from core.units import ns_from_s
 from service.api.access.actors import actor_or
-from service.api.access.declared import needs
+from service.api.access.declared import Reach, needs
 from service.api.alarm_models import (
     AlarmEventsModel,
     AlarmListModel,
@@ -98,6 +98,7 @@ def alarm_router(context: Context) -> APIRouter:
         summary="History of all alarms",
         response_model=AlarmEventsModel,
         responses={**EVENT_PROBLEMS, **table_content("History of all alarms")},
+        dependencies=[needs(Permission.READ, Reach.ASKED)],
     )
     async def events(
         query: Annotated[AlarmQuery, Depends(event_query)], wanted: Format

@@ -1,5 +1,6 @@
 """The doors: a login by password, and who is behind a session's token or a machine's key."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -11,6 +12,11 @@ from service.security.passwords import Hashing
 from service.security.sessions import Session, SessionLimits
 from service.security.tokens import digest, is_token, is_token_of, key_id, new_token
 from service.store.access_port import AccessStore, Account
+
+
+def at_once(note: Callable[[], None]) -> None:
+    """Do it."""
+    note()
 
 
 class Refusal(StrEnum):
@@ -55,6 +61,9 @@ class Doors:
     ----------
     store
         Accounts, sessions and keys.
+    note
+        Does what only notes that somebody came; at once unless given. Nobody waits for that, and
+        who may come in may do so also while it cannot be written.
     """
 
     def __init__(
@@ -63,9 +72,10 @@ class Doors:
         hashing: Hashing,
         backoff: Backoff,
         limits: SessionLimits | None = None,
+        note: Callable[[Callable[[], None]], None] = at_once,
     ) -> None:
         self._store, self._hashing, self._backoff = store, hashing, backoff
-        self._limits = limits or SessionLimits()
+        self._limits, self._note = limits or SessionLimits(), note
         hashing.prepare()
 
     def log_in(
@@ -106,10 +116,10 @@ class Doors:
             return Refusal.UNKNOWN
         session, account = found
         if not self._limits.is_live(session, now_ns):
-            self._store.sessions.end(session.digest)
+            self._note(lambda: self._store.sessions.end(session.digest))
             return Refusal.EXPIRED
         if self._limits.is_news(session, now_ns):
-            self._store.sessions.see(session.digest, now_ns)
+            self._note(lambda: self._store.sessions.see(session.digest, now_ns))
         return _person(account)
 
     def machine(self, key: str, now_ns: int) -> Identity | Refusal:
@@ -122,7 +132,7 @@ class Doors:
         if state is not KeyState.VALID:
             return Refusal.REVOKED if state is KeyState.REVOKED else Refusal.EXPIRED
         if stored.is_news(now_ns):
-            self._store.keys.see(stored.id, now_ns)
+            self._note(lambda: self._store.keys.see(stored.id, now_ns))
         return Identity(stored.name, stored.role, Means.KEY, stored.units)
 
     def _begin(self, account: Account, now_ns: int) -> str | None:

@@ -21,8 +21,8 @@ class Reach(StrEnum):
     NO_UNIT = "no_unit"
     """What belongs to no unit."""
 
-    NARROWED = "narrowed"
-    """Units, and the route leaves those out that are not open to whoever asks."""
+    ASKED = "asked"
+    """The unit that the parameter ``unit`` names; all of them without it."""
 
 
 @dataclass(frozen=True)

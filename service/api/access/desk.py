@@ -132,4 +132,4 @@ class AccessDesk:
 
     @cached_property
     def _doors(self) -> Doors:
-        return Doors(self._store, self._hashing, Backoff(), self._limits)
+        return Doors(self._store, self._hashing, Backoff(), self._limits, self._work.note)

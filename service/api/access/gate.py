@@ -98,7 +98,9 @@ async def require_declared(request: Request) -> None:
     if not identity.role.may(needed.permission):
         raise not_allowed()
     unit = _unit_of(request.path_params)
-    if unit is None and needed.reach is Reach.PLANT and identity.units:
+    if needed.reach is Reach.ASKED:
+        unit = _unit_asked(request)
+    if unit is None and needed.reach is not Reach.NO_UNIT and identity.units:
         raise not_this_unit()
     if not identity.may(needed.permission, unit):
         raise not_this_unit()
@@ -119,3 +121,9 @@ def _unit_of(parameters: Mapping[str, str]) -> str | None:
     if "alarm" in parameters:
         return parameters["alarm"].partition(":")[0]
     return None
+
+
+def _unit_asked(request: Request) -> str | None:
+    """The unit that is asked for; of two it is not guessed which."""
+    units = request.query_params.getlist("unit")
+    return units[0] if len(units) == 1 else None

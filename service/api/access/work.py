@@ -7,12 +7,20 @@ from contextvars import copy_context
 from threading import BoundedSemaphore
 from typing import TypeVar
 
+import structlog
+
 from service.security.passwords import MAX_AT_ONCE
+from service.store.port import StoreError
+
+log = structlog.get_logger()
 
 MAX_WAITING = 16
 """Passwords that are hashed or wait for it; at a third of a second each nobody waits for long."""
 
 LOOKUP_THREADS = 2
+
+MAX_NOTES = 64
+"""Notes that wait for the disk; more are not taken, they come again."""
 
 T = TypeVar("T")
 
@@ -22,12 +30,14 @@ class TooManyLoginsError(Exception):
 
 
 class AccessWork:
-    """Threads for looking into the store, and others for hashing passwords."""
+    """Threads for looking into the store, for hashing passwords, and for notes."""
 
     def __init__(self) -> None:
         self._lookups = ThreadPoolExecutor(LOOKUP_THREADS, "access")
         self._hashes = ThreadPoolExecutor(MAX_AT_ONCE, "passwords")
         self._places = BoundedSemaphore(MAX_WAITING)
+        self._notes = ThreadPoolExecutor(1, "notes")
+        self._note_places = BoundedSemaphore(MAX_NOTES)
 
     async def looked_up(self, look: Callable[[], T]) -> T:
         """Do something short that waits for the disk."""
@@ -46,3 +56,16 @@ class AccessWork:
         running: Future[T] = self._hashes.submit(copy_context().run, work)
         running.add_done_callback(lambda _: self._places.release())
         return await asyncio.wrap_future(running)
+
+    def note(self, write: Callable[[], None]) -> None:
+        """Write something down that nobody waits for, and that may fail."""
+        if self._note_places.acquire(blocking=False):
+            running = self._notes.submit(_tried, write)
+            running.add_done_callback(lambda _: self._note_places.release())
+
+
+def _tried(write: Callable[[], None]) -> None:
+    try:
+        write()
+    except StoreError as error:
+        log.warning("not noted that somebody came", reason=str(error))

@@ -1,6 +1,7 @@
 """Who is let in, for how long, and what ends it."""
 
 import sqlite3
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -261,3 +262,17 @@ def test_a_forged_token_opens_nothing(doors: Doors, token: str) -> None:
 def test_limits_of_logins_can_be_set(access: AccessStore, hashing: Hashing) -> None:
     doors = Doors(access, hashing, Backoff(), SessionLimits(idle_s=60.0, absolute_s=120.0))
     assert doors.person(log_in(doors), T0 + 60 * S) is Refusal.EXPIRED
+
+
+@pytest.mark.usefixtures("anna")
+def test_who_may_come_in_does_so_also_while_nothing_can_be_noted(
+    access: AccessStore, hashing: Hashing
+) -> None:
+    notes: list[Callable[[], None]] = []
+    doors = Doors(access, hashing, Backoff(), note=notes.append)
+    token, step = log_in(doors), 20 * 60 * S
+
+    assert isinstance(doors.person(token, T0 + step), Identity)
+    assert doors.person(token, T0 + 2 * step) is Refusal.EXPIRED
+    notes[0]()
+    assert isinstance(doors.person(token, T0 + 2 * step), Identity)

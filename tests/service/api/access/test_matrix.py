@@ -236,3 +236,23 @@ async def test_a_key_for_some_units_opens_those_and_what_belongs_to_none(
             )
             assert let_in(status) == expected, f"{operation}: {status}"
             assert expected or status == 403, f"{operation}: {status}"
+
+
+async def test_a_key_for_some_units_may_ask_for_the_history_of_those(
+    access: Any, show: Show
+) -> None:
+    headers = await show("key", "good", "viewer", "U1")
+    asked = {
+        "unit=U1": 200,
+        "unit=U2": 403,
+        "unit=U1&unit=U2": 403,
+        "unit=U1&unit=U1": 403,
+        "unit=": 403,
+        "alarm=U1:ujb_shaft_x:channel_not_ok": 403,
+    }
+    async with access.client(**headers) as client:
+        for query, status in asked.items():
+            answer = await client.get(f"/api/v1/alarms/events?{query}")
+            assert answer.status_code == status, query
+        assert (await client.get("/api/v1/alarms/rates?unit=U1")).status_code == 200
+        assert (await client.get("/api/v1/alarms/rates?unit=plant")).status_code == 403
