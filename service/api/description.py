@@ -44,6 +44,24 @@ HEADERS = {
 }
 """Of every answer of the API."""
 
+OF_REFUSALS: dict[str, dict[str, Any]] = {
+    "401": {
+        "WWW-Authenticate": {
+            "description": "How a machine shows who it is.",
+            "schema": {"type": "string"},
+            "example": 'Bearer realm="padwatch"',
+        }
+    },
+    "429": {
+        "Retry-After": {
+            "description": "Seconds to wait.",
+            "schema": {"type": "integer"},
+            "example": 4,
+        }
+    },
+}
+"""What some problems say beside their document."""
+
 NOT_MODIFIED = {
     "description": "Nothing is new since the answer of that `ETag`",
     "headers": {"ETag": ETAG, **HEADERS},
@@ -75,14 +93,15 @@ def _add_examples(operation: dict[str, Any], examples: Examples) -> None:
     answers = [said for status, said in operation["responses"].items() if status.startswith("2")]
     for told in (*answers, operation.get("requestBody", {})):
         content = told.get("content", {}).get(JSON)
-        if content is not None and not {"example", "examples"} & set(content):
+        if content and "schema" in content and not {"example", "examples"} & set(content):
             content["example"] = examples.of(content["schema"])
 
 
 def _add_headers(operation: dict[str, Any]) -> None:
     for status, answer in operation["responses"].items():
-        if status.startswith("2"):
-            answer["headers"] = {**HEADERS, **answer.get("headers", {})}
+        common = HEADERS if status.startswith("2") else OF_REFUSALS.get(status, {})
+        if common:
+            answer["headers"] = {**common, **answer.get("headers", {})}
 
 
 def _add_tags(operation: dict[str, Any]) -> None:

@@ -1,10 +1,13 @@
 """Answers have tags: who has seen one already is told that nothing is new, and only then."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any
 
 from core.assessment import Assessment
 from service.live import LinkState
+
+RANGE = "start=2026-01-01T00:00:00Z&end=2026-02-01T00:00:00Z"
 
 POLLED = (
     "overview",
@@ -20,6 +23,9 @@ POLLED = (
     "units/U1/bearings/UJB/spectrum",
     "units/U1/bearings/UJB/orbit",
     "units/U1/bearings/UJB/baselines",
+    f"units/U1/bearings/UJB/trends?{RANGE}&quantity=speed_rpm",
+    f"units/U1/bearings/UJB/shaft-centre?{RANGE}",
+    f"units/U1/bearings/UJB/spectra?{RANGE}&channel=shaft_x",
     "quantities",
     "openapi.json",
 )
@@ -56,7 +62,9 @@ async def tags_of(service: Any, paths: Iterable[str]) -> list[str]:
 
 async def test_whatever_changes_is_news(running: Any, assessments: list[Assessment]) -> None:
     latest, spectrum = (f"units/U1/bearings/UJB/{what}" for what in ("latest", "spectrum"))
+    trends = f"units/U1/bearings/UJB/trends?{RANGE}&quantity=speed_rpm"
     new = next(assessment for assessment in assessments if assessment.bearing == "UJB")
+    later = replace(new, time_ns=assessments[-1].time_ns + 1_000_000_000)
 
     def alarm() -> None:
         running.alarms.link("U2", False, "no answer")
@@ -65,6 +73,7 @@ async def test_whatever_changes_is_news(running: Any, assessments: list[Assessme
 
     changes: list[tuple[Callable[[], object], tuple[str, ...]]] = [
         (lambda: running.live.set_assessment(new), ("overview", spectrum)),
+        (lambda: running.store.append([later], []), (trends,)),
         (lambda: setattr(running.live, "store_error", "disk full"), ("overview",)),
         (alarm, ("overview", "alarms")),
         (lambda: setattr(running.clock, "s", 30.5), ("overview", latest)),  # no longer current
