@@ -18,6 +18,7 @@ from core.quality import GOOD, Level, Reading, Reason, missing, uncertain
 from service.store import trends
 from service.store.port import QueryTooLargeError, StoreError, Trend, TrendQuery
 from service.store.rollups import cover, rolling
+from service.store.rollups.cells import bins
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
 
@@ -224,7 +225,7 @@ def dump(path: Path) -> list[tuple[object, ...]]:
         return cells + numbers
 
 
-@pytest.mark.parametrize("late_min", [3, 70, 200])
+@pytest.mark.parametrize("late_min", [3, 70, 200, 254])
 def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     rolled: SqliteStore,
     plain: SqliteStore,
@@ -240,6 +241,11 @@ def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     gather_all(rolled)
     require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
 
+    newer = [assessment(T0 + (300 + i) * MINUTE_NS, speed_rpm=1.0) for i in range(20)]
+    for store in (plain, rolled):
+        store.append(newer, [])
+    gather_all(rolled)
+    require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
     assert max(v for v in rolled.trend(WHOLE).series["speed_rpm"].maximum if v is not None) == 1e6
     with closing(sqlite3.connect(path_of("rolled"))) as reader:
         assert reader.execute("SELECT count(*) FROM rollup_redo").fetchone() == (0,)
@@ -289,6 +295,15 @@ def test_a_quantity_that_was_not_known_when_it_was_gathered_is_null_there(
 
     require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
     assert set(rolled.trend(WHOLE).series["vortex_roundness"].worst_level) <= {Level.BAD, None}
+
+
+@pytest.mark.parametrize("width", [0.05, 2.5, 0.1])
+def test_a_value_on_the_bound_of_two_cells_is_in_the_upper_one(width: float) -> None:
+    numbers = np.arange(-40, 400)
+    bounds = np.array([round(int(number) * width, 9) for number in numbers])
+
+    assert bins(bounds, width).tolist() == numbers.tolist()
+    assert bins(np.nextafter(bounds, -np.inf), width).tolist() == (numbers - 1).tolist()
 
 
 def test_few_readings_of_a_long_time_stay_single(rolled: SqliteStore, plain: SqliteStore) -> None:
