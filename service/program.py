@@ -22,6 +22,7 @@ from service.films.start import film_keeper
 from service.heartbeats import Heartbeats
 from service.http.listening import url_of
 from service.http.server import GuardedServer
+from service.instance import only_one
 from service.live import LiveView
 from service.metrics.timed import timed, timed_sources
 from service.metrics.timings import Timings
@@ -43,7 +44,7 @@ from service.wiring.delivery import receivers_of, router_of
 from service.wiring.evidence import evidence_desk, evidence_of, watch
 from service.wiring.http import server_of
 from service.wiring.sources import vector_rows
-from service.wiring.stores import open_store
+from service.wiring.stores import database_path, open_store
 
 STALE_HOPS = 2.5
 """A result older than this many refreshes is no longer current."""
@@ -98,11 +99,12 @@ async def run_service(
     plant, origin = performance.plant, performance.origin
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * _refresh_s(plant))
     around = Around(live)
-    store = open_store(plant, origin, router_of(plant, origin, around, clock))
-    try:
-        await _run(performance, listener, clock, live, around, store, announce, manager)
-    finally:
-        store.close()
+    with only_one(database_path(plant)):
+        store = open_store(plant, origin, router_of(plant, origin, around, clock))
+        try:
+            await _run(performance, listener, clock, live, around, store, announce, manager)
+        finally:
+            store.close()
 
 
 async def _run(

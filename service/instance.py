@@ -1,0 +1,60 @@
+"""One service for each database: a second one would be let in by SQLite without a word."""
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from service.store.port import StoreError
+
+SUFFIX = ".lock"
+_PID_BYTES = 20
+
+
+class AlreadyRunningError(StoreError):
+    """Another service works with the database; the message says which process it is."""
+
+
+def lock_path(database: Path) -> Path:
+    """The file whose lock a service holds while it works with a database."""
+    return database.with_name(database.name + SUFFIX)
+
+
+@contextmanager
+def only_one(database: Path) -> Iterator[None]:
+    """Be the only service that works with a database.
+
+    The lock ends with the process, however that ends; the file stays and means nothing by itself.
+
+    Raises
+    ------
+    AlreadyRunningError
+        If another process is.
+    StoreError
+        If the folder cannot be written to.
+    """
+    path = lock_path(database)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise StoreError(f"{path}: {error.strerror}") from error
+    try:
+        _take(descriptor, database)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _take(descriptor: int, database: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.pread(descriptor, _PID_BYTES, 0).decode("ascii", "replace").strip()
+        raise AlreadyRunningError(
+            f"another padwatch (process {holder or 'unknown'}) works with {database}:"
+            " stop it, or choose another data folder"
+        ) from None
+    os.ftruncate(descriptor, 0)
+    os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
