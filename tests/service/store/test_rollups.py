@@ -15,10 +15,11 @@ from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.quality import GOOD, Level, Reading, Reason, missing, uncertain
-from service.store import trends
+from service.store import schema, trends
 from service.store.port import QueryTooLargeError, StoreError, Trend, TrendQuery
 from service.store.rollups import cover, rolling
 from service.store.rollups.cells import bins
+from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
 
@@ -335,3 +336,24 @@ def test_a_range_wider_than_any_date_is_everything(
     assert sum(rolled.trend(giant).series["speed_rpm"].count) > 100
     later = replace(giant, start_ns=reach - 1)
     assert list(rolled.trend(later).time_ns) == []
+
+
+def test_a_database_from_before_roll_ups_is_gathered_after_its_upgrade(
+    plain: SqliteStore, path_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = schema.MIGRATIONS[: schema.MIGRATIONS.index(ROLLUP_TABLES)]
+    with closing(sqlite3.connect(path_of("old"), isolation_level=None)) as old:
+        with monkeypatch.context() as at_that_time:
+            at_that_time.setattr(schema, "MIGRATIONS", before)
+            schema.migrate(old, "old")
+        old.execute("ATTACH ? AS other", (str(path_of("plain")),))
+        for table in ("layout", "series", "assessment"):
+            old.execute(f"INSERT INTO {table} SELECT * FROM other.{table}")  # noqa: S608
+    store = SqliteStore(path_of("old"))
+
+    require_same(store.trend(WHOLE), plain.trend(WHOLE))
+    gather_all(store)
+    require_same(store.trend(WHOLE), plain.trend(WHOLE))
+
+    store.close()
+    assert len(dump(path_of("old"))) > 1000
