@@ -8,6 +8,14 @@ UNIT = "#/units/U1"
 DATA_MS = 60_000
 A_NUMBER = re.compile(r"\d")
 WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
+HREFS = "links => links.map(link => link.getAttribute('href'))"
+LEADS_SOMEWHERE = """
+async (addresses) => {
+  const { routeOf } = await import("/static/route.js");
+  const { PAGES } = await import("/static/pages.js");
+  return addresses.map((address) => routeOf(address, PAGES) !== null);
+}
+"""
 OIL = "[data-reading=oil_temperature_c] .number"
 
 
@@ -40,6 +48,9 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     await expect(table.locator(".film-line .mark").first).to_be_visible()
     await expect(page.locator(".unit-alarms")).not_to_contain_text("Asking the service.")
     await expect(page.locator(".unit-recordings")).not_to_contain_text("Asking the service.")
+    ways = await table.locator(".ways a").evaluate_all(HREFS)
+    assert len(ways) == 15
+    assert all(await page.evaluate(LEADS_SOMEWHERE, ways))
     await picture_of(page, "unit")
     assert complaints == []
 

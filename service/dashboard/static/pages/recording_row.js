@@ -1,12 +1,13 @@
 /** One recording in the list, with its check and the ways to take it away. */
 
+import { bearingOf } from "../alarm_place.js";
 import { ask } from "../api.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatCount, formatFixed } from "../format.js";
 import { listingCell, listingName, rowBelow } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
 import { lengthWords, occasionWords, recordingTime, sizeWords } from "../recording_words.js";
-import { unitAddress } from "../route.js";
+import { orbitAddress, unitAddress } from "../route.js";
 
 export const RECORDING_HEADS = ["Begins", "Unit", "Made for", "Length", "Size", "State", ""];
 
@@ -21,7 +22,8 @@ export function recordingRow({ id }) {
   const check = element("button", { type: "button" }, "Check");
   const path = `/api/v1/recordings/${encodeURIComponent(id)}`;
   const ways = [element("a", { href: `${path}/files.zip`, download: "" }, "Files"), element("a", { href: `${path}/samples.csv`, download: "" }, "CSV")];
-  const actions = element("span", { class: "actions" }, check, ...ways);
+  const play = element("a", { hidden: "" }, "Orbit player");
+  const actions = element("span", { class: "actions" }, check, play, ...ways);
   const cells = [unit, ...texts, state.node, actions].map((node, n) => listingCell(RECORDING_HEADS[n + 1], node));
   const row = element("tr", { role: "row", "data-recording": id }, listingName(begins), ...cells);
   const said = element("p", { class: "advice", role: "status" });
@@ -51,6 +53,9 @@ export function recordingRow({ id }) {
       setText(unit, recording.unit ?? "");
       if (recording.unit !== null) setAttribute(unit, "href", unitAddress(recording.unit));
       [occasionWords(recording), lengthWords(recording), sizeWords(recording.n_bytes)].forEach((words, n) => setText(texts[n], words));
+      const bearing = bearingToPlay(recording);
+      play.hidden = bearing === null;
+      if (bearing !== null) setAttribute(play, "href", orbitAddress(recording.unit, bearing));
       setAttribute(check, "aria-label", `Check the recording of ${recordingTime(recording)}`);
       if (recording.reason !== null && checked === null) {
         below.hidden = false;
@@ -59,6 +64,13 @@ export function recordingRow({ id }) {
       drawState();
     },
   };
+}
+
+/** The bearing that a recording was made for; null if it was made for none. */
+function bearingToPlay({ unit, alarms }) {
+  if (unit === null || alarms.length === 0) return null;
+  const [, subject, kind] = alarms[0].alarm.split(":");
+  return bearingOf({ subject, kind: kind ?? "" });
 }
 
 /** Reads a recording from end to end: whether it is whole, and what is in it. */

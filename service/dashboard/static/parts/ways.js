@@ -1,13 +1,15 @@
 /** Everything there is about one bearing, with the addresses of it. */
 
 import { element } from "../dom.js";
-import { bearingAddress, filmAddress } from "../route.js";
+import { bearingAddress, filmAddress, orbitAddress, waterfallAddress } from "../route.js";
 
 /** Pairs of words and address. */
 export function waysOf(unit, bearing) {
   return [
     ["Numbers and charts", bearingAddress(unit, bearing)],
     ["Film and baseline", filmAddress(unit, bearing)],
+    ["Spectra over time", waterfallAddress(unit, bearing)],
+    ["Orbit player", orbitAddress(unit, bearing)],
     ["Trends", `#/trends?${new URLSearchParams([["b", `${unit}/${bearing}`]])}`],
   ];
 }
