@@ -48,6 +48,9 @@ OWN_TABLES = re.compile(r"^\[(?:analysis|alarms)\]\n(?:[^\[\n].*\n|\n)*", re.MUL
 ROLES = ("viewer", "operator", "engineer", "admin")
 PASSWORD = "the river is high in may"  # noqa: S105 - of accounts that exist in tests alone
 
+TO_SET_UP = "to make the first account"
+"""In what the service says before its address, where somebody must log in and nobody can."""
+
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
@@ -72,7 +75,7 @@ class Plant:
         self._daq: subprocess.Popen[str] | None = None
         self._service: subprocess.Popen[str] | None = None
         self._daq_port = free_port()
-        self.url = ""
+        self.url = self.token = ""
         self.settings = QUICK_ANALYSIS
 
     def start_daq(self) -> None:
@@ -86,7 +89,11 @@ class Plant:
         """The first time on a free port, then on the same one."""
         port = self.url.rstrip("/").rpartition(":")[2] or "0"
         self._service = self._start("run", str(self._plant_file()), "--port", port)
-        self.url = read_line(self._service).removeprefix("padwatch: ").strip()
+        line = read_line(self._service)
+        if TO_SET_UP in line:
+            self.token = line.rpartition(" ")[2].strip()
+            line = read_line(self._service)
+        self.url = line.removeprefix("padwatch: ").strip()
 
     def stop_service(self) -> None:
         stop(self._service)

@@ -103,3 +103,32 @@ async def test_a_login_that_ends_leads_to_the_door_and_back_to_the_same_page(
     await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
     await page.reload()
     await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
+
+
+async def test_the_first_account_is_made_with_the_token_and_lasts_over_a_restart(
+    new_plant, page, password, complaints_of, picture_of
+) -> None:
+    new_plant.settings += "[access]\nlogin = true\n"
+    new_plant.start_service()
+    complaints = complaints_of(page)
+    await page.goto(new_plant.url + ALARMS)
+    await expect(page.get_by_role("heading", name="Set up padwatch")).to_be_visible()
+    await page.get_by_label("Token").fill(new_plant.token)
+    await page.get_by_label("Your name").fill("anna")
+    await page.get_by_label("Password", exact=True).fill(password)
+    await page.get_by_label("Password again").fill("another than that")
+    await page.keyboard.press("Enter")
+    await expect(page.get_by_role("alert")).to_contain_text("are not the same")
+    await picture_of(page, "set-up")
+    await page.get_by_label("Password again").fill(password)
+    await page.keyboard.press("Enter")
+    await expect(page.locator(".person")).to_contain_text("anna, admin", timeout=FIRST_MS)
+    await expect(page.get_by_role("heading", name="Alarms", exact=True)).to_be_visible()
+    assert complaints == []
+
+    new_plant.stop_service()
+    await expect(page.locator("#failure")).to_contain_text("Service not reachable")
+    new_plant.start_service()
+    await expect(page.locator("#banner")).to_be_hidden(timeout=FIRST_MS)
+    await expect(page.locator(".person")).to_contain_text("anna, admin")
+    await expect(page.get_by_role("heading", name="Alarms", exact=True)).to_be_visible()
