@@ -94,7 +94,7 @@ def test_the_schema_says_what_every_key_means() -> None:
     assert schema["type"] == "object"
     assert set(schema["properties"]) == {
         *("plant", "service", "analysis", "alarms", "films", "capture", "evidence"),
-        *("delivery", "unit"),
+        *("access", "delivery", "spectra", "unit"),
     }
     keys = list(_keys(schema))
     assert len(keys) > 60

@@ -1,0 +1,116 @@
+"""The motion of a shaft out of samples: marks and speed of a key-phase, centre of four probes."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from core.arrays import FloatArray
+from core.machine import Bearing, Channel, Measurand, Unit
+from core.quality import Reading
+from service.orbits.motion import motion_of
+from service.orbits.stretch import ShaftStretch
+
+RATE_HZ, TURN_HZ, N = 600.0, 1.5, 6000
+TURNS = TURN_HZ * np.arange(N) / RATE_HZ
+GROWTH_UM, CENTRE_X_UM, CENTRE_Y_UM = 40.0, -30.0, 75.0
+
+
+def machine(**changes: object) -> Unit:
+    gaps = [Channel(id_, Measurand.GAP_UM, -1) for id_ in ("x", "y", "far_x", "far_y")]
+    bearing = Bearing(
+        id="UJB",
+        bracket_stiffness_n_per_m=1e9,
+        shaft_x="x",
+        shaft_y="y",
+        bearing_x="v",
+        bearing_y="v",
+        clearance_um=200.0,
+        gap_reference_um=(2000.0, 2100.0),
+        opposite_x="far_x",
+        opposite_y="far_y",
+        opposite_reference_um=(1900.0, 1950.0),
+    )
+    settings: dict[str, object] = {
+        "id": "U1",
+        "rated_speed_rpm": 90.0,
+        "rate_hz": RATE_HZ,
+        "channels": (*gaps, Channel("mark", Measurand.KEY_PHASE_V, -1)),
+        "bearings": (bearing,),
+        "key_phase": "mark",
+        "speed_channel": "speed",
+    }
+    return Unit(**{**settings, **changes})  # type: ignore[arg-type]
+
+
+def stretch(slow: Mapping[str, Reading] | None = None, **changes: FloatArray) -> ShaftStretch:
+    """A circle of 50 µm from x to y about a centre; all gaps have grown; pulses fall."""
+    x = CENTRE_X_UM + 50.0 * np.cos(2.0 * math.pi * TURNS)
+    y = CENTRE_Y_UM + 50.0 * np.sin(2.0 * math.pi * TURNS)
+    samples = {
+        "x": 2000.0 + GROWTH_UM - x,
+        "y": 2100.0 + GROWTH_UM - y,
+        "far_x": 1900.0 + GROWTH_UM + x,
+        "far_y": 1950.0 + GROWTH_UM + y,
+        "mark": np.where((TURNS + 0.3) % 1.0 < 0.02, -5.0, 0.0),
+    }
+    return ShaftStretch(1, 0, 0, RATE_HZ, {**samples, **changes}, slow or {"speed": Reading(91.0)})
+
+
+def test_the_mark_of_the_shaft_gives_speed_and_place_of_each_turn() -> None:
+    unit = machine()
+
+    found = motion_of(stretch(), unit, unit.bearings[0])
+
+    assert found.marks is not None
+    expected = (np.arange(1.0, 16.0) - 0.3) / TURN_HZ * RATE_HZ
+    assert found.marks == pytest.approx(expected, abs=1.0)
+    assert found.speed_rpm == pytest.approx(90.0)  # not the slow channel's
+
+
+def test_four_probes_tell_the_centre_from_thermal_growth() -> None:
+    unit = machine()
+
+    found = motion_of(stretch(), unit, unit.bearings[0])
+
+    assert found.centre_um == pytest.approx((CENTRE_X_UM, CENTRE_Y_UM), abs=0.01)
+    assert found.x_um == pytest.approx(50.0 * np.cos(2.0 * math.pi * TURNS), abs=0.01)
+    assert found.order1 is not None
+    assert found.order1.ellipse.major_um_pk == pytest.approx(50.0, rel=1e-3)
+    assert found.order1.ellipse.minor_um_pk == pytest.approx(50.0, rel=1e-3)
+    assert found.order1.ellipse.sense == 1
+
+
+def test_without_a_key_phase_there_are_no_marks_and_the_slow_channel_says_the_speed() -> None:
+    unit = machine(key_phase=None)
+
+    found = motion_of(stretch(), unit, unit.bearings[0])
+
+    assert found.marks is None
+    assert found.speed_rpm == 91.0
+
+
+def test_a_lost_probe_leaves_no_motion_no_centre_and_no_zeros() -> None:
+    unit = machine()
+    lost = np.full(N, np.nan)
+
+    found = motion_of(stretch(y=lost, far_y=lost), unit, unit.bearings[0])
+
+    assert np.isnan(found.y_um).all()
+    assert np.isfinite(found.x_um).all()
+    assert (found.centre_um, found.order1) == (None, None)
+
+
+@pytest.mark.parametrize("n_samples", [1, 2, 3, 50])
+def test_a_moment_too_short_for_a_turn_is_motion_without_its_part_at_running_speed(
+    n_samples: int,
+) -> None:
+    unit = machine()
+    whole = stretch()
+    short = {id_: each[:n_samples] for id_, each in whole.samples.items()}
+
+    found = motion_of(ShaftStretch(1, 0, 0, RATE_HZ, short, whole.slow), unit, unit.bearings[0])
+
+    assert found.x_um.size == n_samples
+    assert found.order1 is None
