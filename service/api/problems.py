@@ -30,7 +30,7 @@ log = structlog.get_logger()
 class Mistake(BaseModel):
     """One wrong parameter of a request."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     parameter: str = Field(description="Its name.", examples=["max_points"])
     detail: str = Field(
@@ -41,7 +41,7 @@ class Mistake(BaseModel):
 class Problem(BaseModel):
     """A problem document (RFC 9457)."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     type: str = Field(default="about:blank", description="Always this.", examples=["about:blank"])
     title: str = Field(description="Kind of problem.", examples=["Unknown unit"])

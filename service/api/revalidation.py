@@ -56,6 +56,7 @@ class _Answer:
         if "ETag" not in headers:
             headers["ETag"] = tag_of(digest_of(body.get("body", b"")))
         headers["Cache-Control"] = CACHE_CONTROL
+        headers.add_vary_header("Accept")
         if not is_known(headers["ETag"], self._named):
             return body
         head["status"] = 304

@@ -117,6 +117,7 @@ def table_response(
     headers = {
         "Content-Disposition": f'attachment; filename="{name}.{wanted}"',
         "X-Content-Type-Options": "nosniff",
+        "Vary": "Accept",
     }
     if next_cursor is not None:
         headers[CURSOR_HEADER] = next_cursor

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from jsonschema_rs import Draft202012Validator
+from pydantic import BaseModel
 
 
 @pytest.fixture
@@ -115,10 +116,19 @@ def test_no_example_holds_a_number_that_is_none(service: Any) -> None:
     json.dumps(service.document, allow_nan=False)
 
 
-def test_every_model_refuses_what_it_does_not_know(service: Any) -> None:
+def test_every_model_refuses_what_it_does_not_know_and_numbers_that_are_none(
+    service: Any,
+) -> None:
+    models: dict[str, list[type[BaseModel]]] = {}
+    for model in _models(BaseModel):
+        models.setdefault(model.__name__, []).append(model)
     for name, schema in service.document["components"]["schemas"].items():
         if schema.get("type") == "object":
             assert schema.get("additionalProperties") is False, name
+            assert models[name]
+            for model in models[name]:
+                assert model.model_config.get("extra") == "forbid", model
+                assert model.model_config.get("allow_inf_nan") is False, model
 
 
 def test_operations_are_named_by_their_address(
@@ -176,6 +186,13 @@ def test_every_reference_leads_somewhere(service: Any) -> None:
     assert references
     for reference in references:
         assert _resolved(reference, service.document)
+
+
+def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    for model in base.__subclasses__():
+        if model.__module__.startswith(("service.api.", "service.evidence.")):
+            yield model
+        yield from _models(model)
 
 
 def _resolved(reference: str, document: dict[str, Any]) -> dict[str, Any]:
