@@ -165,6 +165,11 @@ async def test_a_recording_is_played_although_its_unit_is_not_connected(
     await expect(page.locator(".player .facts")).to_contain_text("00:00:5", timeout=DATA_MS)
     await expect(page.locator(".player .facts")).to_contain_text("92.3")
     await picture_of(page, "recording")
+
+    await page.reload()  # the address names the recording
+    await await_orbit(page)
+    await expect(page.locator("#orbit-source")).to_have_value(name)
+    await expect(page.locator(".player .facts")).to_contain_text("2026-01-01 00:00:0")
     assert complaints == []
 
 

@@ -19,9 +19,10 @@ export function waterfallAddress(unit, bearing) {
   return `${bearingAddress(unit, bearing)}/waterfall`;
 }
 
-/** Address of the player of a bearing’s orbits. */
-export function orbitAddress(unit, bearing) {
-  return `${bearingAddress(unit, bearing)}/orbits`;
+/** Address of the player of a bearing’s orbits: live, or of a recording. */
+export function orbitAddress(unit, bearing, recording = null) {
+  const query = recording === null ? "" : `?${new URLSearchParams({ recording })}`;
+  return `${bearingAddress(unit, bearing)}/orbits${query}`;
 }
 
 /** Address of the page of a bearing's film. */

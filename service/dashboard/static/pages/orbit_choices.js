@@ -10,8 +10,8 @@ const PARTS = [["both", "Whole and 1×"], ["whole", "Whole"], ["alone", "1× alo
 const FRAMES = [["clearance", "In the clearance"], ["fit", "To fit"]];
 const MOST_RECORDINGS = 100;
 
-/** `choose(recording)` with its name, or null for now; `show` when the drawing changes. */
-export function orbitChoices(unit, bearing, choose, show) {
+/** `choose(recording)` with its name, or null for now; `show` when the drawing changes; `chosen` at first. */
+export function orbitChoices(unit, chosen, choose, show) {
   const select = element("select", { id: "orbit-source" }, element("option", { value: "" }, "Now, live"));
   const note = element("span", { class: "hint", role: "status" });
   const source = element("label", { class: "setting" }, "Play ", select);
@@ -19,7 +19,7 @@ export function orbitChoices(unit, bearing, choose, show) {
   const turns = choice("Turns", TURNS, 3, show);
   const frame = choice("Frame", FRAMES, "clearance", show);
   select.addEventListener("change", () => choose(select.value || null));
-  offer(select, note, unit);
+  offer(select, note, unit, chosen);
   return {
     node: element("div", { class: "choices" }, source, note, parts.node, turns.node, frame.node),
     how: () => ({
@@ -31,13 +31,15 @@ export function orbitChoices(unit, bearing, choose, show) {
   };
 }
 
-async function offer(select, note, unit) {
+async function offer(select, note, unit, chosen) {
   try {
     const { recordings } = await ask(["recordings"], [["unit", unit], ["limit", String(MOST_RECORDINGS)]]);
     const whole = recordings.filter(({ state }) => state === "complete");
     for (const each of whole) {
       select.append(element("option", { value: each.id }, `${recordingTime(each)}, ${lengthWords(each)}: ${occasionWords(each)}`));
     }
+    if (chosen !== null && whole.every(({ id }) => id !== chosen)) select.append(element("option", { value: chosen }, chosen));
+    select.value = chosen ?? "";
     setText(note, whole.length ? "" : "No recording of this unit is kept yet; one is made around every alarm of vibration.");
   } catch (failure) {
     setText(note, `Recordings cannot be listed. ${failure.message}`);

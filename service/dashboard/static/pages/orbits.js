@@ -7,6 +7,7 @@ import { timebasePicture } from "../charts/timebase_picture.js";
 import { element, setText } from "../dom.js";
 import { STOPPED, advanced, moved } from "../parts/playhead.js";
 import { poll } from "../poll.js";
+import { orbitAddress, queryOf } from "../route.js";
 import { onTheme } from "../theme.js";
 import { bearingHead } from "./bearing_head.js";
 import { orbitChoices } from "./orbit_choices.js";
@@ -27,7 +28,8 @@ export function orbitsPage(main, unit, bearing) {
   const path = ["units", unit, "bearings", bearing];
   const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const head = bearingHead(unit, bearing, "orbit player", "orbits");
-  const choices = orbitChoices(unit, bearing, choose, paint);
+  const asked = queryOf(location.hash).get("recording");
+  const choices = orbitChoices(unit, asked, choose, paint);
   const controls = orbitControls({ play, step, seek, hasten });
   const [orbit, timebase, facts] = [orbitPicture(), timebasePicture(), orbitFacts()];
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
@@ -35,7 +37,8 @@ export function orbitsPage(main, unit, bearing) {
   const player = element("section", { class: "panel player", "aria-label": "Player" }, sentence, pictures, controls.node, facts.node);
   main.append(element("div", { class: "bearing orbit-page" }, head.node, choices.node, player));
 
-  let source = liveSource(path);
+  const sourceOf = (recording) => (recording === null ? liveSource(path) : recordedSource(recording, bearing));
+  let source = sourceOf(asked);
   let clip = null;
   let at = { ...STOPPED, isPlaying: !isStill };
   let trouble = null;
@@ -51,10 +54,10 @@ export function orbitsPage(main, unit, bearing) {
 
   const questions = poll(async (signal) => {
     if (!wants()) return;
-    const asked = source;
+    const mine = source;
     try {
-      const found = await asked.clip(at.atS, signal);
-      if (asked === source) take(found);
+      const found = await mine.clip(at.atS, signal);
+      if (mine === source) take(found);
     } catch (failure) {
       if (signal.aborted) return;
       trouble = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
@@ -74,8 +77,9 @@ export function orbitsPage(main, unit, bearing) {
   }
 
   function choose(recording) {
-    source = recording === null ? liveSource(path) : recordedSource(recording, bearing);
-    clip = null;
+    source = sourceOf(recording);
+    history.replaceState(null, "", orbitAddress(unit, bearing, recording));
+    [clip, trouble] = [null, null];
     at = { ...at, atS: 0, isPlaying: !isStill };
     setText(sentence, "Asking the service.");
     questions.again();

@@ -55,7 +55,7 @@ export function recordingRow({ id }) {
       [occasionWords(recording), lengthWords(recording), sizeWords(recording.n_bytes)].forEach((words, n) => setText(texts[n], words));
       const bearing = bearingToPlay(recording);
       play.hidden = bearing === null;
-      if (bearing !== null) setAttribute(play, "href", orbitAddress(recording.unit, bearing));
+      if (bearing !== null) setAttribute(play, "href", orbitAddress(recording.unit, bearing, recording.id));
       setAttribute(check, "aria-label", `Check the recording of ${recordingTime(recording)}`);
       if (recording.reason !== null && checked === null) {
         below.hidden = false;
