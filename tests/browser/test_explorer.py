@@ -113,6 +113,7 @@ async def test_oil_temperature_colours_the_points(living_plant, page, picture_of
         "points => new Set(points.map((point) => getComputedStyle(point).fill)).size"
     )
     assert fills > 5
+    await expect(page.locator(f"{STIFFNESS} figcaption")).to_contain_text("Colour: oil temp")
     assert "colour=oil_temperature_c" in page.url
     await picture_of(page, "coloured")
 

@@ -66,11 +66,17 @@ async function showAxis(box, { unit, names, title, words }, found, state, refres
   const layout = compareLayout(full[0].trends, unit, state.colour);
   const sentences = [
     trendCaption(full.map(({ pieces }) => pieces)) + simulatedSentence(full[0].trends),
+    COLOURED[state.colour] ?? "",
     empty.length ? `No value in this time: ${empty.map(({ label }) => label).join("; ")}.` : "",
     pairs.length > shown.length ? `Only the first ${MOST_LINES} of ${pairs.length} lines are drawn; choose fewer quantities or bearings.` : "",
   ];
   await box.show(compareTraces(full, state.colour), layout, sentences.filter(Boolean).join(" "));
 }
+
+const COLOURED = {
+  oil_temperature_c: "Colour: oil temperature, where it is known; shapes tell the lines apart.",
+  eccentricity_ratio: "Colour: eccentricity, where it is known; shapes tell the lines apart.",
+};
 
 const hasData = ({ pieces }) => pieces.length > 0;
 
