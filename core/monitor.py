@@ -45,30 +45,12 @@ class UnitMonitor(MonitoredUnit):
         self._first_start = 0
         self._n_voided = 0
 
-    def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Take a block in and return what has been learnt by it.
-
-        Parameters
-        ----------
-        block
-            Must follow its predecessors in index order; repeated samples are dropped.
-
-        Returns
-        -------
-        One assessment for each bearing and each hop that the block completes; mostly none.
-
-        Raises
-        ------
-        ValueError
-            If the block is not of this unit, or has another sampling rate or number of channels;
-            the message gives both.
-        """
+    def steps(self, block: SampleBlock) -> Iterator[Assessment]:
+        """Take a block in and hand over what is learnt by it, one bearing at a time."""
         self._require_own(block)
-        assessments: list[Assessment] = []
         for piece in _pieces(block, self._settings.segment_samples):
             self._write(piece)
-            assessments += self._complete_segments()
-        return assessments
+            yield from self._complete_segments()
 
     def _write(self, block: SampleBlock) -> None:
         epoch = self._ring.epoch
@@ -83,15 +65,14 @@ class UnitMonitor(MonitoredUnit):
             self._n_voided += 1
             self._next_start = self._ring.contiguous_from
 
-    def _complete_segments(self) -> list[Assessment]:
-        assessments: list[Assessment] = []
+    def _complete_segments(self) -> Iterator[Assessment]:
         start = self._next_start or 0
         while self._ring.holds(start, start + self._settings.segment_samples):
             window = self._ring.read(start, start + self._settings.segment_samples)
             segment = self._transform.add(window)
-            assessments += [self._assess(bearing, segment) for bearing in self.unit.bearings]
             self._next_start = start = start + self._settings.hop_samples
-        return assessments
+            for bearing in self.unit.bearings:
+                yield self._assess(bearing, segment)
 
     def _assess(self, bearing: Bearing, newest: Segment) -> Assessment:
         settings = self._settings

@@ -1,5 +1,6 @@
 """The port through which the program hands sample blocks to the numerics of one unit."""
 
+from collections.abc import Iterator
 from typing import Protocol
 
 from core.account import Gap, SampleAccount
@@ -36,12 +37,16 @@ class Monitor(Protocol):
         """Hand over the gaps found since the last call, to be recorded."""
         ...
 
-    def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Take a block in and return what has been learnt by it.
+    def steps(self, block: SampleBlock) -> Iterator[Assessment]:
+        """Take a block in and hand over what is learnt by it, one bearing at a time.
 
         Raises
         ------
         ValueError
             If the block does not fit the unit.
         """
+        ...
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return all that has been learnt by it; as `steps`."""
         ...

@@ -1,14 +1,18 @@
 """What every monitor keeps of its unit: its description, its samples' account, its gaps."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
 from core.account import Gap, SampleAccount
 from core.adoption import bearings_with_new_references, require_same_machine
+from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
 from core.probe_axes import Growth
 from core.ring import Ring
 
 
-class MonitoredUnit:
+class MonitoredUnit(ABC):
     """A unit that is watched.
 
     Parameters
@@ -46,6 +50,31 @@ class MonitoredUnit:
         for bearing in bearings_with_new_references(self.unit, unit):
             self._growth.pop(bearing, None)  # it counts from a reference
         self.unit = unit
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return all that has been learnt by it; as `steps`."""
+        return list(self.steps(block))
+
+    @abstractmethod
+    def steps(self, block: SampleBlock) -> Iterator[Assessment]:
+        """Take a block in and hand over what is learnt by it, one bearing at a time.
+
+        Parameters
+        ----------
+        block
+            Must follow its predecessors in index order; what is repeated is dropped.
+
+        Yields
+        ------
+        One assessment for each bearing and each hop that the block completes; mostly none. They
+        must all be taken before the next block.
+
+        Raises
+        ------
+        ValueError
+            If the block is not of this unit, or has another rate or number of channels; the
+            message gives both.
+        """
 
     def drain_gaps(self) -> list[Gap]:
         """Hand over the gaps found since the last call, to be recorded."""

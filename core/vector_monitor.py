@@ -1,7 +1,7 @@
 """`VectorMonitor`: what a rack has measured in, assessments of the unit's bearings out."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -60,46 +60,32 @@ class VectorMonitor(MonitoredUnit):
         self._first_index: int | None = None
         self._n_hops = -1
 
-    def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Take a block in and return what has been learnt by it.
-
-        Parameters
-        ----------
-        block
-            Rows as given, a sample for each poll; repeated polls are dropped.
-
-        Returns
-        -------
-        One assessment for each bearing and each hop that the block completes; mostly none.
-
-        Raises
-        ------
-        ValueError
-            If the block is not of this unit, or has another rate or number of rows.
-        """
+    def steps(self, block: SampleBlock) -> Iterator[Assessment]:
+        """Take rows in, a sample for each poll, and hand over what is learnt, one bearing each."""
         self._require_own(block)
         epoch, taken_up_to = self._ring.epoch, self._ring.stop_index
         self._write_to_ring(block)
         if block.epoch != epoch:
             self._begin(block.first_index)
             taken_up_to = 0
-        fresh = [poll for poll in self._reader.polls(block) if poll.index >= taken_up_to]
-        return [assessment for poll in fresh for assessment in self._take(block.epoch, poll)]
+        for poll in self._reader.polls(block):
+            if poll.index >= taken_up_to:
+                yield from self._take(block.epoch, poll)
 
     def _begin(self, first_index: int) -> None:
         self._polls.clear()
         self._first_index = first_index
         self._n_hops = first_index // self._averaging.hop_polls
 
-    def _take(self, epoch: int, poll: Poll) -> list[Assessment]:
+    def _take(self, epoch: int, poll: Poll) -> Iterator[Assessment]:
         self._polls.append(poll)
         while self._polls[0].index <= poll.index - self._averaging.n_polls:
             self._polls.popleft()
         n_hops = (poll.index + 1) // self._averaging.hop_polls
-        if n_hops == self._n_hops:
-            return []
-        self._n_hops = n_hops
-        return [self._assess(epoch, bearing) for bearing in self.unit.bearings]
+        if n_hops != self._n_hops:
+            self._n_hops = n_hops
+            for bearing in self.unit.bearings:
+                yield self._assess(epoch, bearing)
 
     def _assess(self, epoch: int, bearing: Bearing) -> Assessment:
         polls = list(self._polls)

@@ -115,13 +115,18 @@ class Runner:
         pulse.rest()
         async for block in self._bus.blocks():
             pulse.beat()
-            self._take(block)
+            await self._take(block)
             self._bus.done()
+            await asyncio.sleep(0)  # more blocks may be waiting, but so may others
             pulse.rest()
 
-    def _take(self, block: SampleBlock) -> None:
+    async def _take(self, block: SampleBlock) -> None:
         monitor = self._units[block.unit].monitor
-        assessments, films = self._films.take(block.unit, monitor.ingest(block))
+        found = []
+        for assessment in monitor.steps(block):
+            found.append(assessment)
+            await asyncio.sleep(0)  # a bearing takes milliseconds: others have their turn between
+        assessments, films = self._films.take(block.unit, found)
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
             self._live.set_assessment(assessment)

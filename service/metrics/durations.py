@@ -55,12 +55,12 @@ class Durations:
         self._newest_s: float | None = None
         self._lock = Lock()
 
-    def observe(self, duration_s: float, times: int = 1) -> None:
-        """Count something that took so long, so many times."""
+    def observe(self, duration_s: float) -> None:
+        """Count something that took so long."""
         place = bisect_left(self._bounds_s, duration_s)
         with self._lock:
-            self._n_in[place] += times
-            self._sum_s += duration_s * times
+            self._n_in[place] += 1
+            self._sum_s += duration_s
             self._newest_s = duration_s
 
     @contextmanager

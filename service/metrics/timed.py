@@ -1,6 +1,6 @@
 """Units whose analysis is timed, without the runner or the numerics knowing of it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from core.account import Gap, SampleAccount
@@ -34,12 +34,18 @@ class TimedMonitor:
         """Hand over the gaps found since the last call, to be recorded."""
         return self._monitor.drain_gaps()
 
+    def steps(self, block: SampleBlock) -> Iterator[Assessment]:
+        """Take a block in, one bearing at a time; raises as the monitor does."""
+        steps = self._monitor.steps(block)
+        began_s = self._timings.begin()
+        for assessment in steps:
+            self._timings.assessed(block.unit, began_s)
+            yield assessment
+            began_s = self._timings.begin()
+
     def ingest(self, block: SampleBlock) -> list[Assessment]:
         """Take a block in and return what has been learnt by it; raises as the monitor does."""
-        began_s = self._timings.begin()
-        found = self._monitor.ingest(block)
-        self._timings.assessed(block.unit, began_s, len(found))
-        return found
+        return list(self.steps(block))
 
 
 def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, WatchedUnit]:

@@ -37,8 +37,6 @@ class Timings:
         """When something begins, for `assessed`."""
         return self._clock.monotonic_s()
 
-    def assessed(self, unit: str, began_s: float, n_results: int) -> None:
-        """Note what each of the results took that a block has brought, if it brought any."""
-        if n_results:
-            each_s = (self._clock.monotonic_s() - began_s) / n_results
-            self.assessments[unit].observe(each_s, n_results)
+    def assessed(self, unit: str, began_s: float) -> None:
+        """Note what a result took."""
+        self.assessments[unit].observe(self._clock.monotonic_s() - began_s)

@@ -19,6 +19,8 @@ class Readers:
     """Read-only connections to one database; each is used by one thread at a time."""
 
     def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: tuple[int, int] | None = None
         self._uri = f"{path.absolute().as_uri()}?mode=ro"
         self._lock = Lock()
         self._idle: list[sqlite3.Connection] = []
@@ -51,9 +53,21 @@ class Readers:
 
     def _taken(self) -> sqlite3.Connection:
         with self._lock:
+            if self._is_another_file():
+                while self._idle:
+                    self._idle.pop().close()
             if self._idle:
                 return self._idle.pop()
         return sqlite3.connect(self._uri, uri=True, timeout=BUSY_TIMEOUT_S, check_same_thread=False)
+
+    def _is_another_file(self) -> bool:
+        """Whether the file of that name was moved away or replaced; SQLite would not notice."""
+        try:
+            status = self._path.stat()
+        except OSError:
+            return True
+        before, self._file = self._file, (status.st_dev, status.st_ino)
+        return before != self._file
 
     def _put_back(self, reader: sqlite3.Connection) -> None:
         with self._lock:
