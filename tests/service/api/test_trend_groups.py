@@ -109,3 +109,24 @@ async def test_more_groups_than_anybody_looks_at_are_refused(
     found = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, group_by="eccentricity")
 
     assert "60 groups" in found["detail"]
+
+
+@pytest.mark.parametrize("by", ["state", "eccentricity", "oil_temperature"])
+async def test_groups_are_the_same_when_they_have_been_gathered_beforehand(
+    seen: Any, by: str
+) -> None:
+    asked = {**WHOLE, "quantity": K, "group_by": by, "max_points": 2}
+    single = (await seen.json(TRENDS, **asked))["groups"]
+    later_ns = START_NS + 86_400_000_000_000
+
+    for series in seen.store.rollups.due(later_ns):
+        seen.store.rollups.gather(series, later_ns)
+
+    assert seen.store.rollups.due(later_ns) == []
+    gathered = (await seen.json(TRENDS, **asked))["groups"]
+    assert [group["name"] for group in gathered] == [group["name"] for group in single]
+    for ours, theirs in zip(gathered, single, strict=True):
+        assert ours["time"] == theirs["time"]
+        for column in ("min", "max", "count", "worst_level"):
+            assert ours["series"][K][column] == theirs["series"][K][column]
+        assert minutes(ours) == minutes(theirs)
