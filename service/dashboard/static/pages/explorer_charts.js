@@ -65,7 +65,7 @@ async function showAxis(box, { unit, names, title, words }, found, state, refres
   }
   const layout = compareLayout(full[0].trends, unit, state.colour);
   const sentences = [
-    trendCaption(full.map(({ pieces }) => pieces)) + simulatedSentence(full[0].trends),
+    trendCaption(full.map(({ pieces }) => (state.colour ? withoutRandom(pieces) : pieces))) + simulatedSentence(full[0].trends),
     COLOURED[state.colour] ?? "",
     empty.length ? `No value in this time: ${empty.map(({ label }) => label).join("; ")}.` : "",
     pairs.length > shown.length ? `Only the first ${MOST_LINES} of ${pairs.length} lines are drawn; choose fewer quantities or bearings.` : "",
@@ -77,6 +77,9 @@ const COLOURED = {
   oil_temperature_c: "Colour: oil temperature, where it is known; shapes tell the lines apart.",
   eccentricity_ratio: "Colour: eccentricity, where it is known; shapes tell the lines apart.",
 };
+
+/** Coloured points go without the lines of their uncertainty. */
+const withoutRandom = (pieces) => pieces.map((piece) => piece.map((bucket) => ({ ...bucket, random: null })));
 
 const hasData = ({ pieces }) => pieces.length > 0;
 
