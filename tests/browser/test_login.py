@@ -43,20 +43,27 @@ async def test_nothing_of_the_plant_shows_before_a_login_which_leads_on_to_the_p
 
 
 async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(
-    guarded_plant, remote_page, password
+    new_plant, remote_page, password
 ) -> None:
     page = remote_page
-    await page.goto(guarded_plant.url)
+    new_plant.add_account("anna", "operator", password)
+    new_plant.start_service()
+    await page.goto(new_plant.url)
     button = page.locator(".entries button")
     said = page.get_by_role("alert").filter(has_text=re.compile("wrong|wait", re.IGNORECASE))
-    for _ in range(20):
-        await expect(button).to_be_enabled()
-        await log_in(page, "nobody-here", password)
+    words = ""
+    for _ in range(9):  # each wait is twice as long as the one before, so that one is seen
+        await expect(button).to_be_enabled(timeout=FIRST_MS)
+        await log_in(page, "anna", "not " + password)
         await expect(said).to_be_visible(timeout=FIRST_MS)
-        if await button.is_disabled():
+        words = await button.inner_text()
+        if words != "Log in":
             break
-    await expect(button).to_have_text(re.compile(r"Wait \d+ s"))
+    assert re.fullmatch(r"Wait \d+ s", words)
     await expect(page.locator(".person")).to_be_hidden()
+    await expect(button).to_have_text("Log in", timeout=FIRST_MS)
+    await log_in(page, "anna", password)
+    await expect(page.locator(".person")).to_contain_text("anna, operator", timeout=FIRST_MS)
 
 
 async def test_a_viewer_is_told_what_he_may_not_do_and_not_offered_it(
