@@ -8,7 +8,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.cli.ending import run_to_its_end
+from service.cli.ending import leave, run_to_its_end
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.http.listening import PortInUseError
 from service.http.tls import CertificateError
@@ -35,6 +35,7 @@ def run(
     """Acquire, analyse, store and serve a plant until Ctrl-C or SIGTERM."""
     plant = read_plant_file(plant_file)
     run_plant(plant, plant.service.port if port is None else port)
+    leave()
 
 
 def run_plant(plant: PlantFile, port: int) -> None:

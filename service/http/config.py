@@ -12,7 +12,7 @@ from service.http.guard import guarded
 from service.settings.http_limits import HttpLimitSettings
 
 STOP_S = 2
-"""What clients get to finish in before their connections are closed."""
+"""When uvicorn gives up what the server has not given up before, which logs a traceback."""
 
 
 class GuardedConfig(uvicorn.Config):

@@ -12,6 +12,9 @@ from service.http.config import STOP_S, GuardedConfig
 from service.http.connections import Connections
 from service.http.protocol import GuardedProtocol
 
+PATIENCE_S = 1.0
+"""What clients get to finish in when the server stops."""
+
 SWEEP_TICKS = 5
 """Connections are looked at every so many of uvicorn's ticks of 0.1 s."""
 
@@ -72,7 +75,7 @@ class GuardedServer(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Close everything in time; who does not read his answer is not waited for to the end."""
         # before uvicorn cancels the tasks, which would log a traceback for each
-        patience = asyncio.get_running_loop().call_later(0.75 * STOP_S, self._give_up)
+        patience = asyncio.get_running_loop().call_later(PATIENCE_S, self._give_up)
         try:
             await super().shutdown(sockets)
         finally:
