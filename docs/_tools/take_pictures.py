@@ -10,6 +10,7 @@ service that runs already; its accounts and keys stay as they are. At last, or a
 import argparse
 import asyncio
 import base64
+import re
 import shutil
 import subprocess
 import sys
@@ -20,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from ingest import daq, padwatch, plant_file
+from ingest import padwatch, plant_file
 from palette import Pixels, indexed_png
 from pictures import IN_THE_GUIDE, PAGES, PHONE, SCREEN, TWENTY, Picture, every_look
 from playwright.async_api import APIRequestContext, Browser, Page, async_playwright
@@ -29,11 +30,13 @@ DOCS = Path(__file__).parents[1]
 EVERY = DOCS.parent / "build" / "screenshots"
 GUIDE = DOCS / "pictures"
 WAIT_S = 1200.0
-TWENTY_S = 45.0
+TWENTY_S = 90.0
 DRAWN_MS = 30_000
 CHARTS_MS = 1500
+MOST_HEIGHT = 1300
 ELSEWHERE = {"X-Forwarded-For": "192.0.2.7"}
 NOW_IS_KNOWN = "() => !document.querySelector('#main').innerText.includes('Asking the service.')"
+QUICK_ANALYSIS = "[analysis]\nsegment_samples = 2048\nn_segments = 6\n\n"
 PIXELS = """
 async (png) => {
   const blob = await (await fetch(`data:image/png;base64,${png}`)).blob();
@@ -56,20 +59,28 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="only these pages, as overview")
     parser.add_argument("--url", help="of a service that runs")
+    parser.add_argument("--guide", action="store_true", help="only what the documentation shows")
     options = parser.parse_args()
     wanted = [page for page in PAGES if not options.names or page.name in options.names]
+    looks = looks_of(wanted, options)
     for folder in (EVERY, GUIDE):
         folder.mkdir(parents=True, exist_ok=True)
     if options.url and wanted:
-        asyncio.run(take_all(options.url, wanted))
+        asyncio.run(take_all(options.url, looks))
     elif wanted:
         with demo() as url:
             asyncio.run(prepare(url))
-            asyncio.run(take_all(url, wanted))
+            asyncio.run(take_all(url, looks))
     if not options.names or TWENTY.name in options.names:
         with twenty_units() as url:
             time.sleep(TWENTY_S)
-            asyncio.run(take_all(url, [TWENTY]))
+            asyncio.run(take_all(url, looks_of([TWENTY], options)))
+
+
+def looks_of(pages: list[Picture], options: argparse.Namespace) -> list[Picture]:
+    """Every look of some pages that is wanted."""
+    looks = [look for page in pages for look in every_look(page)]
+    return [look for look in looks if not options.guide or look.name in IN_THE_GUIDE]
 
 
 @contextmanager
@@ -90,15 +101,24 @@ def demo() -> Iterator[str]:
 
 @contextmanager
 def twenty_units() -> Iterator[str]:
-    """Run a plant of twenty units, each behind a DAQ; yield where its dashboard is."""
+    """Run a plant of twenty units, simulated without any wire; yield where its dashboard is."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "plant.toml")
-        path.write_text(plant_file(20, Path(folder)), encoding="utf-8")
-        with daq(path) as ports:
-            text = plant_file(20, Path(folder), ports).replace('"Benchmark"', '"Twenty units"')
-            path.write_text(text, encoding="utf-8")
-            with padwatch("run", str(path), "--port", "0") as (_, line):
-                yield line.split()[-1]
+        path.write_text(twenty_file(Path(folder)), encoding="utf-8")
+        with padwatch("run", str(path), "--port", "0") as (_, line):
+            yield line.split()[-1]
+
+
+def twenty_file(folder: Path) -> str:
+    """The demo plant's second unit twenty times, sampled slowly: the picture shows no spectra."""
+    head, *units = plant_file(20, folder).split("[[unit]]\n")
+    text = head.replace('"Benchmark"', '"Twenty units"') + QUICK_ANALYSIS
+    for number, unit in enumerate(units, 1):
+        named = re.sub(r'^name = ".*"', f'name = "Unit {number}"', unit, count=1, flags=re.M)
+        slow = named.replace("rate_hz = 600.0", "rate_hz = 200.0", 1)
+        source = re.sub(r"(\[unit\.source\]\n)(?:[^\[\n].*\n)+", r'\1kind = "simulated"\n', slow)
+        text += f"[[unit]]\n{source}"
+    return text
 
 
 async def prepare(url: str) -> None:
@@ -123,13 +143,13 @@ async def await_recording(service: APIRequestContext) -> None:
         await asyncio.sleep(5.0)
 
 
-async def take_all(url: str, pages: list[Picture]) -> None:
-    """Take every look of some pages."""
+async def take_all(url: str, looks: list[Picture]) -> None:
+    """Take some pictures."""
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))))
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=chromium)
         painter = await browser.new_page()
-        for picture in [look for page in pages for look in every_look(page)]:
+        for picture in looks:
             shot = await taken(browser, url, picture)
             small = indexed_png(await pixels_of(painter, shot))
             (EVERY / f"{picture.name}.png").write_bytes(small)
@@ -148,10 +168,12 @@ async def taken(browser: Browser, url: str, picture: Picture) -> bytes:
         extra_http_headers=ELSEWHERE if picture.is_remote else {},
     )
     await page.goto(url + picture.address)
-    await page.locator(picture.until).first.wait_for(timeout=DRAWN_MS)
+    await page.locator(picture.until).first.wait_for(state="attached", timeout=DRAWN_MS)
     await page.wait_for_function(NOW_IS_KNOWN, timeout=DRAWN_MS)
     await page.wait_for_timeout(CHARTS_MS)
-    shot = await page.screenshot(full_page=not picture.is_phone)
+    reach = await page.evaluate("document.documentElement.scrollHeight")
+    seen = {"x": 0, "y": 0, "width": width, "height": min(max(height, reach), MOST_HEIGHT)}
+    shot = await page.screenshot(full_page=True, clip=seen)
     await page.close()
     return shot
 
