@@ -235,8 +235,10 @@ def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     late_min: int,
 ) -> None:
     late = assessment(T0 + late_min * MINUTE_NS + 1, speed_rpm=1e6, eccentricity_ratio=0.35)
+    later = [replace(late, time_ns=late.time_ns + i) for i in range(1, 4)]  # of the same hour
     for store in (plain, rolled):
         store.append([late], [])
+        store.append([late, *later], [])
 
     require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
     gather_all(rolled)
