@@ -183,3 +183,17 @@ async def test_spectra_and_orbits_fit_a_phone(
     width, visible = await phone_page.evaluate(WIDTHS)
     assert width <= visible
     await picture_of(phone_page, address.rpartition("/")[2])
+
+
+async def test_the_last_motion_does_not_pass_for_the_present_one_when_the_link_is_lost(
+    new_plant, page
+) -> None:
+    new_plant.start_daq()
+    new_plant.start_service()
+    await page.goto(new_plant.url + ORBITS)
+    await await_orbit(page)
+    new_plant.stop_daq()
+
+    sentence = page.locator(".player .sentence")
+    await expect(sentence).to_contain_text("not the present", timeout=DATA_MS)
+    await expect(page.locator("canvas.orbit-canvas")).to_be_visible()

@@ -46,8 +46,12 @@ export function ordersOf(rows, frequencyHz) {
   return Array.from({ length: frequencyHz.length }, (_, n) => (n + 1) * step);
 }
 
+/** How long one spectrum alone is drawn, s: with no neighbour nothing says how long it stands for. */
+const ALONE_S = 60;
+
 /** Rows with an empty one at each end of every hole, so that nothing is drawn over it. */
 export function withHoles(rows) {
+  if (rows.length === 1) return [empty(rows[0].timeS - ALONE_S), ...rows, empty(rows[0].timeS + ALONE_S)];
   return rows.flatMap((row, n) => {
     const next = rows[n + 1];
     const usualS = next ? usualStepS(rows, n) : null;

@@ -5,6 +5,7 @@ import { reachOf } from "../charts/orbit_clip.js";
 import { orbitPicture } from "../charts/orbit_picture.js";
 import { timebasePicture } from "../charts/timebase_picture.js";
 import { element, setText } from "../dom.js";
+import { formatAge } from "../format.js";
 import { STOPPED, advanced, moved } from "../parts/playhead.js";
 import { poll } from "../poll.js";
 import { orbitAddress, queryOf } from "../route.js";
@@ -19,6 +20,9 @@ const PERIOD_S = 2;
 
 /** How far behind the newest sample live motion is played, so that it never has to wait for one, s. */
 const LAG_S = 3.5;
+
+/** Without new samples for so long, motion is no longer live, s. */
+const STALE_S = 8;
 
 /** Longest step of the picture: a tab that slept does not leap, s. */
 const LONGEST_STEP_S = 0.25;
@@ -45,6 +49,7 @@ export function orbitsPage(main, unit, bearing) {
   let shownMs = null;
   let hasSamples = false;
   let absence = "Asking the service.";
+  let staleness = null;
 
   const follows = () => source.isLive && at.isPlaying && at.speed === 1;
   function wants() {
@@ -120,9 +125,9 @@ export function orbitsPage(main, unit, bearing) {
 
   function paint() {
     const isThere = clip !== null && at.atS >= clip.startS - 1e-6 && at.atS <= clip.endS + 1e-6;
-    const words = trouble ?? (isThere ? null : waitingWords(clip, source, absence));
-    sentence.hidden = words === null;
-    if (words !== null) setText(sentence, words);
+    const words = trouble ?? (isThere ? source.isLive && staleness : waitingWords(clip, source, absence));
+    sentence.hidden = !words;
+    if (words) setText(sentence, words);
     pictures.hidden = clip === null;
     controls.draw(at, clip, source);
     facts.draw(isThere ? clip : null, at, source, choices.how());
@@ -140,8 +145,9 @@ export function orbitsPage(main, unit, bearing) {
       const had = hasSamples;
       absence = absenceWords(view, unit, bearing);
       hasSamples = absence === null;
+      staleness = stalenessWords(view, unit);
       if (hasSamples && !had) questions.again();
-      if (clip === null) paint();
+      if (!at.isPlaying || clip === null || staleness !== null) paint();
     },
     close() {
       cancelAnimationFrame(timer);
@@ -159,6 +165,13 @@ function absenceWords(view, unitId, bearingId) {
   const unit = view.units.find(({ id }) => id === unitId);
   if (!unit?.bearings.some(({ bearing }) => bearing === bearingId)) return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
   return unit.source.data_age_s === null ? "No sample of this unit has arrived since the service started." : null;
+}
+
+/** That nothing new arrives, so that nobody takes the last motion for the present one; null if something does. */
+function stalenessWords(view, unitId) {
+  const ageS = view.units.find(({ id }) => id === unitId)?.source.data_age_s ?? null;
+  if (ageS === null || ageS < STALE_S) return null;
+  return `No new samples for ${formatAge(ageS)}: this is the last that came, not the present.`;
 }
 
 function waitingWords(clip, source, absence) {

@@ -23,10 +23,10 @@ const PERIOD_S = 30;
 export function waterfallPage(main, unit, bearing) {
   const path = ["units", unit, "bearings", bearing];
   const head = bearingHead(unit, bearing, "spectra over time", "waterfall");
-  const choices = waterfallChoices(() => questions.again(), show);
+  const choices = waterfallChoices(() => questions.again(), redraw);
   const map = panel("Spectra over time", "waterfall");
   const single = panel("Spectrum of the moment", "moment");
-  const moment = momentSlider(show);
+  const moment = momentSlider(redraw);
   main.append(element("div", { class: "bearing waterfall-page" }, head.node, choices.node, map.node, moment.node, single.node));
   let found = null;
   let view = null;
@@ -38,11 +38,17 @@ export function waterfallPage(main, unit, bearing) {
       found = await askSpectra(path, choices.place(), range, signal);
       await show();
     } catch (failure) {
-      if (signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      for (const box of [map, single]) box.trouble(words);
+      if (!signal.aborted) tell(failure);
     }
   }, () => PERIOD_S);
+
+  function tell(failure) {
+    const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
+    for (const box of [map, single]) box.trouble(words);
+  }
+  function redraw() {
+    show().catch(tell);
+  }
 
   async function show() {
     if (found === null) return;
@@ -57,7 +63,7 @@ export function waterfallPage(main, unit, bearing) {
     await showMoment(single, drawn, found.spectra, moment.index());
   }
 
-  const stopTheme = onTheme(() => show()); // shades of a map are colours, not names of colours
+  const stopTheme = onTheme(redraw); // shades of a map are colours, not names of colours
   return {
     draw(now) {
       const first = view?.serviceTimeMs == null && now.serviceTimeMs !== null;
