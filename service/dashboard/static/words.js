@@ -59,6 +59,24 @@ export function reasonWords(reason) {
   return REASONS[reason]?.[0] ?? reason.replaceAll("_", " ");
 }
 
+/** Where there is room for one word or two only. */
+const BRIEF = {
+  waiting_for_data: "waiting",
+  stale: "data old",
+  sensor_failure: "sensor fails",
+  standstill: "standstill",
+  low_coverage: "gaps",
+  insufficient_excitation: "weak motion",
+  swapped_axes: "x, y swapped?",
+  speed_implausible: "speed wrong?",
+  speed_unknown: "no speed",
+  non_stationary: "changing",
+  service_not_reachable: "unknown",
+};
+
+/** A word or two for one of many tiles. */
+export const briefWords = (reason) => BRIEF[reason] ?? reasonWords(reason);
+
 /** A sentence for the bearing page. */
 export function reasonSentence(reason) {
   return REASONS[reason]?.[1] ?? `${reasonWords(reason)}.`;

@@ -6,7 +6,7 @@ import { verdictMark } from "../film_words.js";
 import { mark } from "../parts/mark.js";
 import { readingOf } from "../parts/reading.js";
 import { bearingAddress, unitAddress } from "../route.js";
-import { NOT_CURRENT, lookOf, qualityOf, reasonWords, sourceState } from "../words.js";
+import { NOT_CURRENT, briefWords, lookOf, qualityOf, sourceState } from "../words.js";
 
 const DASH = "—";
 const SHAFT = ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"];
@@ -75,9 +75,9 @@ function stateOf(latest, film, isSaid) {
   const { level, reason } = qualityOf(latest);
   const look = lookOf(level, reason);
   if (isSaid && NOT_CURRENT.has(reason)) return ["absent", "no data"];
-  if (look === "bad") return [look, reasonWords(reason)];
+  if (look === "bad") return [look, briefWords(reason)];
   const verdicts = film.why_not === null ? [film.x, film.y].map(verdictMark) : [];
   const judged = verdicts.find(([one]) => one === "bad") ?? verdicts.find(([one]) => one === "uncertain");
   if (judged) return [judged[0], `film ${judged[1].toLowerCase()}`];
-  return [look, look === "good" ? "good" : reasonWords(reason)];
+  return [look, look === "good" ? "good" : briefWords(reason)];
 }

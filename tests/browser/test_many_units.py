@@ -1,0 +1,61 @@
+"""A plant of twenty units: all on one screen, and what is wrong stands out."""
+
+import copy
+from typing import Any
+
+from playwright.async_api import Page, Route, expect
+
+N_UNITS = 20
+LOST = 7
+FIRST_MS = 60_000
+SIZE = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+
+
+def unit_of(unit: dict[str, Any], number: int) -> dict[str, Any]:
+    another = copy.deepcopy(unit) | {"id": f"U{number}", "name": f"Unit {number}"}
+    if number == LOST:
+        another["source"]["state"] = "not_connected"
+    return another
+
+
+async def twenty_of_one(route: Route) -> None:
+    """The overview of a plant of one unit, with that unit twenty times."""
+    asked = {**route.request.headers, "if-none-match": '"none"'}
+    answer = await route.fetch(headers=asked)
+    overview = await answer.json()
+    unit = overview["units"][0]
+    overview["units"] = [unit_of(unit, number) for number in range(1, N_UNITS + 1)]
+    await route.fulfill(json=overview)
+
+
+async def see(page: Page, url: str) -> None:
+    await page.route("**/api/v1/overview", twenty_of_one)
+    await page.goto(url)
+    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=FIRST_MS)
+
+
+async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
+    running_plant, page, picture_of
+) -> None:
+    await see(page, running_plant.url)
+    stiffness = page.locator("[data-unit=U20] [data-bearing=UJB] .number").first
+    await expect(stiffness).not_to_have_text("—", timeout=FIRST_MS)
+    width, height = await page.evaluate(SIZE)
+    assert (width, height) == (1280, 800)
+    lost = page.locator(f"[data-unit=U{LOST}] .tile-head .mark").filter(visible=True)
+    await expect(lost).to_have_text("Not connected")
+    await expect(lost).to_have_attribute("data-look", "bad")
+    well = page.locator("[data-unit=U8] .tile-head .mark").filter(visible=True)
+    await expect(well).to_have_count(0)
+    await picture_of(page, "twenty")
+    await page.get_by_role("link", name="Unit 8").click()
+    await expect(page.locator("h1")).to_contain_text("Unit 8")
+
+
+async def test_twenty_units_never_scroll_a_phone_sideways(
+    running_plant, phone_page, picture_of
+) -> None:
+    await see(phone_page, running_plant.url)
+    width, _ = await phone_page.evaluate(SIZE)
+    assert width <= 360
+    await picture_of(phone_page, "twenty")
