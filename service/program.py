@@ -210,6 +210,7 @@ async def _run(
                 task.cancel()
             await asyncio.wait([serving])
     finally:
+        desk.close()
         await captures.close()
         await recorder.flush()  # also when a bug ends the program
         await evidence.close()

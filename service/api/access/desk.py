@@ -120,6 +120,10 @@ class AccessDesk:
         """Whether anybody could log in."""
         return bool(await self._work.looked_up(self._store.accounts.all))
 
+    def close(self) -> None:
+        """Let nobody in any more: the service ends."""
+        self._work.close()
+
     async def _proven(self, shown: Credentials) -> Identity | None:
         now_ns = self._clock.now_ns()
         if shown.kind is Kind.SESSION:

@@ -57,6 +57,11 @@ class AccessWork:
         running.add_done_callback(lambda _: self._places.release())
         return await asyncio.wrap_future(running)
 
+    def close(self) -> None:
+        """Begin nothing more; what has begun is short."""
+        for threads in (self._lookups, self._hashes, self._notes):
+            threads.shutdown(wait=False, cancel_futures=True)
+
     def note(self, write: Callable[[], None]) -> None:
         """Write something down that nobody waits for, and that may fail."""
         if self._note_places.acquire(blocking=False):
