@@ -43,11 +43,11 @@ function accountRow({ name }, again) {
   const below = rowBelow(HEADS, ...questions.map(([, form]) => form.node));
   below.hidden = false;
   const buttons = questions.map(([words, form]) => opener(words, name, form, () => questions.map(([, one]) => one)));
+  buttons[0].addEventListener("click", () => (role.value = texts[0].textContent)); // what it is now, not what was chosen and left
   const cells = [...texts, element("span", { class: "actions" }, ...buttons)].map((node, n) => listingCell(HEADS[n + 1], node));
   return {
     nodes: [element("tr", { role: "row", "data-account": name }, listingName(title), ...cells), below],
     draw(account) {
-      if (texts[0].textContent !== account.role) role.value = account.role;
       [account.role, formatTime(Date.parse(account.created)), formatTime(Date.parse(account.password_set))].forEach((words, n) => setText(texts[n], words));
     },
   };

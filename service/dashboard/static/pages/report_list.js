@@ -28,11 +28,12 @@ const SAMPLES = { complete: "kept", being_made: "being written", lost: "lost", r
 export function reportList() {
   const table = listing("Reports, the newest first", HEADS, "None yet: no alarm has been raised.", keyOf, reportRow);
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
+  let known = new Map();
   const questions = poll(async (signal) => {
     try {
       const { events } = await ask(["alarms", "events"], [["limit", N_EVENTS]], signal);
       const raised = events.filter(({ change }) => ["raised", "escalated"].includes(change));
-      const kept = await occurrencesOf([...new Set(raised.map(({ alarm }) => alarm))].slice(0, MOST_ALARMS), signal);
+      const kept = (known = await occurrencesOf(raised, known, signal));
       table.draw(raised.filter(({ alarm }) => kept.has(alarm)).map((event) => ({ event, kept: kept.get(event.alarm).get(event.occurrence) })));
       setText(sentence, "");
     } catch (failure) {
@@ -47,19 +48,27 @@ export function reportList() {
 
 const keyOf = ({ event }) => `${event.alarm} ${event.occurrence}`;
 
-/** For each alarm what is kept of its occurrences, by number. */
-async function occurrencesOf(alarms, signal) {
+/** For each of the newest alarms what is kept of its occurrences, by number; asked for while that may change. */
+async function occurrencesOf(raised, known, signal) {
   const found = new Map();
-  for (const alarm of alarms) {
-    try {
-      const { occurrences } = await ask(["alarms", alarm, "evidence"], [], signal);
-      found.set(alarm, new Map(occurrences.map((one) => [one.occurrence, one])));
-    } catch (failure) {
-      if (!(failure instanceof Refused) || failure.status !== 404) throw failure;
-      found.set(alarm, new Map()); // no evidence is kept here, or of such an alarm
-    }
+  for (const alarm of [...new Set(raised.map((event) => event.alarm))].slice(0, MOST_ALARMS)) {
+    const numbers = raised.filter((event) => event.alarm === alarm).map(({ occurrence }) => occurrence);
+    const before = known.get(alarm);
+    found.set(alarm, before && numbers.every((n) => isFinal(before.get(n))) ? before : await askOccurrences(alarm, signal));
   }
   return found;
+}
+
+const isFinal = (kept) => kept !== undefined && kept.state !== "waiting" && kept.samples !== "being_made";
+
+async function askOccurrences(alarm, signal) {
+  try {
+    const { occurrences } = await ask(["alarms", alarm, "evidence"], [], signal);
+    return new Map(occurrences.map((one) => [one.occurrence, one]));
+  } catch (failure) {
+    if (!(failure instanceof Refused) || failure.status !== 404) throw failure;
+    return new Map(); // no evidence is kept here, or of such an alarm
+  }
 }
 
 function reportRow({ event }) {
