@@ -18,6 +18,7 @@ import { waterfallChoices } from "./waterfall_choices.js";
 const MAX_SPECTRA = 240;
 const MAX_ALARMS = 200;
 const PERIOD_S = 30;
+const LEAST_ROOM_S = 30;
 
 /** Returns `{ draw(view), close() }`. */
 export function waterfallPage(main, unit, bearing) {
@@ -101,7 +102,12 @@ function drawnOf({ spectra, place, startS, endS }, choices) {
   const turnHz = turns.at(-1) ?? null;
   const toUpper = Math.min(choices.toOrder() * (inOrders ? 1 : (turnHz ?? Infinity)), abscissa.at(-1));
   const common = { rows, abscissa, inOrders, turnHz, toUpper, isLog: choices.isLog(), unit: inOrders ? "×" : "Hz" };
-  return { ...common, startS, endS, headroom: choices.asLines(), revision: choices.revision() };
+  return { ...common, startS: shownFromS(startS, endS, Date.parse(spectra.first) / 1000), endS, headroom: choices.asLines(), revision: choices.revision() };
+}
+
+/** No stretch of time is shown that lies before the first spectrum of all, but for a little room. */
+function shownFromS(startS, endS, firstS) {
+  return Math.max(startS, firstS - Math.max(0.1 * (endS - firstS), LEAST_ROOM_S));
 }
 
 function absenceWords({ spectra, place }, choices) {
