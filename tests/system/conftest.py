@@ -43,7 +43,9 @@ class Program:
 
     async def get(self, path: str, **parameters: Any) -> Any:
         """Ask the API; the answer must be 200."""
-        async with httpx2.AsyncClient(base_url=self.url, trust_env=False) as client:
+        async with httpx2.AsyncClient(
+            base_url=self.url, trust_env=False, timeout=PATIENCE_S
+        ) as client:
             response = await client.get(path, params=parameters)
         assert response.status_code == 200, response.text
         return response.json()
