@@ -116,9 +116,9 @@ class SqliteStore:
 
     def close(self) -> None:
         """Release the file; closing twice is fine."""
+        self._readers.close()  # first: only the writer, closed last, brings the journal into the file
         with self._lock:
             self._writer.close()
-        self._readers.close()
 
     def append(
         self,

@@ -296,3 +296,13 @@ def test_live_and_replayed_results_never_share_a_database(
     SqliteStore(path, first).close()
     with pytest.raises(StoreError, match=f"holds {first} results and is not opened for {then}"):
         SqliteStore(path, then)
+
+
+def test_a_closed_database_is_one_whole_file_also_after_reads(tmp_path: Path) -> None:
+    store = SqliteStore(tmp_path / "padwatch.sqlite3")
+    assert store.references() == []
+    store.close()
+
+    assert [path.name for path in tmp_path.iterdir() if "sqlite3" in path.name] == [
+        "padwatch.sqlite3"
+    ]
