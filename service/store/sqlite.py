@@ -116,7 +116,7 @@ class SqliteStore:
 
     def close(self) -> None:
         """Release the file; closing twice is fine."""
-        self._readers.close()  # first: only the writer, closed last, brings the journal into the file
+        self._readers.close()  # first: the last to close brings the journal into the file
         with self._lock:
             self._writer.close()
 
