@@ -5,6 +5,7 @@ from playwright.async_api import Page, expect
 ACCESS = "#/access"
 FIRST_MS = 60_000
 NEW = "[data-account=newcomer]"
+FIELDS = ("password", "new-password", "new-password-again")
 
 
 async def open_access(page: Page, url: str, password: str) -> None:
@@ -98,3 +99,30 @@ async def test_a_plant_that_nobody_needs_to_log_in_to_says_so(running_plant, pag
     await page.goto(running_plant.url + ACCESS)
     await expect(page.locator(".accounts")).to_contain_text("No account yet", timeout=FIRST_MS)
     await expect(page.locator(".keys")).to_contain_text("No key yet")
+
+
+async def test_whoever_is_logged_in_changes_his_own_password(
+    guarded_plant, remote_page, password
+) -> None:
+    page, other = remote_page, f"{password} and cold"
+    await open_access(page, guarded_plant.url, password)
+    await page.locator(".person").get_by_role("link", name="Password").press("Enter")
+    now, wanted, again = (page.locator(f".door input[name={name}]") for name in FIELDS)
+    await now.fill(password)
+    await wanted.fill(other)
+    await again.fill(other + "er")
+    await page.keyboard.press("Enter")
+    await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("not the same")
+    await again.fill(other)
+    await page.keyboard.press("Enter")
+    said = page.get_by_text("Your password is changed.")
+    await expect(said).to_be_visible(timeout=FIRST_MS)
+    new_context, at = page.context.browser.new_context, f"{guarded_plant.url}api/v1"
+    found = await (await new_context()).request.post(
+        f"{at}/session", data={"name": "admin", "password": other}
+    )
+    assert found.status == 201
+    back = await (await new_context()).request.put(
+        f"{at}/accounts/admin/password", data={"password": password}
+    )
+    assert back.ok

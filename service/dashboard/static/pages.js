@@ -16,6 +16,7 @@ import { explorerPage } from "./pages/explorer.js";
 import { filmPage } from "./pages/film.js";
 import { orbitsPage } from "./pages/orbits.js";
 import { overviewPage } from "./pages/overview.js";
+import { passwordPage } from "./pages/password.js";
 import { recordingsPage } from "./pages/recordings.js";
 import { sourcesPage } from "./pages/sources.js";
 import { unitPage } from "./pages/unit.js";
@@ -30,6 +31,7 @@ export const PAGES = [
   { pattern: "#/recordings", title: "recordings and reports", nav: "Recordings", open: recordingsPage },
   { pattern: "#/audit", title: "audit trail", nav: "Audit", permission: "read_audit", open: auditPage },
   { pattern: "#/access", title: "access", nav: "Access", permission: "change_access", open: accessPage },
+  { pattern: "#/password", title: "your password", open: passwordPage },
   { pattern: "#/units/:unit", title: (unit) => unit, open: unitPage },
   { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },
   { pattern: "#/units/:unit/bearings/:bearing/film", title: (unit, bearing) => `film of ${unit} ${bearing}`, open: filmPage },

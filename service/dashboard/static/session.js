@@ -34,6 +34,11 @@ export async function logIn(name, password) {
   settle(await tell(["session"], { name, password }));
 }
 
+/** Set another password; all other sessions of the account end. */
+export async function changePassword(password, newPassword) {
+  settle(await tell(["session", "password"], { password, new_password: newPassword }));
+}
+
 /** End the session here and on the service. */
 export async function logOut() {
   await tell(["session"], undefined, "DELETE");

@@ -6,6 +6,7 @@ import { logOut, session } from "../session.js";
 /** Returns `{ node, draw() }`. */
 export function personView() {
   const who = element("span");
+  const password = element("a", { href: "#/password" }, "Password");
   const leave = element("button", { type: "button" }, "Log out");
   const failure = element("span", { class: "action-failure", role: "alert" });
   leave.addEventListener("click", async () => {
@@ -16,7 +17,7 @@ export function personView() {
       setText(failure, `Not logged out: ${error.message}`);
     }
   });
-  const node = element("span", { class: "person", hidden: "" }, who, leave, failure);
+  const node = element("span", { class: "person", hidden: "" }, who, password, leave, failure);
   return {
     node,
     draw() {
