@@ -94,6 +94,9 @@ class LiveView:
         self._status = {unit: UnitStatus() for unit in units}
         self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
         self._blocks: dict[str, BlockHistory] = {}
+        self.revision = 0
+        """Another number as soon as a link has changed or a result has come."""
+
         self.store_error: str | None = None
         self.n_unstored = 0
 
@@ -104,6 +107,7 @@ class LiveView:
             before = self._status[unit] = replace(before, n_failed=before.n_failed + 1)
         if (before.state, before.reason) == (state, reason):
             return False
+        self.revision += 1
         since_ns = before.since_ns if before.state is state else self._clock.now_ns()
         self._status[unit] = replace(before, state=state, reason=reason, since_ns=since_ns)
         return before.state is not state
@@ -122,6 +126,7 @@ class LiveView:
 
     def set_assessment(self, assessment: Assessment) -> None:
         """Note a new result."""
+        self.revision += 1
         key = (assessment.unit, assessment.bearing)
         self._assessments[key] = (self._clock.monotonic_s(), assessment)
 

@@ -31,6 +31,9 @@ CONNECTS_PER_S = 50.0
 CONFIG_RETRY_S = 15.0
 """A device that cannot fit the settings may be replaced or reconfigured, but not in seconds."""
 
+TURNS = 3
+"""Of the event loop between two bearings: what a request takes from its arrival to its answer."""
+
 
 @dataclass(frozen=True)
 class WatchedUnit:
@@ -125,7 +128,7 @@ class Runner:
         found = []
         for assessment in monitor.steps(block):
             found.append(assessment)
-            await asyncio.sleep(0)  # a bearing takes milliseconds: others have their turn between
+            await _others()
         assessments, films = self._films.take(block.unit, found)
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
@@ -134,6 +137,12 @@ class Runner:
         news = self._alarms.take(block, assessments, self._films.conditions(films))
         if assessments or gaps or news:
             self._recorder.put(Findings(assessments, gaps, news, films))
+
+
+async def _others() -> None:
+    """Let all others have their turns: a bearing takes milliseconds, and many may be waiting."""
+    for _ in range(TURNS):
+        await asyncio.sleep(0)
 
 
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:

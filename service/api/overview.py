@@ -31,6 +31,19 @@ NO_UNITS = b'"units":[]}'
 COUNTERS_S = 1.0
 """How old counts of samples may be: they change with every block, many times a second."""
 
+SHARED_S = 0.2
+"""How long everybody is given the same answer, unless a link, a result or an alarm is new."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """All of it, as it was put together for whoever asked first."""
+
+    news: tuple[object, ...]
+    made_s: float
+    tag: str
+    body: bytes
+
 
 @dataclass(frozen=True)
 class UnitState:
@@ -87,9 +100,25 @@ class Overview:
         self._parts: dict[str, UnitPart] = {}
         self._latest: dict[tuple[str, str], tuple[Sequence[object], LatestModel]] = {}
         self._rendering = Lock()
+        self._answer: Answer | None = None
 
     async def answer(self, if_none_match: str | None) -> Response:
         """The overview now, or only that it is as the client knows it."""
+        news, now_s = self._news(), self._context.clock.monotonic_s()
+        kept = self._answer
+        if kept is None or kept.news != news or now_s - kept.made_s >= SHARED_S:
+            kept = self._answer = await self._put_together(news, now_s)
+        if is_known(kept.tag, if_none_match):
+            return Response(status_code=304, headers={"ETag": kept.tag})
+        return Response(kept.body, media_type="application/json", headers={"ETag": kept.tag})
+
+    def _news(self) -> tuple[object, ...]:
+        """Another one as soon as there is something that nobody may be told late."""
+        live, alarms, captures = self._context.live, self._context.alarms, self._context.captures
+        stored = (live.store_error, live.n_unstored)
+        return (live.revision, alarms.revision, *stored, captures.error, captures.n_running)
+
+    async def _put_together(self, news: tuple[object, ...], now_s: float) -> Answer:
         states = {unit: self._state(unit) for unit in self._context.units}
         head = self._head()
         if any(self._is_old(unit, state) for unit, state in states.items()):
@@ -97,12 +126,9 @@ class Overview:
         parts = [self._parts[unit] for unit in states]
         without_time = head.model_copy(update={"time": ""}).model_dump_json().encode()
         tag = tag_of(digest_of(without_time), *(part.digest for part in parts))
-        if is_known(tag, if_none_match):
-            return Response(status_code=304, headers={"ETag": tag})
         units = [p.filled(s.ages_s) for p, s in zip(parts, states.values(), strict=True)]
         body = head.model_dump_json().encode().removesuffix(NO_UNITS)
-        body += b'"units":[' + b",".join(units) + b"]}"
-        return Response(body, media_type="application/json", headers={"ETag": tag})
+        return Answer(news, now_s, tag, body + b'"units":[' + b",".join(units) + b"]}")
 
     def _state(self, unit: str) -> UnitState:
         live, films = self._context.live, self._context.films
