@@ -4,6 +4,7 @@ import asyncio
 import os
 import sys
 from collections.abc import Coroutine
+from contextlib import suppress
 from threading import Timer
 from typing import Any, NoReturn
 
@@ -35,11 +36,16 @@ def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
     leaving.cancel()
 
 
-def leave() -> NoReturn:
-    """End the process now: taking libraries and threads down would last longer than the stop."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)
+def leave(code: int = 0) -> NoReturn:
+    """End the process now, without taking libraries and threads down.
+
+    That would last longer than a stop may, and now and then ends in an abort: Arrow's threads may
+    still be there when its parts are destroyed (apache/arrow#34314).
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # whoever read it has gone
+            stream.flush()
+    os._exit(code)
 
 
 def _leave_threads() -> None:

@@ -1,8 +1,8 @@
 """Entry point of the `padwatch` command."""
 
-import sys
 import tempfile
 import traceback
+from typing import NoReturn
 
 import typer
 
@@ -11,6 +11,7 @@ from service.cli.backtest import backtest
 from service.cli.backup import backup, restore
 from service.cli.daq import daq
 from service.cli.demo import demo
+from service.cli.ending import leave
 from service.cli.logs import set_up_logging
 from service.cli.reanalyse import reanalyse
 from service.cli.record import record
@@ -48,17 +49,24 @@ def padwatch() -> None:
     set_up_logging()
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Run the command line; a bug ends it with one line and a report for its makers."""
+    leave(_exit_code())
+
+
+def _exit_code() -> int:
     try:
         app()
+    except SystemExit as ended:
+        return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     except Exception:  # the outermost rim: users get a sentence, the report gets the traceback
         with tempfile.NamedTemporaryFile(
             "w", prefix="padwatch-", suffix=".txt", delete=False
         ) as report:
             traceback.print_exc(file=report)
         typer.echo(f"padwatch: stopped by an internal error; the report is {report.name}", err=True)
-        sys.exit(EXIT_BUG)
+        return EXIT_BUG
+    return 0
 
 
 if __name__ == "__main__":

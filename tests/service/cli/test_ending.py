@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 WAITS_FOR_EVER = """
 import asyncio, threading
 from service.cli.ending import run_to_its_end
@@ -32,3 +34,32 @@ def test_a_thread_without_end_does_not_hold_the_end_up() -> None:
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith("over")
     assert "left behind" in ended.stdout + ended.stderr
+
+
+ENDS_WITH = """
+import atexit
+from service.cli import main
+
+def app():
+    atexit.register(print, "taken down")
+    print("said", end="")
+    raise SystemExit({code!r})
+
+main.app = app
+main.main()
+"""
+
+
+@pytest.mark.parametrize(("code", "seen"), [(0, 0), (3, 3), (None, 0), ("why", 1)])
+def test_a_command_ends_with_its_code_before_libraries_are_taken_down(
+    code: object, seen: int
+) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", ENDS_WITH.format(code=code)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+    assert (ended.returncode, ended.stdout) == (seen, "said"), ended.stderr
