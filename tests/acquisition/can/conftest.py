@@ -4,11 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from rigs.fake_bus import VIRTUAL, FakeBus
 
 from acquisition.can.settings import CanLinkSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
 from acquisition.daq.can_dbc import daq_settings
+from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_shape import CanShape, DaqSignal
 from acquisition.raw import FeedEndedError, RawBlock
 from core.blocks import SampleBlock
@@ -129,3 +131,23 @@ async def blocks_of(source: CanSource, epoch: int, stop_index: int) -> list[Samp
 def read_up_to() -> Callable:
     """`blocks_of`: everything a source delivers up to a sample of an epoch."""
     return blocks_of
+
+
+@pytest.fixture
+def fake_bus() -> FakeBus:
+    return FakeBus()
+
+
+@pytest.fixture
+def fake_bus_source(shape_of, fake_bus, source_of):
+    return source_of(shape_of(), VIRTUAL, opener=lambda *_: fake_bus, stale_after_s=60.0)
+
+
+@pytest.fixture
+def shape(shape_of):
+    return shape_of()
+
+
+@pytest.fixture
+def device(shape, counting_feed):
+    return CanDevice(counting_feed(n_channels=4), shape)

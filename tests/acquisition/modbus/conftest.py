@@ -1,17 +1,32 @@
 """Small rings, honest and hostile, and the sources and links that read them."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 
 import pytest
+from rigs.bench import Bench
 from rigs.hostile_modbus import HostileLine, HostileServer
+from rigs.polled import (
+    CALIBRATION,
+    Follower,
+    device_of,
+    map_of,
+)
 
 from acquisition.clock import SystemClock
+from acquisition.daq.map_device import MapDevice
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.rtu_server import ModbusRtuServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
+from acquisition.registers.register_map import (
+    RegisterMap,
+)
 from core.blocks import SampleBlock
 
 
@@ -95,3 +110,60 @@ def source_at(counts_calibration) -> Callable[..., ModbusRingSource]:
         )
 
     return build
+
+
+@pytest.fixture
+def plant(stepped_clock) -> Callable:
+    """A device that lives on a stepped clock, and a source that polls it once a second."""
+
+    @asynccontextmanager
+    async def build(
+        registers: RegisterMap | None = None, read_as: RegisterMap | None = None, **settings
+    ) -> AsyncIterator[tuple[PolledSource, MapDevice, ModbusTcpServer, Follower]]:
+        registers = registers or map_of()
+        device = device_of(registers)
+        clock = Follower(stepped_clock, device)
+        async with ModbusTcpServer(device) as server:
+            transport = TcpTransport(host="127.0.0.1", port=server.port)
+            source = PolledSource(
+                PolledSettings(transport=transport, **({"timeout_s": 5.0} | settings)),
+                read_as or registers,
+                ("wave",),
+                CALIBRATION,
+                clock,
+            )
+            yield source, device, server, clock
+
+    return build
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture(params=["tcp", "rtu"])
+async def bench_server(request, bench):
+    kind = {"tcp": ModbusTcpServer, "rtu": ModbusRtuServer}[request.param]
+    async with kind(bench) as server:
+        yield server
+
+
+@pytest.fixture
+def linked(bench_server):
+    """Builds links to the bench; other settings as keywords."""
+    links = []
+
+    def build(**settings) -> ModbusLink:
+        found = bench_server.endpoint
+        transport = (
+            TcpTransport(host=found["host"], port=found["port"])
+            if "port" in found
+            else SerialTransport(device=found["device"], parity=found["parity"])
+        )
+        links.append(ModbusLink(LinkSettings(transport=transport, **{"timeout_s": 0.2} | settings)))
+        return links[-1]
+
+    yield build
+    for link in links:
+        link.close()

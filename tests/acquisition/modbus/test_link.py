@@ -1,7 +1,6 @@
 """What can be read from a device, over TCP and RTU alike, and that nothing can be written."""
 
 import inspect
-import struct
 
 import pymodbus.pdu.bit_message
 import pymodbus.pdu.diag_message
@@ -12,83 +11,12 @@ import pymodbus.pdu.register_message
 import pytest
 from pymodbus.pdu import ModbusPDU
 
-from acquisition.daq.register_memory import RegisterMemory
-from acquisition.daq.rtu_server import ModbusRtuServer
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import RtuFramer, TcpFramer
 from acquisition.modbus.identification import Identification
-from acquisition.modbus.identity import ExpectedIdentification, Signature
-from acquisition.modbus.link import ModbusLink
-from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 
 
-class Bench:
-    """A device with some of everything that can be read."""
-
-    step_s = 1.0
-    ended = drained = False
-
-    def __init__(self) -> None:
-        self.memory = RegisterMemory(100, 300)
-        self.memory.write(100, bytes(range(200)))
-        self.bits = bytes([0b1010_0101, 0b11, 0xFF] * 100)
-        self.queues = {100: b"", 7: bytes(range(62)), 8: b"", 9: bytes(64)}
-        self.identification = {0: b"Acme", 1: b"DAQ-12", 2: b"1.4"}
-
-    def read_registers(self, function, address, count):  # noqa: ARG002
-        return self.memory.read(address, count)
-
-    def read_bits(self, function, address, count):
-        n_bytes = -(-count // 8)
-        return self.bits[address // 8 : address // 8 + n_bytes] if function == 2 else bytes(n_bytes)
-
-    def read_fifo(self, address):
-        return self.queues.get(address)
-
-    def produce(self, n_steps):
-        pass
-
-    def fault_names(self):
-        return []
-
-    def spoil(self, fault, count):
-        pass
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
-
-
-@pytest.fixture(params=["tcp", "rtu"])
-async def server(request, bench):
-    kind = {"tcp": ModbusTcpServer, "rtu": ModbusRtuServer}[request.param]
-    async with kind(bench) as server:
-        yield server
-
-
-@pytest.fixture
-def linked(server):
-    """Builds links to the bench; other settings as keywords."""
-    links = []
-
-    def build(**settings) -> ModbusLink:
-        found = server.endpoint
-        transport = (
-            TcpTransport(host=found["host"], port=found["port"])
-            if "port" in found
-            else SerialTransport(device=found["device"], parity=found["parity"])
-        )
-        links.append(ModbusLink(LinkSettings(transport=transport, **{"timeout_s": 0.2} | settings)))
-        return links[-1]
-
-    yield build
-    for link in links:
-        link.close()
-
-
-async def test_every_kind_of_read_brings_what_the_device_has(linked, server, bench):
+async def test_every_kind_of_read_brings_what_the_device_has(linked, bench_server, bench):
     link = linked()
     await link.open()
     assert await link.read(100, 60) == bytes(range(120))
@@ -98,17 +26,17 @@ async def test_every_kind_of_read_brings_what_the_device_has(linked, server, ben
     assert await link.read_fifo(7) == bytes(range(62))
     assert await link.read_fifo(8) == b""
     assert await link.identify() == Identification("Acme", "DAQ-12", "1.4")
-    assert server.function_codes == {3: 1, 4: 1, 2: 1, 1: 1, 0x18: 2, 43: 1}
+    assert bench_server.function_codes == {3: 1, 4: 1, 2: 1, 1: 1, 0x18: 2, 43: 1}
 
 
-async def test_a_long_read_is_split_at_what_the_device_gives_at_once(linked, server, bench):
+async def test_a_long_read_is_split_at_what_the_device_gives_at_once(linked, bench_server, bench):
     link = linked(max_registers=7)
     await link.open()
     assert await link.read(100, 100) == bytes(range(200))
-    assert server.function_codes == {3: 15}
+    assert bench_server.function_codes == {3: 15}
     bench.bits = bytes(range(251)) * 2
     assert await link.read_bits(0, 3000) == bench.bits[:375]
-    assert server.function_codes[2] == 2
+    assert bench_server.function_codes[2] == 2
 
 
 async def test_a_queue_that_claims_more_than_31_registers_is_refused(linked):
@@ -139,28 +67,28 @@ async def test_what_the_device_does_not_have_is_a_config_error_that_says_what_wa
         (lambda link: link.read_fifo(65_536), "1 at 65536 are asked"),
     ],
 )
-async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, server):
+async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, bench_server):
     link = linked()
     await link.open()
     with pytest.raises(ConfigError, match=complaint):
         await ask(link)
-    assert not server.function_codes
+    assert not bench_server.function_codes
 
 
-async def test_a_busy_device_may_be_asked_again_on_the_same_connection(linked, server):
+async def test_a_busy_device_may_be_asked_again_on_the_same_connection(linked, bench_server):
     link = linked()
     await link.open()
-    server.inject("busy", 2)
+    bench_server.inject("busy", 2)
     for _ in range(2):
         with pytest.raises(LinkError, match=r"exception 6 \(busy\) to a read of 1 at 100"):
             await link.read(100, 1)
     assert await link.read(100, 1) == b"\0\1"
 
 
-async def test_a_half_open_link_is_noticed_by_the_time_out_and_says_so(linked, server):
+async def test_a_half_open_link_is_noticed_by_the_time_out_and_says_so(linked, bench_server):
     link = linked(timeout_s=0.1)
     await link.open()
-    server.inject("silent")
+    bench_server.inject("silent")
     with pytest.raises(LinkError, match=f"{link.where}: no answer within 0.1 s"):
         await link.read(100, 1)
     with pytest.raises(LinkError, match="closed"):
@@ -220,105 +148,14 @@ def test_nothing_but_reads_can_be_framed(framer, kind):
 
 
 @pytest.mark.parametrize("kind", requests_of_pymodbus(), ids=lambda kind: kind.__name__)
-async def test_nothing_but_reads_ever_reaches_the_wire(kind, linked, server):
+async def test_nothing_but_reads_ever_reaches_the_wire(kind, linked, bench_server):
     link = linked(timeout_s=0.02)
     await link.open()
     request = kind(**arguments_of(kind))
     if kind.__name__ in READS:
         await link._connection.ask(request, "a read")
-        assert list(server.function_codes) == [kind.function_code]
+        assert list(bench_server.function_codes) == [kind.function_code]
         return
     with pytest.raises(ConfigError, match="is never sent"):
         await link._connection.ask(request, "a write")
-    assert not server.function_codes
-
-
-@pytest.mark.parametrize("request_data", [b"", b"\x0d\x01\x00", b"\x0e\x00\x00", b"\x0e\x05\x00"])
-def test_function_43_is_only_sent_to_read_an_identification(request_data):
-    class Other(ModbusPDU):
-        function_code = 43
-
-        def encode(self) -> bytes:
-            return request_data
-
-    with pytest.raises(ConfigError, match="function code 43 is never sent"):
-        TcpFramer().buildFrame(Other())
-
-
-async def test_the_expected_device_is_read_and_another_one_is_not(linked, server):
-    for identity in (
-        Signature(address=101, words=(0x0203, 0x0405)),
-        Signature(address=101, words=(0x0203,), function=4),
-        ExpectedIdentification(vendor="Acme"),
-        ExpectedIdentification(product_code="DAQ-12", revision="1.4"),
-    ):
-        link = linked(identity=identity)
-        await link.open()
-        assert await link.read(100, 1) == b"\0\1"
-        link.close()
-    server.function_codes.clear()
-
-
-@pytest.mark.parametrize(
-    ("identity", "complaint"),
-    [
-        (
-            Signature(address=101, words=(0x0203, 0x0406)),
-            "registers at 101 are 0x0203 0x0405, expected are 0x0203 0x0406",
-        ),
-        (ExpectedIdentification(vendor="Emca"), "vendor is 'Acme', expected is 'Emca'"),
-        (
-            ExpectedIdentification(vendor="Acme", product_code="DAQ-24"),
-            "product_code is 'DAQ-12', expected is 'DAQ-24'",
-        ),
-        (ExpectedIdentification(revision="1.5"), "revision is '1.4', expected is '1.5'"),
-    ],
-)
-async def test_another_device_is_refused_with_found_and_expected(identity, complaint, linked):
-    link = linked(identity=identity)
-    with pytest.raises(ConfigError, match=f"{link.where}: another device answers: its {complaint}"):
-        await link.open()
-
-
-async def test_a_device_without_identification_is_not_the_expected_one(linked, bench):
-    bench.identification = {}
-    with pytest.raises(ConfigError, match=r"illegal function.*its identification"):
-        await linked(identity=ExpectedIdentification(vendor="Acme")).open()
-
-
-async def test_one_changed_reply_does_not_make_another_device(linked, server):
-    link = linked(identity=Signature(address=101, words=(0x0203, 0x0405)))
-    server.inject("word_order")
-    await link.open()
-
-
-async def test_an_identification_that_is_no_text_is_shown_and_does_no_harm(linked, bench):
-    bench.identification = {0: b"\xff\0\0", 1: bytes(100), 2: b"1.4\0"}
-    link = linked()
-    await link.open()
-    assert await link.identify() == Identification("\\xff", "", "1.4")
-
-
-def test_a_signature_is_made_of_words():
-    for words in ((), (0x10000,), (-1,)):
-        with pytest.raises(ConfigError, match="signature is"):
-            Signature(address=0, words=words)
-
-
-async def test_an_identification_in_parts_is_read_to_its_end_and_one_without_end_is_refused(
-    linked, server
-):
-    def part(request, _):
-        more, following = (0xFF, 1) if request[3] == 0 else (0, 0)
-        return struct.pack(">7B", 43, 14, 1, 0x81, more, following, 1) + bytes(
-            (request[3], 1, 65 + request[3])
-        )
-
-    link = linked()
-    await link.open()
-    server._reply_faults.extend([part] * 2)
-    assert await link.identify() == Identification("A", "B", "")
-    endless = struct.pack(">7B", 43, 14, 1, 0x81, 0xFF, 0, 0)
-    server._reply_faults.extend([lambda *_: endless] * 8)
-    with pytest.raises(FrameError, match="no end"):
-        await link.identify()
+    assert not bench_server.function_codes

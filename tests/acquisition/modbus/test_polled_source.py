@@ -1,126 +1,16 @@
 """Polled registers: a sample is a poll, missed ones count, nothing stale or flagged passes."""
 
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
-
 import numpy as np
 import pytest
+from rigs.polled import map_of, take
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.daq.map_device import MapDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.polled_source import PolledSettings, PolledSource
-from acquisition.modbus.transport import TcpTransport
-from acquisition.raw import RawBlock
 from acquisition.registers.cells import Cell, NumberType
 from acquisition.registers.device_time import EpochTime
 from acquisition.registers.register_map import (
-    FlagCheck,
-    FullScale,
-    MapValue,
-    Meaning,
-    RegisterMap,
     Signature,
 )
-from core.blocks import SampleBlock
-from core.quality import GOOD, Level, Reason
-
-STATUS = Cell(address=50)
-BAD_IF_SET = FlagCheck(cell=STATUS, mask=0x0008, set_means=Meaning.BAD)
-CHANNEL = ChannelCalibration(10.0, 100.0, -10.0, 10.0)
-CALIBRATION = UnitCalibration(
-    "U1", 1.0, (CHANNEL,), (SlowCalibration("oil", -50.0, 200.0),), block_samples=1
-)
-
-
-class Waves:
-    """A converter of one channel of counts: 100 engineering units at sample 0, then 101 and on."""
-
-    def __init__(self) -> None:
-        self.n, self.value, self.oil = 0, 100.0, 45.0
-
-    def advance(self, n_samples: int) -> RawBlock:
-        first, self.n = self.n, self.n + n_samples
-        counts = np.full((1, n_samples), self.value + first, dtype=np.float32)
-        start_ns = (1_800_000_000 + first) * 10**9
-        return RawBlock(0, first, start_ns, 1.0, counts, (True,), (self.oil,))
-
-
-def map_of(**settings) -> RegisterMap:
-    wave = MapValue(
-        id="wave",
-        cell=Cell(address=10, type=NumberType.FLOAT32),
-        flags=(BAD_IF_SET,),
-    )
-    oil = MapValue(
-        id="oil",
-        cell=Cell(address=20, type=NumberType.INT16),
-        scale=0.1,
-        invalid_values=(0x8000,),
-        flags=(BAD_IF_SET,),
-    )
-    return RegisterMap(**({"values": (wave, oil)} | settings))
-
-
-def device_of(registers: RegisterMap) -> MapDevice:
-    return MapDevice(Waves(), registers, ("wave",), CALIBRATION)
-
-
-class Follower:
-    """A clock on which a device lives: it produces whenever time passes."""
-
-    def __init__(self, clock, device: MapDevice) -> None:
-        self._clock, self._device, self._done = clock, device, 0
-
-    def now_ns(self) -> int:
-        return self._clock.now_ns()
-
-    def monotonic_s(self) -> float:
-        return self._clock.monotonic_s()
-
-    async def sleep(self, duration_s: float) -> None:
-        await self._clock.sleep(duration_s)
-        self.catch_up()
-
-    def step(self, duration_s: float) -> None:
-        self._clock.step(duration_s)
-        self.catch_up()
-
-    def catch_up(self) -> None:
-        passed = int(self._clock.monotonic_s() + 1e-6)
-        self._device.produce(passed - self._done)
-        self._done = passed
-
-
-@pytest.fixture
-def plant(stepped_clock) -> Callable:
-    """A device that lives on a stepped clock, and a source that polls it once a second."""
-
-    @asynccontextmanager
-    async def build(
-        registers: RegisterMap | None = None, read_as: RegisterMap | None = None, **settings
-    ) -> AsyncIterator[tuple[PolledSource, MapDevice, ModbusTcpServer, Follower]]:
-        registers = registers or map_of()
-        device = device_of(registers)
-        clock = Follower(stepped_clock, device)
-        async with ModbusTcpServer(device) as server:
-            transport = TcpTransport(host="127.0.0.1", port=server.port)
-            source = PolledSource(
-                PolledSettings(transport=transport, **({"timeout_s": 5.0} | settings)),
-                read_as or registers,
-                ("wave",),
-                CALIBRATION,
-                clock,
-            )
-            yield source, device, server, clock
-
-    return build
-
-
-async def take(source: PolledSource, n: int) -> list[SampleBlock]:
-    async with source.connect() as stream:
-        return [await anext(stream) for _ in range(n)]
+from core.quality import GOOD
 
 
 async def test_each_poll_is_a_sample_with_its_slow_values(plant) -> None:
@@ -166,55 +56,6 @@ async def test_the_index_goes_on_across_connections(plant, cut: bool) -> None:
     assert (before.first_index, after.first_index) == (0, 10)
     assert after.epoch == before.epoch
     assert float(after.samples[0, 0]) == 110.0
-
-
-async def test_what_the_device_flags_is_never_good(plant) -> None:
-    async with plant() as (source, device, *_), source.connect() as stream:
-        await anext(stream)
-        device.spoil("flag", 1)
-        flagged = await anext(stream)
-        again = await anext(stream)
-
-    assert flagged.channel_quality[0].level is Level.BAD
-    assert flagged.channel_quality[0].reason is Reason.SENSOR_FAILURE
-    assert flagged.slow["oil"].value is None
-    assert again.channel_quality == (GOOD,)
-
-
-async def test_a_number_that_means_an_error_is_no_value(plant) -> None:
-    async with plant() as (source, device, *_), source.connect() as stream:
-        await anext(stream)
-        device.spoil("sentinel", 1)
-        spoilt = await anext(stream)
-
-    assert spoilt.channel_quality[0].reason is Reason.NOT_FINITE
-    assert spoilt.slow["oil"].value is None
-    assert spoilt.slow["oil"].quality.reason is Reason.NOT_MEASURED
-
-
-async def test_a_clipped_reading_is_called_clipped(plant) -> None:
-    wave = MapValue(
-        id="wave",
-        cell=Cell(address=10),
-        full_scale=FullScale(minimum=-50.0, maximum=102.0),
-    )
-    async with plant(RegisterMap(values=(wave,))) as (source, *_):
-        blocks = await take(source, 4)
-
-    assert [b.channel_quality[0].reason for b in blocks] == [
-        Reason.OK,
-        Reason.OK,
-        Reason.CLIPPED,
-        Reason.CLIPPED,
-    ]
-
-
-async def test_a_slow_channel_that_the_map_lacks_is_not_measured(plant) -> None:
-    only_wave = RegisterMap(values=map_of().values[:1])
-    async with plant(only_wave) as (source, *_):
-        [block] = await take(source, 1)
-
-    assert block.slow["oil"].quality.reason is Reason.NOT_MEASURED
 
 
 async def test_a_device_whose_heartbeat_stands_still_is_not_connected(plant) -> None:
