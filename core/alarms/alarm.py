@@ -63,6 +63,7 @@ class AlarmKind(StrEnum):
     BLOCKS_WAITING = "blocks_waiting"
     ANALYSIS_LATE = "analysis_late"
     CAPTURES_NOT_KEPT = "captures_not_kept"
+    DISK_NEARLY_FULL = "disk_nearly_full"
 
 
 PLANT = "plant"

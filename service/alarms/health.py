@@ -4,10 +4,21 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from core.account import SampleAccount
+from core.alarms.alarm import WITHIN, AlarmLevel, Condition
 from service.bus import Bus
 from service.capture.captures import Captures
 from service.live import LiveView
 from service.recorder import Recorder
+from service.space.watch import SpaceWatch
+
+DiskJudge = Callable[[AlarmLevel | None], Condition]
+"""What is to be said of the fullest disk, by the level that it had before."""
+
+
+def enough_room(held: AlarmLevel | None) -> Condition:
+    """Say so where nobody looks at the disks."""
+    del held
+    return WITHIN
 
 
 @dataclass(frozen=True)
@@ -30,6 +41,8 @@ class ServiceHealth:
         Why samples around alarms are not kept; None if they are.
     accounts
         Where samples went, by unit.
+    disk
+        Judges how full the disks are.
     """
 
     store_error: str | None = None
@@ -39,13 +52,19 @@ class ServiceHealth:
     analysis_delay_s: float = 0.0
     captures_error: str | None = None
     accounts: Mapping[str, SampleAccount] = field(default_factory=dict)
+    disk: DiskJudge = enough_room
 
 
 LookAtHealth = Callable[[], ServiceHealth]
 
 
 def health_of(
-    units: Iterable[str], live: LiveView, recorder: Recorder, captures: Captures, bus: Bus
+    units: Iterable[str],
+    live: LiveView,
+    recorder: Recorder,
+    captures: Captures,
+    bus: Bus,
+    space: SpaceWatch | None = None,
 ) -> LookAtHealth:
     """A look at the parts of the running service."""
     names = list(units)
@@ -59,6 +78,7 @@ def health_of(
             analysis_delay_s=bus.oldest_wait_s,
             captures_error=captures.trouble,
             accounts={unit: live.status(unit).account for unit in names},
+            disk=enough_room if space is None else space.condition,
         )
 
     return look

@@ -109,6 +109,7 @@ class ServiceAlarms:
         ):
             self._find(kind, self._compared(kind, value), now_ns)
         self._find(AlarmKind.CAPTURES_NOT_KEPT, _captures(health), now_ns)
+        self._find(AlarmKind.DISK_NEARLY_FULL, self._disk(health), now_ns)
         for unit, account in health.accounts.items():
             share = self._losses[unit].share(account, now_ns)
             self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)
@@ -118,6 +119,10 @@ class ServiceAlarms:
         if found.level is None:
             return found
         return replace(found, reason=health.store_error or "the store does not answer")
+
+    def _disk(self, health: ServiceHealth) -> Condition:
+        watch = self._watches[AlarmKind.DISK_NEARLY_FULL]
+        return health.disk(self._board.alarm(watch.id).condition.level)
 
     def _lost(self, health: ServiceHealth) -> Condition:
         n_more = health.n_unstored - self._n_unstored

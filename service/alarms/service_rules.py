@@ -10,7 +10,7 @@ from core.alarms.state_limits import StateLimits
 from core.alarms.watch import LimitWatch, Watch
 from service.settings.alarms import AlarmSettings
 
-STORE, SERVICE, CAPTURES = "store", "service", "captures"
+STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
 """Subjects of alarms about the service; lost samples have their unit's name."""
 
 FULL_SHARE = 0.9
@@ -63,6 +63,7 @@ def service_watches(units: Iterable[str], rules: ServiceRules) -> dict[str, Watc
         _limit(SERVICE, AlarmKind.BLOCKS_WAITING, steady, rules.waiting),
         _limit(SERVICE, AlarmKind.ANALYSIS_LATE, steady, rules.delay),
         Watch(_identity(CAPTURES, AlarmKind.CAPTURES_NOT_KEPT), soon, CAPTURES),
+        Watch(_identity(DISK, AlarmKind.DISK_NEARLY_FULL), steady, DISK),
     ]
     found = {watch.identity.kind.value: watch for watch in watches}
     lost = {unit: _limit(unit, AlarmKind.SAMPLES_LOST, soon, rules.loss) for unit in units}

@@ -49,6 +49,7 @@ AlarmKindName = Literal[
     "blocks_waiting",
     "analysis_late",
     "captures_not_kept",
+    "disk_nearly_full",
 ]
 
 AlarmChangeName = Literal[

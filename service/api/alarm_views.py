@@ -58,6 +58,7 @@ VALUE_UNITS = {
     AlarmKind.RESULTS_LOST: "findings",
     AlarmKind.BLOCKS_WAITING: "1",
     AlarmKind.ANALYSIS_LATE: "s",
+    AlarmKind.DISK_NEARLY_FULL: "1",
 }
 
 LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {

@@ -23,6 +23,7 @@ from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.settings.bearings import BearingSettings
 from service.settings.units import UnitSettings
+from service.space.watch import SpaceWatch
 from service.store.port import Store
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
@@ -48,6 +49,8 @@ class Context:
         What is wrong with each loop of the program; None where nothing is.
     access
         Tells who asks; None for one that asks nobody on this computer.
+    space
+        Knows how full the disks are; None where nobody looks.
     refusals
         Takes refused requests; None for a taker of the application's own.
     sources
@@ -74,6 +77,7 @@ class Context:
     refusals: Refusals | None = None
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     access: AccessDesk | None = None
+    space: SpaceWatch | None = None
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -28,6 +28,8 @@ def health_router(context: Context) -> APIRouter:
         """
         checks = {f"unit {unit}": context.live.status(unit).state.value for unit in context.units}
         checks["store"] = context.live.store_error or "ok"
+        if context.space is not None:
+            checks["disk"] = str(context.space)
         loops = context.loops()
         checks |= {f"loop {name}": trouble or "alive" for name, trouble in loops.items()}
         ready = context.live.store_error is None and not any(loops.values())

@@ -18,6 +18,7 @@ WITHOUT_SAMPLES = (
     AlarmKind.BLOCKS_WAITING,
     AlarmKind.ANALYSIS_LATE,
     AlarmKind.CAPTURES_NOT_KEPT,
+    AlarmKind.DISK_NEARLY_FULL,
 )
 """Kinds of alarms that no sample can explain."""
 

@@ -58,5 +58,24 @@ def evidence_metrics(watched: Watched) -> Iterator[Metric]:
     yield _one("evidence_pending", "Bundles that are still to be written.", evidence.n_pending)
 
 
+def space_metrics(watched: Watched) -> Iterator[Metric]:
+    """Room on the disks; that of a disk which nobody has looked at yet is left out."""
+    disks = watched.space.disks if watched.space else ()
+    fills = [((disk.folder,), disk.days_until_full) for disk in disks]
+    rows = (
+        ("disk_free_bytes", "Room left on a disk.", [d.space.free_bytes for d in disks]),
+        ("disk_size_bytes", "Room on it altogether.", [d.space.total_bytes for d in disks]),
+    )
+    for name, meaning, numbers in rows:
+        by_folder = zip([(disk.folder,) for disk in disks], numbers, strict=True)
+        yield gauge(name, meaning, ("folder",), by_folder)
+    yield gauge(
+        "disk_days_until_full",
+        "When it will be full at the pace of the last day.",
+        ("folder",),
+        [(folder, days) for folder, days in fills if days is not None],
+    )
+
+
 def _one(name: str, meaning: str, number: float) -> Metric:
     return gauge(name, meaning, (), [((), number)])

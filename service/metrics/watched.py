@@ -14,6 +14,7 @@ from service.live import LiveView
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.recorder import Recorder
+from service.space.watch import SpaceWatch
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class Watched:
         Of every unit.
     sources
         Where samples come from, by unit; of those that are timed.
+    space
+        Knows how full the disks are; None where nobody looks.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -40,3 +43,4 @@ class Watched:
     timings: Timings
     clock: Clock
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
+    space: SpaceWatch | None = None

@@ -15,6 +15,7 @@ from service.settings.evidence import EvidenceSettings
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.http_limits import HostName, HttpLimitSettings
 from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.space import SpaceSettings
 from service.settings.spectra import SpectraSettings
 from service.settings.units import UnitSettings
 
@@ -201,6 +202,9 @@ class PlantFile(Settings):
 
     spectra: SpectraSettings = SpectraSettings()
     """Spectra that are kept over time."""
+
+    space: SpaceSettings = SpaceSettings()
+    """How little room on the disk is an alarm."""
 
     delivery: DeliverySettings = DeliverySettings()
     """Receivers of messages about alarms, besides the dashboard."""

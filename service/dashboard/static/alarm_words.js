@@ -39,6 +39,7 @@ const KINDS = {
   blocks_waiting: "Queue to the analysis fills",
   analysis_late: "Analysis falls behind",
   captures_not_kept: "Samples around alarms not kept",
+  disk_nearly_full: "Disk nearly full",
 };
 
 const STATES = {

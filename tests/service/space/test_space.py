@@ -1,0 +1,145 @@
+"""How full the disks are: what is measured, when it is an alarm, and for how long it will do."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from acquisition.clock import Clock
+from core.alarms.alarm import AlarmLevel
+from service.settings.space import SpaceSettings
+from service.space.disk import DiskSpace, measure_disk
+from service.space.growth import Growth
+from service.space.limits import SpaceLimits
+from service.space.watch import SpaceWatch
+from service.wiring.space import space_limits
+
+GB = 10**9
+HOUR_S = 3600.0
+ALERT, DANGER = AlarmLevel
+
+
+class Disks:
+    """Two disks, as full as a test says."""
+
+    def __init__(self) -> None:
+        self.free = {"data": 500 * GB, "captures": 50 * GB}
+        self.total = {"data": 1000 * GB, "captures": 100 * GB}
+        self.trouble: OSError | None = None
+
+    def measure(self, folder: Path) -> DiskSpace:
+        if self.trouble is not None:
+            raise self.trouble
+        name = folder.name if folder.name in self.free else "data"
+        return DiskSpace(hash(name), self.total[name], self.free[name])
+
+
+@pytest.fixture
+def disks() -> Disks:
+    return Disks()
+
+
+@pytest.fixture
+def watch(disks: Disks, stepped_clock: Clock) -> SpaceWatch:
+    folders = [Path("data"), Path("captures"), Path("evidence")]
+    return SpaceWatch(folders, SpaceLimits(), stepped_clock, disks.measure)
+
+
+def test_what_a_real_file_system_says_is_taken(tmp_path: Path) -> None:
+    there, yet_to_be_made = measure_disk(tmp_path), measure_disk(tmp_path / "a" / "b")
+
+    assert 0 < there.free_bytes <= there.total_bytes
+    assert there.device == yet_to_be_made.device == tmp_path.stat().st_dev
+
+
+async def test_a_disk_with_room_is_no_alarm_and_each_disk_is_named_once(watch: SpaceWatch) -> None:
+    await watch.look()
+
+    assert watch.condition(None).level is None
+    assert [disk.folder for disk in watch.disks] == ["data", "captures"]
+    assert str(watch) == "data: 500 of 1e+03 GB free; captures: 50 of 100 GB free"
+
+
+@pytest.mark.parametrize(
+    ("free_gb", "level"),
+    [(11.0, None), (9.9, ALERT), (5.1, ALERT), (4.9, DANGER), (0.0, DANGER)],
+)
+async def test_the_fullest_disk_rules(
+    watch: SpaceWatch, disks: Disks, free_gb: float, level: AlarmLevel | None
+) -> None:
+    disks.free["captures"] = round(free_gb * GB)
+    await watch.look()
+
+    found = watch.condition(None)
+
+    assert found.level is level
+    assert found.value == pytest.approx(free_gb / 100.0)
+    assert level is None or f"{free_gb:.3g} of 100 GB free" in found.reason
+
+
+async def test_a_level_is_left_only_when_there_is_clearly_more_room(
+    watch: SpaceWatch, disks: Disks
+) -> None:
+    disks.free["captures"] = round(5.5 * GB)
+    await watch.look()
+    assert watch.condition(DANGER).level is DANGER
+    disks.free["captures"] = round(6.1 * GB)
+    await watch.look()
+    assert watch.condition(DANGER).level is ALERT
+
+
+async def test_a_disk_that_cannot_be_asked_is_not_taken_for_one_with_room(
+    watch: SpaceWatch, disks: Disks
+) -> None:
+    await watch.look()
+    disks.trouble = OSError(5, "Input/output error")
+    await watch.look()
+
+    found = watch.condition(ALERT)
+
+    assert not found.is_known
+    assert "Input/output error" in found.reason
+    assert "Input/output error" in str(watch)
+
+
+@given(st.integers(1, 10**16))
+def test_limits_fit_every_disk(total_bytes: int) -> None:
+    limits = SpaceLimits().of(total_bytes)
+
+    assert limits.passed(1.0, None) is None
+    assert limits.passed(0.5, AlarmLevel.DANGER) is None
+    assert limits.passed(0.0, None) is DANGER
+
+
+def test_gigabytes_rule_where_a_share_of_the_disk_is_too_little() -> None:
+    limits = SpaceLimits().of(10 * GB)
+    assert limits.passed(0.15, None) is ALERT
+    assert limits.passed(0.09, None) is DANGER
+
+
+def test_it_is_told_when_the_disk_will_be_full() -> None:
+    growth, free = Growth(), 100 * GB
+    for hour in range(49):
+        space = DiskSpace(1, 1000 * GB, free - hour * GB)
+        growth.note(space, hour * HOUR_S)
+    assert growth.days_until_full(space, 48 * HOUR_S) == pytest.approx(52.0 / 24.0)
+
+
+def test_nothing_is_foretold_from_minutes_or_of_what_does_not_grow() -> None:
+    growth = Growth()
+    growth.note(DiskSpace(1, 100 * GB, 50 * GB), 0.0)
+    assert growth.days_until_full(DiskSpace(1, 100 * GB, 40 * GB), 1800.0) is None
+    assert growth.days_until_full(DiskSpace(1, 100 * GB, 60 * GB), 90_000.0) is None
+
+
+@pytest.mark.parametrize("unit", ["share", "gb"])
+def test_a_danger_that_comes_before_its_alert_is_refused(unit: str) -> None:
+    asked = {f"danger_free_{unit}": 0.5, f"alert_free_{unit}": 0.4}
+    with pytest.raises(ValidationError, match=f"must be below alert_free_{unit}, 0.4"):
+        SpaceSettings.model_validate(asked)
+
+
+def test_settings_and_limits_have_the_same_defaults() -> None:
+    assert space_limits(SpaceSettings()) == SpaceLimits()
