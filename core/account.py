@@ -8,18 +8,24 @@ from core.blocks import Rejection
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples that the device counted but nobody delivered: per channel, exact.
+    """Samples that nobody delivered, per channel: exact where the device has counted them.
 
     Parameters
     ----------
     stop_ns
         Time of the first sample after the gap.
+    start_ns
+        Time of the first sample that is missing; None where it follows from the number.
+    is_estimated
+        Whether the device began to count anew, so that ``n_samples`` is worked out from the times.
     """
 
     epoch: int
     first_index: int
     n_samples: int
     stop_ns: int
+    start_ns: int | None = None
+    is_estimated: bool = False
 
 
 @dataclass(frozen=True)

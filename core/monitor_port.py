@@ -7,6 +7,7 @@ from core.account import Gap, SampleAccount
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
+from core.outage import Reach
 
 
 class Monitor(Protocol):
@@ -31,6 +32,10 @@ class Monitor(Protocol):
         ValueError
             If more than references, clearances and brackets differ.
         """
+        ...
+
+    def go_on(self, reach: Reach | None) -> None:
+        """Go on after a stop, before the first block: what is missing since then is a gap."""
         ...
 
     def drain_gaps(self) -> list[Gap]:

@@ -8,6 +8,7 @@ from core.adoption import bearings_with_new_references, require_same_machine
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
+from core.outage import Reach, outage, restart
 from core.probe_axes import Growth
 from core.ring import Ring
 
@@ -26,6 +27,7 @@ class MonitoredUnit(ABC):
         self._ring = ring
         self._gaps: list[Gap] = []
         self._growth: dict[str, Growth] = {}
+        self._reach: Reach | None = None
 
     @property
     def account(self) -> SampleAccount:
@@ -50,6 +52,10 @@ class MonitoredUnit(ABC):
         for bearing in bearings_with_new_references(self.unit, unit):
             self._growth.pop(bearing, None)  # it counts from a reference
         self.unit = unit
+
+    def go_on(self, reach: Reach | None) -> None:
+        """Go on after a stop, before the first block: what is missing since then is a gap."""
+        self._reach = reach
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
         """Take a block in and return all that has been learnt by it; as `steps`."""
@@ -89,6 +95,12 @@ class MonitoredUnit(ABC):
             raise ValueError(f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
 
     def _write_to_ring(self, block: SampleBlock) -> None:
+        epoch = self._ring.epoch
         gap = self._ring.write(block)
-        if gap is not None:
-            self._gaps.append(gap)
+        if epoch is None:
+            self._gaps += outage(self._reach, block) if self._reach else []
+        elif epoch != block.epoch and self._reach is not None:
+            lost = restart(self._reach, block)
+            self._gaps += [lost] if lost else []
+        self._gaps += [gap] if gap else []
+        self._reach = Reach(block.epoch, self._ring.stop_index, block.stop_ns)
