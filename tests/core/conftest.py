@@ -4,8 +4,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from rigs.shaken_shaft import (
+    shaken,
+)
 
-from core.arrays import FloatArray
+from core.arrays import ComplexArray, FloatArray
 from core.blocks import SampleBlock
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.quality import GOOD, Reading, Reason, missing
@@ -54,3 +57,9 @@ def blocks() -> BlockMaker:
             )
 
     return cut
+
+
+@pytest.fixture
+def recording() -> Callable[..., ComplexArray]:
+    """Phasors (n_segments, 4, n_lines) of a shaft that is shaken and a bracket that answers."""
+    return shaken

@@ -1,66 +1,22 @@
 """A file that is damaged, or means harm, ends in one sentence and in bounded memory."""
 
-import json
 import pickle
 import random
 import struct
-import subprocess
-import sys
 import zipfile
-import zlib
-from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import asammdf
 import can
-import h5py
 import nptdms
 import numpy as np
 import pytest
+from rigs.hostile_files import Placed, Read, measured, refusal, write_hdf5
 
 from acquisition.errors import ConfigError
 from acquisition.importing.job import ImportJob, Place, TimeAxis
-
-Read = Callable[[Path, ImportJob], Any]
-Placed = Callable[..., ImportJob]
-
-READ = """
-import json, resource, sys
-from pathlib import Path
-from pydantic import TypeAdapter
-from acquisition.errors import ConfigError
-from acquisition.importing.job import ImportJob
-from acquisition.importing.reading import reading
-
-try:
-    with reading(Path(sys.argv[1]), TypeAdapter(ImportJob).validate_json(sys.argv[2])) as found:
-        said = str(sum(block.n_samples for block in found.blocks()))
-except ConfigError as error:
-    said = str(error)
-status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
-own = int(status["VmHWM"].split()[0]) // 1024
-child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024
-print(json.dumps([own, child, said]))
-"""
-
-
-def measured(path: Path, job: ImportJob) -> tuple[int, int, str]:
-    """Peaks of the importing and of the reading process in MB, and what was said."""
-    command = [sys.executable, "-c", READ, str(path), json.dumps(asdict(job))]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
-    own_mb, child_mb, said = json.loads(result.stdout)
-    return own_mb, child_mb, said
-
-
-def refusal(read: Read, path: Path, job: ImportJob) -> str:
-    with pytest.raises(ConfigError) as error:
-        read(path, job)
-    assert str(error.value).startswith(f"{path}: ")
-    assert "\n" not in str(error.value)
-    assert len(str(error.value)) < 1500
-    return str(error.value)
 
 
 @pytest.fixture
@@ -99,83 +55,6 @@ def test_wrong_text_is_refused_naming_the_line(
 def test_a_file_that_is_none_is_refused(tmp_path: Path, read: Read, csv_job: ImportJob) -> None:
     assert "No such file" in refusal(read, tmp_path / "absent", csv_job)
     assert "not a regular file" in refusal(read, tmp_path, csv_job)
-
-
-@pytest.fixture
-def hdf5_job(job: ImportJob) -> ImportJob:
-    return replace(job, format="hdf5", slow=())
-
-
-def write_hdf5(path: Path, **datasets: Any) -> None:
-    with h5py.File(path, "w") as file:
-        for name in ("time", "shaft x", "shaft y"):
-            file[name] = datasets.get(name.replace(" ", "_"), np.arange(100) / 600.0)
-
-
-def test_hdf5_links_to_elsewhere_are_not_followed(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob
-) -> None:
-    write_hdf5(tmp_path / "other")
-    write_hdf5(tmp_path / "external", shaft_x=h5py.ExternalLink("other", "/shaft x"))
-    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "external", hdf5_job)
-    write_hdf5(tmp_path / "soft", shaft_x=h5py.SoftLink("/shaft y"))
-    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "soft", hdf5_job)
-
-
-def test_hdf5_values_in_other_files_are_not_read(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob
-) -> None:
-    secret = tmp_path / "secret"
-    secret.write_bytes(bytes(800))
-    with h5py.File(tmp_path / "external", "w") as file:
-        file["time"] = file["shaft y"] = np.arange(100) / 600.0
-        file.create_dataset("shaft x", (100,), "f8", external=[(str(secret), 0, 800)])
-    says = "dataset 'shaft x' has its values in another file"
-    assert says in refusal(read, tmp_path / "external", hdf5_job)
-    write_hdf5(tmp_path / "other")
-    layout = h5py.VirtualLayout((100,), "f8")
-    layout[:] = h5py.VirtualSource(str(tmp_path / "other"), "shaft x", (100,))
-    with h5py.File(tmp_path / "virtual", "w") as file:
-        file["time"] = file["shaft y"] = np.arange(100) / 600.0
-        file.create_virtual_dataset("shaft x", layout)
-    assert says in refusal(read, tmp_path / "virtual", hdf5_job)
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        (np.zeros((100, 2)), "has shape (100, 2) of float64"),
-        (np.array([b"a"] * 100), "has shape (100,) of |S1"),
-        (np.zeros(100, np.complex128), "has shape (100,) of complex128"),
-        (np.zeros(0), "0 samples, column"),
-    ],
-    ids=["matrix", "text", "complex", "empty"],
-)
-def test_hdf5_values_that_are_no_numbers_in_a_row_are_refused(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob, values: np.ndarray, words: str
-) -> None:
-    write_hdf5(tmp_path / "run", shaft_y=values)
-    assert words in refusal(read, tmp_path / "run", hdf5_job)
-
-
-def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(
-    tmp_path: Path, hdf5_job: ImportJob
-) -> None:
-    with h5py.File(tmp_path / "declared", "w") as file:
-        for name in ("time", "shaft x", "shaft y"):
-            file.create_dataset(name, (2**50,), "f4", chunks=(1024,))
-    own_mb, child_mb, said = measured(tmp_path / "declared", hdf5_job)
-    assert "1125899906842624 samples per channel; 1 to 536870912 can be read" in said
-    assert max(own_mb, child_mb) < 200
-    with h5py.File(tmp_path / "packed", "w") as file:
-        for name in ("time", "shaft x", "shaft y"):
-            n_rows = 2**29 - 1
-            made = file.create_dataset(name, (n_rows,), "f4", chunks=(n_rows,), compression="gzip")
-            packed = zlib.compress(bytes(2**20), 1)
-            made.id.write_direct_chunk((0,), packed)
-    own_mb, child_mb, said = measured(tmp_path / "packed", hdf5_job)
-    assert "'shaft x' has chunks of 2147483644 bytes; up to 67108864 can be read" in said
-    assert max(own_mb, child_mb) < 200
 
 
 @pytest.mark.slow

@@ -1,0 +1,62 @@
+"""What importing a file that means harm costs, and what is said of it."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from acquisition.errors import ConfigError
+from acquisition.importing.job import ImportJob
+
+Read = Callable[[Path, ImportJob], Any]
+Placed = Callable[..., ImportJob]
+
+
+READ = """
+import json, resource, sys
+from pathlib import Path
+from pydantic import TypeAdapter
+from acquisition.errors import ConfigError
+from acquisition.importing.job import ImportJob
+from acquisition.importing.reading import reading
+
+try:
+    with reading(Path(sys.argv[1]), TypeAdapter(ImportJob).validate_json(sys.argv[2])) as found:
+        said = str(sum(block.n_samples for block in found.blocks()))
+except ConfigError as error:
+    said = str(error)
+status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+own = int(status["VmHWM"].split()[0]) // 1024
+child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024
+print(json.dumps([own, child, said]))
+"""
+
+
+def measured(path: Path, job: ImportJob) -> tuple[int, int, str]:
+    """Peaks of the importing and of the reading process in MB, and what was said."""
+    command = [sys.executable, "-c", READ, str(path), json.dumps(asdict(job))]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
+    own_mb, child_mb, said = json.loads(result.stdout)
+    return own_mb, child_mb, said
+
+
+def refusal(read: Read, path: Path, job: ImportJob) -> str:
+    with pytest.raises(ConfigError) as error:
+        read(path, job)
+    assert str(error.value).startswith(f"{path}: ")
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 1500
+    return str(error.value)
+
+
+def write_hdf5(path: Path, **datasets: Any) -> None:
+    with h5py.File(path, "w") as file:
+        for name in ("time", "shaft x", "shaft y"):
+            file[name] = datasets.get(name.replace(" ", "_"), np.arange(100) / 600.0)

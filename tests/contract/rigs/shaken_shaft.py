@@ -1,0 +1,55 @@
+"""Phasors of a shaft that is shaken and a bracket that answers through a film."""
+
+import numpy as np
+
+from core.arrays import ComplexArray
+from core.bracket import BracketDynamics
+from core.cross_spectrum import CrossSpectrum, average
+from core.dynamic import DynamicStiffness, dynamic_stiffness
+from core.dynamic_settings import DynamicSettings
+
+FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)
+TURN_HZ = (92.3 / 60.0, 92.3 / 60.0)
+BRACKET = BracketDynamics(1.18e9, 0.45e5)
+STIFFNESS = np.array([[1.2e9, -0.33e9], [-0.25e9, 0.7e9]])
+DAMPING = np.array([[1.5e7, 2.0e6], [-1.0e6, 0.9e7]])
+# These phasors are displacement from the start: nothing is integrated.
+NOISE_FREE = DynamicSettings(probe_noise_um2_per_hz=(0.0, 0.0), n_integrations=0)
+BIN_HZ = float(FREQUENCY_HZ[0])
+
+
+def hann_noise(rng: np.random.Generator, n_segments: int, n_channels: int) -> ComplexArray:
+    """White noise of unit power with the neighbours' correlation that Hann's taper gives."""
+    shape = (n_segments, n_channels, FREQUENCY_HZ.size + 2)
+    white = rng.normal(size=shape) + 1j * rng.normal(size=shape)
+    return (white[..., 1:-1] - 0.5 * (white[..., :-2] + white[..., 2:])) / np.sqrt(3.0)
+
+
+def shaken(
+    seed: int = 1,
+    n_segments: int = 24,
+    probe_um: float = 0.0,
+    bearing_um: float = 0.0,
+    motion_um: float = 1.0,
+) -> ComplexArray:
+    """Phasors (n_segments, 4, n_lines) of a shaft that is shaken and a bracket that answers."""
+    rng = np.random.default_rng(seed)
+    omega = 2.0 * np.pi * FREQUENCY_HZ
+    film = STIFFNESS[..., np.newaxis] + 1j * omega * DAMPING[..., np.newaxis]
+    rolling_off = 1.0 / (1.0 + (FREQUENCY_HZ / 6.0) ** 4)
+    shaft = motion_um * rolling_off * hann_noise(rng, n_segments, 2)
+    bearing = np.einsum("ijl,sjl->sil", film, shaft)
+    bearing /= BRACKET.dynamic_stiffness_n_per_m(FREQUENCY_HZ)
+    shaft = shaft + probe_um * hann_noise(rng, n_segments, 2)
+    bearing = bearing + bearing_um * hann_noise(rng, n_segments, 2)
+    return np.concatenate([shaft, bearing], axis=1)
+
+
+def averaged(phasors: ComplexArray) -> CrossSpectrum:
+    return average(FREQUENCY_HZ, phasors, np.ones(phasors.shape[:2], dtype=bool))
+
+
+def found(phasors: ComplexArray, settings: DynamicSettings = NOISE_FREE) -> DynamicStiffness:
+    result = dynamic_stiffness(averaged(phasors), BRACKET, TURN_HZ, settings)
+    assert isinstance(result, DynamicStiffness)
+    return result
