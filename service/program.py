@@ -1,57 +1,31 @@
-"""The running service from start to end: store, runner, HTTP server, orderly stop."""
+"""The running service from start to end: all roles in one process, and an orderly stop."""
 
 import asyncio
-import gc
 import signal
 import socket
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 from acquisition.clock import Clock
-from service.alarms.health import health_of
-from service.alarms.start import alarm_engine
-from service.api.access.desk import AccessDesk
-from service.api.app import create_app
-from service.api.context import Context
 from service.bus import Bus
-from service.conversion import analysis_of
-from service.delivery.deliveries import Deliveries
 from service.delivery.facts import Around
-from service.films.keeper import FilmKeeper
-from service.films.start import film_keeper
 from service.heartbeats import Heartbeats
-from service.http.listening import url_of
-from service.http.server import GuardedServer
 from service.instance import only_one
-from service.live import LiveView
 from service.metrics.timed import timed, timed_sources
 from service.metrics.timings import Timings
-from service.metrics.watched import Watched
 from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
-from service.recorder import Recorder
-from service.references import ReferencesInForce
-from service.rolling import Rolling
-from service.runner import BUS_CAPACITY, Runner, WatchedUnit
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.roles.analysis import Analysis, analysis_on
+from service.roles.ground import Ground, live_view
+from service.roles.serving import Serving, context_of, server_for
+from service.roles.watched_unit import WatchedUnit
+from service.runner import BUS_CAPACITY, Runner
 from service.settings.plant import PlantFile
-from service.store.port import Store
 from service.supervision import Supervision
 from service.wiring.access import access_desk
 from service.wiring.audit import ServiceTrail
-from service.wiring.captures import captures_of
-from service.wiring.delivery import receivers_of, router_of
-from service.wiring.evidence import evidence_desk, evidence_of, watch
-from service.wiring.http import server_of
-from service.wiring.sources import vector_rows
+from service.wiring.delivery import router_of
 from service.wiring.stores import database_path, open_store
-
-GC_THRESHOLDS = (20_000, 20, 20)
-"""Seldom enough to cost nothing; what a request or a block leaves is mostly no cycle."""
-
-STALE_HOPS = 2.5
-"""A result older than this many refreshes is no longer current."""
 
 
 @dataclass(frozen=True)
@@ -101,163 +75,85 @@ async def run_service(
         If others could reach the service, and it is not fit for that.
     """
     plant, origin = performance.plant, performance.origin
-    live = LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * _refresh_s(plant))
+    live = live_view(plant, clock)
     around = Around(live)
     with only_one(database_path(plant)):
         store = open_store(plant, origin, router_of(plant, origin, around, clock))
+        beats, timings = Heartbeats(clock), Timings(performance.units, clock)
+        ground = Ground(plant, origin, clock, store, live, beats, timings)
         try:
-            await _run(performance, listener, clock, live, around, store, announce, manager)
+            await _run(performance, ground, around, listener, announce, manager)
         finally:
             store.close()
 
 
 async def _run(
     performance: Performance,
-    listener: socket.socket,
-    clock: Clock,
-    live: LiveView,
+    ground: Ground,
     around: Around,
-    store: Store,
+    listener: socket.socket,
     announce: Callable[[str], None],
     manager: ServiceManager,
 ) -> None:
-    plant, units = performance.plant, performance.units
-    desk = access_desk(plant, store.access, clock)
-    receivers = receivers_of(plant, performance.origin, clock)
-    deliveries = Deliveries(receivers, store.outbox, clock)
-    timings = Timings(units, clock)
-    recorder = Recorder(store, live, clock, told=deliveries.wake, timed=timings.commits.timed)
-    monitors = {unit: watched.monitor for unit, watched in units.items()}
-    units = timed(units, timings)
-    captures = captures_of(plant, performance.origin, clock)
+    plant, clock = ground.plant, ground.clock
+    desk = access_desk(plant, ground.store.access, clock)
+    units = timed(performance.units, ground.timings)
     bus = Bus(BUS_CAPACITY, clock)
-    look = health_of(units, live, recorder, captures, bus)
-    alarms = await alarm_engine(
-        plant, performance.origin, store, recorder.put, clock, captures, vector_rows(plant), look
-    )
-    machines = {unit: monitor.unit for unit, monitor in monitors.items()}
-    films = await film_keeper(plant, machines, store.films, clock)
-    around.watch_films(films.newest)
-    evidence = evidence_of(plant, performance.origin, live, films, store, captures, clock)
-    watch(evidence, alarms, captures, performance.origin)
-    beats = Heartbeats(clock)
-    supervision = Supervision(manager, beats, live, units, clock)
-    runner = Runner(units, live, recorder, clock, alarms, films, bus, beats)
-    references = ReferencesInForce(monitors, store, clock)
-    await references.look()  # before the first result
-    rolling = Rolling(store.rollups, clock)
-    audit = ServiceTrail(plant, performance.origin, store.audit, clock)
+    monitors = {unit: watched.monitor for unit, watched in units.items()}
+    analysis = await analysis_on(ground, monitors, bus, around)
+    runner = _runner(units, analysis, bus)
+    audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
     await audit.begin()
-    context = Context(
-        plant_name=plant.plant.name,
-        units={unit.id: unit for unit in plant.unit},
-        live=live,
-        store=store,
-        clock=clock,
-        refresh_s=_refresh_s(plant),
-        references=references,
-        alarms=alarms,
-        films=films,
-        recorder=recorder,
-        captures=captures,
-        deliveries=deliveries,
-        evidence=evidence_desk(plant, store, evidence, clock),
-        metrics=Watched(
-            bearings={unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit},
-            live=live,
-            bus=bus,
-            recorder=recorder,
-            alarms=alarms,
-            films=films,
-            captures=captures,
-            evidence=evidence,
-            deliveries=deliveries,
-            timings=timings,
-            clock=clock,
-            sources=timed_sources(units),
-        ),
-        origin=performance.origin,
-        max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
-        sources=timed_sources(units),
-        loops=beats.look,
-        refusals=audit.refusals,
-        access=desk,
-    )
-    app = create_app(context)
-    app.openapi()  # kept from now on: no client waits for it, nor samples for a client
-    server = server_of(app, plant, clock)
-    stopped = _stop_on_signals()
+    context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
+    serving = Serving(ground, server_for(context, ground), listener, desk, announce)
+    supervision = Supervision(manager, ground.beats, ground.live, units, clock)
     try:
-        async with asyncio.TaskGroup() as tasks:
-            running = tasks.create_task(runner.run(), name="run")
-            looking = tasks.create_task(beats.tend("references", references.run), name="references")
-            watching = tasks.create_task(beats.tend("alarms", alarms.run), name="alarms")
-            capturing = tasks.create_task(beats.tend("captures", captures.run), name="captures")
-            witnessing = tasks.create_task(beats.tend("evidence", evidence.run), name="evidence")
-            learning = tasks.create_task(_learn(films, performance.origin, beats), name="learn")
-            gathering = tasks.create_task(beats.tend("gather", rolling.run), name="gather")
-            delivering = tasks.create_task(deliveries.run(beats), name="deliver")
-            serving = tasks.create_task(
-                beats.tend("serve", partial(server.run_on, listener)), name="serve"
-            )
-            announcing = tasks.create_task(
-                _announce(server, listener, announce, supervision, desk), name="announce"
-            )
-            supervising = tasks.create_task(supervision.run(), name="supervise")
-            if performance.ends:
-                running.add_done_callback(lambda _: stopped.set())
-            await stopped.wait()
-            supervision.stopping()
-            server.should_exit = True
-            helping = (capturing, witnessing, learning, delivering, announcing, supervising)
-            for task in (running, looking, watching, gathering, *helping):
-                task.cancel()
-            await asyncio.wait([serving])
+        await _perform(runner, analysis, serving, supervision, ends=performance.ends)
     finally:
         desk.close()
-        await captures.close()
-        await recorder.flush()  # also when a bug ends the program
-        await evidence.close()
+        await analysis.close()
         await audit.end()
 
 
-async def _learn(films: FilmKeeper, origin: Origin, beats: Heartbeats) -> None:
-    """Learn baselines; what a replay shows is no history of a machine."""
-    if origin is Origin.LIVE:
-        await beats.tend("learn", films.run)
-
-
-def _refresh_s(plant: PlantFile) -> float:
-    """Seconds from one result to the next, of the slowest unit."""
-    hop_samples = analysis_of(plant.analysis).hop_samples
-    return max(
-        (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)
-        / unit.sampling_hz
-        for unit in plant.unit
+def _runner(units: Mapping[str, WatchedUnit], analysis: Analysis, bus: Bus) -> Runner:
+    ground = analysis.ground
+    return Runner(
+        units,
+        ground.live,
+        analysis.recorder,
+        ground.clock,
+        analysis.alarms,
+        analysis.films,
+        bus,
+        ground.beats,
     )
 
 
-def _stop_on_signals() -> asyncio.Event:
+async def _perform(
+    runner: Runner, analysis: Analysis, serving: Serving, supervision: Supervision, *, ends: bool
+) -> None:
+    """Run all parts until the service is stopped, or what it runs has come to its end."""
+    stopped = stop_on_signals()
+    async with asyncio.TaskGroup() as tasks:
+        running = tasks.create_task(runner.run(), name="run")
+        beside = analysis.start(tasks)
+        server = serving.start(tasks)
+        announcing = tasks.create_task(serving.tell(supervision), name="announce")
+        supervising = tasks.create_task(supervision.run(), name="supervise")
+        if ends:
+            running.add_done_callback(lambda _: stopped.set())
+        await stopped.wait()
+        supervision.stopping()
+        serving.stop()
+        for task in (running, *beside, announcing, supervising):
+            task.cancel()
+        await asyncio.wait([server])
+
+
+def stop_on_signals() -> asyncio.Event:
+    """An event that SIGINT and SIGTERM set."""
     stopped = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stopped.set)
     return stopped
-
-
-async def _announce(
-    server: GuardedServer,
-    listener: socket.socket,
-    announce: Callable[[str], None],
-    supervision: Supervision,
-    desk: AccessDesk,
-) -> None:
-    while not server.started:
-        await asyncio.sleep(0.01)
-    gc.collect()
-    gc.freeze()  # what is there from the start stays: looking through it again would take 0.1 s
-    gc.set_threshold(*GC_THRESHOLDS)
-    supervision.ready()
-    if token := await desk.offer_set_up():
-        announce(f"to make the first account, within one hour and once: {token}")
-    announce(url_of(listener, has_tls=server.config.is_ssl))

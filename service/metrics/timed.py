@@ -10,7 +10,7 @@ from core.machine import Unit
 from core.monitor_port import Monitor
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
-from service.runner import WatchedUnit
+from service.roles.watched_unit import WatchedUnit
 
 
 class TimedMonitor:

@@ -13,7 +13,7 @@ from core.monitor import UnitMonitor
 from core.monitor_port import Monitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.metrics.polls import TimedSource
-from service.runner import WatchedUnit
+from service.roles.watched_unit import WatchedUnit
 from service.settings import modbus_sources, sources
 from service.settings.can import CanSettings
 from service.settings.plant import AnalysisModel, PlantFile

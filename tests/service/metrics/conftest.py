@@ -24,7 +24,7 @@ from service.conversion import calibration_of
 from service.http.listening import listen
 from service.metrics.polls import TimedSource
 from service.program import Performance, run_service
-from service.runner import WatchedUnit
+from service.roles.watched_unit import WatchedUnit
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.wiring.simulations import simulated_feed

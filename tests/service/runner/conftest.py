@@ -25,7 +25,8 @@ from service.capture.span import CaptureSettings
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
 from service.recorder import Recorder
-from service.runner import Runner, WatchedUnit
+from service.roles.watched_unit import WatchedUnit
+from service.runner import Runner
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 

@@ -1,0 +1,1 @@
+"""What the program does, in roles: acquiring, analysing, serving; `padwatch run` is all of them."""

@@ -1,0 +1,57 @@
+"""`Analyser`: blocks in, findings out, to the recorder and to the live view."""
+
+import asyncio
+from collections.abc import Mapping
+
+from core.blocks import SampleBlock
+from core.monitor_port import Monitor
+from service.alarms.engine import AlarmEngine
+from service.films.keeper import FilmKeeper
+from service.live import LiveView
+from service.recorder import Findings, Recorder
+from service.roles.link_news import LinkNews
+from service.store.port import UnitGap
+
+TURNS = 3
+"""Of the event loop between two bearings: what a request takes from its arrival to its answer."""
+
+
+class Analyser:
+    """Analyses the blocks of all units, one block after the other."""
+
+    def __init__(
+        self,
+        monitors: Mapping[str, Monitor],
+        live: LiveView,
+        recorder: Recorder,
+        alarms: AlarmEngine,
+        films: FilmKeeper,
+    ) -> None:
+        self._monitors, self._live, self._recorder = monitors, live, recorder
+        self._alarms, self._films = alarms, films
+
+    async def take(self, block: SampleBlock) -> None:
+        """Take a block in, and hand over what it has taught."""
+        monitor = self._monitors[block.unit]
+        found = []
+        for assessment in monitor.steps(block):
+            found.append(assessment)
+            await _others()
+        assessments, films = self._films.take(block.unit, found)
+        gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
+        for assessment in assessments:
+            self._live.set_assessment(assessment)
+        self._live.set_received(block, monitor.account)
+        news = self._alarms.take(block, assessments, self._films.conditions(films))
+        if assessments or gaps or news:
+            self._recorder.put(Findings(assessments, gaps, news, films))
+
+    def hear(self, news: LinkNews) -> None:
+        """Let alarms know whether samples of a unit arrive."""
+        self._alarms.link(news.unit, news.is_connected, news.reason)
+
+
+async def _others() -> None:
+    """Let all others have their turns: a bearing takes milliseconds, and many may be waiting."""
+    for _ in range(TURNS):
+        await asyncio.sleep(0)

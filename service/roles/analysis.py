@@ -1,0 +1,112 @@
+"""`Analysis`: the parts that turn blocks into stored results, alarms, evidence and messages."""
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from core.monitor_port import Monitor
+from service.alarms.engine import AlarmEngine
+from service.alarms.health import health_of
+from service.alarms.start import alarm_engine
+from service.bus import Bus
+from service.capture.captures import Captures
+from service.delivery.deliveries import Deliveries
+from service.delivery.facts import Around
+from service.evidence.keeper import EvidenceKeeper
+from service.films.keeper import FilmKeeper
+from service.films.start import film_keeper
+from service.origin import Origin
+from service.recorder import Recorder
+from service.references import ReferencesInForce
+from service.roles.analysing import Analyser
+from service.roles.ground import Ground
+from service.rolling import Rolling
+from service.wiring.captures import captures_of
+from service.wiring.delivery import receivers_of
+from service.wiring.evidence import evidence_of, watch
+from service.wiring.sources import vector_rows
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """All that analysing needs; whoever has it feeds `analyser`, and runs `recorder`."""
+
+    ground: Ground
+    analyser: Analyser
+    recorder: Recorder
+    deliveries: Deliveries
+    captures: Captures
+    alarms: AlarmEngine
+    films: FilmKeeper
+    evidence: EvidenceKeeper
+    references: ReferencesInForce
+    rolling: Rolling
+
+    def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
+        """Begin the loops beside the blocks; they run until they are cancelled."""
+        beats = self.ground.beats
+        loops = {
+            "references": self.references.run,
+            "alarms": self.alarms.run,
+            "captures": self.captures.run,
+            "evidence": self.evidence.run,
+            "gather": self.rolling.run,
+        }
+        if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
+            loops["learn"] = self.films.run
+        begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
+        return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
+
+    async def close(self) -> None:
+        """Write what is not written yet; also when a bug ends the program."""
+        await self.captures.close()
+        await self.recorder.flush()
+        await self.evidence.close()
+
+
+async def analysis_on(
+    ground: Ground, monitors: Mapping[str, Monitor], bus: Bus, around: Around
+) -> Analysis:
+    """Put the parts together, and let them go on where the service stopped.
+
+    Parameters
+    ----------
+    bus
+        Where blocks wait for the analysis.
+    around
+        Is shown the films, of which messages tell.
+
+    Raises
+    ------
+    StoreError
+        If what is stored cannot be read: to begin without it would lose it.
+    """
+    plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
+    live = ground.live
+    deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
+    commits = ground.timings.commits
+    recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)
+    captures = captures_of(plant, origin, clock)
+    look = health_of(monitors, live, recorder, captures, bus)
+    alarms = await alarm_engine(
+        plant, origin, store, recorder.put, clock, captures, vector_rows(plant), look
+    )
+    machines = {unit: monitor.unit for unit, monitor in monitors.items()}
+    films = await film_keeper(plant, machines, store.films, clock)
+    around.watch_films(films.newest)
+    evidence = evidence_of(plant, origin, live, films, store, captures, clock)
+    watch(evidence, alarms, captures, origin)
+    references = ReferencesInForce(monitors, store, clock)
+    await references.look()  # before the first result
+    return Analysis(
+        ground=ground,
+        analyser=Analyser(monitors, live, recorder, alarms, films),
+        recorder=recorder,
+        deliveries=deliveries,
+        captures=captures,
+        alarms=alarms,
+        films=films,
+        evidence=evidence,
+        references=references,
+        rolling=Rolling(store.rollups, clock),
+    )

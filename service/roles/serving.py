@@ -1,0 +1,125 @@
+"""`Serving`: the HTTP server with API and dashboard, and how it says that it is there."""
+
+import asyncio
+import gc
+import socket
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from service.api.access.desk import AccessDesk
+from service.api.app import create_app
+from service.api.context import Context
+from service.audit.refusals import Refusals
+from service.bus import Bus
+from service.http.listening import url_of
+from service.http.server import GuardedServer
+from service.metrics.polls import TimedSource
+from service.metrics.watched import Watched
+from service.roles.analysis import Analysis
+from service.roles.ground import Ground
+from service.supervision import Supervision
+from service.wiring.evidence import evidence_desk
+from service.wiring.http import server_of
+
+GC_THRESHOLDS = (20_000, 20, 20)
+"""Seldom enough to cost nothing; what a request or a block leaves is mostly no cycle."""
+
+
+@dataclass(frozen=True)
+class Serving:
+    """A server on a socket.
+
+    Parameters
+    ----------
+    announce
+        Called with the URL once the server answers, and before with the token for setting up where
+        everybody must log in and nobody can.
+    """
+
+    ground: Ground
+    server: GuardedServer
+    listener: socket.socket
+    desk: AccessDesk
+    announce: Callable[[str], None]
+
+    def start(self, tasks: asyncio.TaskGroup) -> asyncio.Task[None]:
+        """Begin to serve; ends after `stop`."""
+        serve = partial(self.server.run_on, self.listener)
+        return tasks.create_task(self.ground.beats.tend("serve", serve), name="serve")
+
+    def stop(self) -> None:
+        """Take no more requests."""
+        self.server.should_exit = True
+
+    async def tell(self, supervision: Supervision) -> None:
+        """Announce the server as soon as it answers."""
+        while not self.server.started:
+            await asyncio.sleep(0.01)
+        gc.collect()
+        gc.freeze()  # what is there from the start stays: to look through it again takes 0.1 s
+        gc.set_threshold(*GC_THRESHOLDS)
+        supervision.ready()
+        if token := await self.desk.offer_set_up():
+            self.announce(f"to make the first account, within one hour and once: {token}")
+        self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
+
+
+def server_for(context: Context, ground: Ground) -> GuardedServer:
+    """What serves a context."""
+    app = create_app(context)
+    app.openapi()  # kept from now on: no client waits for it, nor samples for a client
+    return server_of(app, ground.plant, ground.clock)
+
+
+def context_of(
+    analysis: Analysis,
+    desk: AccessDesk,
+    refusals: Refusals,
+    bus: Bus,
+    sources: Mapping[str, TimedSource],
+) -> Context:
+    """What the API works with in a process that analyses, too."""
+    ground = analysis.ground
+    plant = ground.plant
+    return Context(
+        plant_name=plant.plant.name,
+        units={unit.id: unit for unit in plant.unit},
+        live=ground.live,
+        store=ground.store,
+        clock=ground.clock,
+        refresh_s=ground.refresh_s,
+        references=analysis.references,
+        alarms=analysis.alarms,
+        films=analysis.films,
+        recorder=analysis.recorder,
+        captures=analysis.captures,
+        deliveries=analysis.deliveries,
+        evidence=evidence_desk(plant, ground.store, analysis.evidence, ground.clock),
+        metrics=metrics_of(analysis, bus, sources),
+        origin=ground.origin,
+        max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
+        sources=sources,
+        loops=ground.beats.look,
+        refusals=refusals,
+        access=desk,
+    )
+
+
+def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource]) -> Watched:
+    """What metrics are read from in a process that analyses."""
+    ground = analysis.ground
+    return Watched(
+        bearings={unit.id: [bearing.id for bearing in unit.bearing] for unit in ground.plant.unit},
+        live=ground.live,
+        bus=bus,
+        recorder=analysis.recorder,
+        alarms=analysis.alarms,
+        films=analysis.films,
+        captures=analysis.captures,
+        evidence=analysis.evidence,
+        deliveries=analysis.deliveries,
+        timings=ground.timings,
+        clock=ground.clock,
+        sources=sources,
+    )
