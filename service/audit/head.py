@@ -71,6 +71,16 @@ def write_head(path: Path, head: AuditHead) -> None:
     except BaseException:
         Path(aside).unlink(missing_ok=True)
         raise
+    _sync_folder(path.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring the name to the disk, too: without it a power cut may leave the head before."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _head(document: object) -> AuditHead:
