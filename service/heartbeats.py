@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Awaitable, Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from acquisition.clock import Clock
 
@@ -25,6 +25,15 @@ class Pulse(Protocol):
 
     def rest(self) -> None:
         """Say that it is alive, and waits for something that may never come."""
+        ...
+
+
+@runtime_checkable
+class Audible(Protocol):
+    """Something that can be heard working, while one task works with it."""
+
+    def listen(self, pulse: Pulse) -> None:
+        """Let the task that calls this be heard of while it works."""
         ...
 
 

@@ -36,7 +36,9 @@ class Runner:
         self._bus = bus or Bus(BUS_CAPACITY, clock)
         self._beats = beats or Heartbeats(clock)
         self._analyser = Analyser(monitors, live, recorder, alarms, films)
-        self._acquirer = Acquirer(units, live, clock, self._bus.publish, self._analyser.hear)
+        self._acquirer = Acquirer(
+            units, live, clock, self._bus.publish, self._analyser.hear, self._beats
+        )
 
     async def run(self) -> None:
         """Acquire and analyse; ends when every source has come to its end."""

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 from acquisition.clock import Clock
 from acquisition.source import SampleSource, refused_frames_of
 from core.blocks import SampleBlock
+from service.heartbeats import UNHEARD, Pulse
 from service.metrics.durations import Durations
 
 POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
@@ -16,10 +17,15 @@ POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2
 
 
 class PollClock:
-    """A source's clock that notes what the source does between its waits, each task apart."""
+    """A source's clock that notes what the source does between its waits, each task apart.
+
+    Whoever reads the source looks at it again and again, and so is heard of.
+    """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
+        self._pulse: Pulse = UNHEARD
+        self._reader: asyncio.Task[Any] | None = None
         self._woken_s: WeakKeyDictionary[asyncio.Task[Any], float] = WeakKeyDictionary()
         self.polls = Durations(POLL_BOUNDS_S, clock)
 
@@ -29,11 +35,13 @@ class PollClock:
 
     def monotonic_s(self) -> float:
         """Seconds that never step."""
+        self._beat()
         return self._clock.monotonic_s()
 
     async def sleep(self, duration_s: float) -> None:
         """Wait; what went before, since the wait before this one, was a poll."""
         task = asyncio.current_task()
+        self._beat(duration_s)
         if task is None:
             await self._clock.sleep(duration_s)
             return
@@ -41,6 +49,15 @@ class PollClock:
             self.polls.observe(self._clock.monotonic_s() - self._woken_s[task])
         await self._clock.sleep(duration_s)
         self._woken_s[task] = self._clock.monotonic_s()
+
+    def listen(self, pulse: Pulse) -> None:
+        """Let the task that calls this be heard of whenever it looks at the clock."""
+        self._pulse, self._reader = pulse, asyncio.current_task()
+
+    def _beat(self, after_s: float = 0.0) -> None:
+        # what asks another device beside says nothing of the one that reads
+        if self._reader is not None and asyncio.current_task() is self._reader:
+            self._pulse.beat(after_s)
 
     def forget(self) -> None:
         """Begin anew: what lies between two connections is no poll."""
@@ -61,6 +78,10 @@ class TimedSource:
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
         self._clock = PollClock(clock)
         self._source = make(self._clock)
+
+    def listen(self, pulse: Pulse) -> None:
+        """Let the task that calls this, and reads the source, be heard of while it does."""
+        self._clock.listen(pulse)
 
     @property
     def polls(self) -> Durations:

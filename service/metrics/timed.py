@@ -8,6 +8,7 @@ from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
 from core.monitor_port import Monitor
+from core.outage import Reach
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.roles.watched_unit import WatchedUnit
@@ -29,6 +30,10 @@ class TimedMonitor:
         """Take a new description of the same unit; raises as the monitor does."""
         self._monitor.adopt(unit)
         self.unit = unit
+
+    def go_on(self, reach: Reach | None) -> None:
+        """Go on after a stop, before the first block."""
+        self._monitor.go_on(reach)
 
     def drain_gaps(self) -> list[Gap]:
         """Hand over the gaps found since the last call, to be recorded."""
