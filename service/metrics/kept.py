@@ -6,6 +6,7 @@ from prometheus_client.metrics_core import Metric
 
 from service.metrics.families import counter, gauge, plain_histogram
 from service.metrics.watched import Watched
+from service.space.growth import S_PER_DAY
 
 
 def queue_metrics(watched: Watched) -> Iterator[Metric]:
@@ -61,19 +62,19 @@ def evidence_metrics(watched: Watched) -> Iterator[Metric]:
 def space_metrics(watched: Watched) -> Iterator[Metric]:
     """Room on the disks; that of a disk which nobody has looked at yet is left out."""
     disks = watched.space.disks if watched.space else ()
-    fills = [((disk.folder,), disk.days_until_full) for disk in disks]
+    fills = [((disk.name,), disk.days_until_full) for disk in disks]
     rows = (
         ("disk_free_bytes", "Room left on a disk.", [d.space.free_bytes for d in disks]),
         ("disk_size_bytes", "Room on it altogether.", [d.space.total_bytes for d in disks]),
     )
     for name, meaning, numbers in rows:
-        by_folder = zip([(disk.folder,) for disk in disks], numbers, strict=True)
-        yield gauge(name, meaning, ("folder",), by_folder)
+        by_disk = zip([(disk.name,) for disk in disks], numbers, strict=True)
+        yield gauge(name, meaning, ("volume",), by_disk)
     yield gauge(
-        "disk_days_until_full",
-        "When it will be full at the pace of the last day.",
-        ("folder",),
-        [(folder, days) for folder, days in fills if days is not None],
+        "disk_full_in_seconds",
+        "After which time it will be full at the pace of the last day.",
+        ("volume",),
+        [(name, S_PER_DAY * days) for name, days in fills if days is not None],
     )
 
 

@@ -21,10 +21,12 @@ from service.references import ReferencesInForce
 from service.roles.analysing import Analyser
 from service.roles.ground import Ground
 from service.rolling import Rolling
+from service.space.watch import SpaceWatch
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of
 from service.wiring.evidence import evidence_of, watch
 from service.wiring.sources import vector_rows
+from service.wiring.space import space_watch
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Analysis:
     evidence: EvidenceKeeper
     references: ReferencesInForce
     rolling: Rolling
+    space: SpaceWatch
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Begin the loops beside the blocks; they run until they are cancelled."""
@@ -51,6 +54,7 @@ class Analysis:
             "captures": self.captures.run,
             "evidence": self.evidence.run,
             "gather": self.rolling.run,
+            "space": self.space.run,
         }
         if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
             loops["learn"] = self.films.run
@@ -87,7 +91,8 @@ async def analysis_on(
     commits = ground.timings.commits
     recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)
     captures = captures_of(plant, origin, clock)
-    look = health_of(monitors, live, recorder, captures, bus)
+    space = space_watch(plant, clock)
+    look = health_of(monitors, live, recorder, captures, bus, space)
     alarms = await alarm_engine(
         plant, origin, store, recorder.put, clock, captures, vector_rows(plant), look
     )
@@ -109,4 +114,5 @@ async def analysis_on(
         evidence=evidence,
         references=references,
         rolling=Rolling(store.rollups, clock),
+        space=space,
     )

@@ -103,6 +103,7 @@ def context_of(
         loops=ground.beats.look,
         refusals=refusals,
         access=desk,
+        space=analysis.space,
     )
 
 
@@ -122,4 +123,5 @@ def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource])
         timings=ground.timings,
         clock=ground.clock,
         sources=sources,
+        space=analysis.space,
     )

@@ -1,7 +1,7 @@
 """`SpaceWatch`: looks at the disks for ever, in a thread, since a disk may not answer."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,13 +24,13 @@ class DiskView:
 
     Parameters
     ----------
-    folder
-        The first of the folders that are on it.
+    name
+        Of the first of the folders that are on it.
     days_until_full
         At the pace of the last day; None if that is not known or it does not fill.
     """
 
-    folder: str
+    name: str
     space: DiskSpace
     days_until_full: float | None = None
 
@@ -46,14 +46,14 @@ class SpaceWatch:
     Parameters
     ----------
     folders
-        What padwatch writes to.
+        What padwatch writes to, by name.
     measure
         Asks the file system.
     """
 
     def __init__(
         self,
-        folders: Sequence[Path],
+        folders: Mapping[str, Path],
         limits: SpaceLimits,
         clock: Clock,
         measure: Measure = measure_disk,
@@ -74,15 +74,15 @@ class SpaceWatch:
     async def look(self) -> None:
         """Look once."""
         try:
-            found = await asyncio.to_thread(lambda: [self._measure(f) for f in self._folders])
+            found = await asyncio.to_thread(self._measured)
         except OSError as error:
             self._trouble = f"it is not known how full the disk is: {error}"
             return
         self._trouble = None
         first: dict[int, DiskView] = {}
-        for folder, space in zip(self._folders, found, strict=True):
+        for name, space in zip(self._folders, found, strict=True):
             if space.device not in first:
-                first[space.device] = self._seen(folder, space)
+                first[space.device] = self._seen(name, space)
         self.disks = tuple(first.values())
 
     def condition(self, held: AlarmLevel | None) -> Condition:
@@ -99,19 +99,24 @@ class SpaceWatch:
         return max((one for one, _ in found), key=_urgency, default=WITHIN)
 
     def __str__(self) -> str:
-        return self._trouble or "; ".join(f"{disk.folder}: {disk}" for disk in self.disks)
+        return self._trouble or "; ".join(f"{disk.name}: {disk}" for disk in self.disks)
 
-    def _seen(self, folder: Path, space: DiskSpace) -> DiskView:
+    def _measured(self) -> list[DiskSpace]:
+        return [self._measure(folder) for folder in self._folders.values()]
+
+    def _seen(self, name: str, space: DiskSpace) -> DiskView:
         growth, now_s = self._growth.setdefault(space.device, Growth()), self._clock.monotonic_s()
         growth.note(space, now_s)
-        return DiskView(str(folder), space, growth.days_until_full(space, now_s))
+        return DiskView(name, space, growth.days_until_full(space, now_s))
 
     def _judged(self, disk: DiskView, held: AlarmLevel | None) -> Condition:
         limits = self._limits.of(disk.space.total_bytes)
         found = judge(Reading(disk.space.free_share), limits, held)
         if found.level is None:
             return found
-        return Condition(found.level, value=found.value, limit=found.limit, reason=str(disk))
+        return Condition(
+            found.level, value=found.value, limit=found.limit, reason=f"{disk.name}: {disk}"
+        )
 
 
 def _urgency(condition: Condition) -> tuple[int, float]:

@@ -16,7 +16,8 @@ BYTES_PER_GB = 1e9
 def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
     """Looks at whatever the plant's data are on; captures may be on a disk of their own."""
     data = Path(plant.service.data_folder)
-    return SpaceWatch([data, data / CAPTURES, data / EVIDENCE], space_limits(plant.space), clock)
+    folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
+    return SpaceWatch(folders, space_limits(plant.space), clock)
 
 
 def space_limits(settings: SpaceSettings) -> SpaceLimits:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 LABELS = {
+    "volume",
     *("unit", "bearing", "quality", "priority", "verdict", "reason", "receiver"),
     *("version", "python", "le"),
 }

@@ -43,7 +43,7 @@ def disks() -> Disks:
 
 @pytest.fixture
 def watch(disks: Disks, stepped_clock: Clock) -> SpaceWatch:
-    folders = [Path("data"), Path("captures"), Path("evidence")]
+    folders = {name: Path(name) for name in ("data", "captures", "evidence")}
     return SpaceWatch(folders, SpaceLimits(), stepped_clock, disks.measure)
 
 
@@ -58,7 +58,7 @@ async def test_a_disk_with_room_is_no_alarm_and_each_disk_is_named_once(watch: S
     await watch.look()
 
     assert watch.condition(None).level is None
-    assert [disk.folder for disk in watch.disks] == ["data", "captures"]
+    assert [disk.name for disk in watch.disks] == ["data", "captures"]
     assert str(watch) == "data: 500 of 1e+03 GB free; captures: 50 of 100 GB free"
 
 
