@@ -1,0 +1,1 @@
+"""Blocks between processes: a wire format, and a JetStream stream that carries it."""

@@ -1,0 +1,46 @@
+"""Blocks that use everything a block can hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.blocks import Rejection, SampleBlock
+from core.device_clock import DeviceClock, StampFault
+from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
+from service.stream.identity import UnitIdentity, fingerprint
+
+T0 = 1_767_225_600_123_456_789
+
+
+@pytest.fixture
+def identity() -> UnitIdentity:
+    return UnitIdentity("U1", fingerprint("Plant"), fingerprint("sx", "sy"))
+
+
+@pytest.fixture
+def block() -> SampleBlock:
+    samples = np.random.default_rng(7).normal(2000.0, 50.0, (2, 60)).astype(np.float32)
+    samples[0, 3], samples[1, 4], samples[0, 5] = np.nan, np.inf, -0.0
+    return SampleBlock(
+        unit="U1",
+        epoch=4_000_000_000,
+        first_index=2**40 + 1,
+        start_ns=T0,
+        rate_hz=600.0,
+        samples=samples,
+        channel_quality=(GOOD, uncertain(Reason.CLIPPED)),
+        slow={
+            "speed": Reading(90.9, u_random=0.1, u_systematic=0.2, interval_95=(90.0, 91.0)),
+            "oil": missing(Reason.SENSOR_FAILURE),
+            "odd": Reading(1 / 3, uncertain(Reason.OUT_OF_RANGE)),
+        },
+        rejected=(Rejection("torn_read", 60),),
+        clock=DeviceClock(0.1, -3.5, None, 2),
+        stamp_fault=StampFault.JUMPED,
+    )
+
+
+@pytest.fixture
+def bad_block(block: SampleBlock) -> SampleBlock:
+    return replace(block, channel_quality=(bad(Reason.DEAD), GOOD), slow={}, clock=None)

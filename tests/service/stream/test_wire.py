@@ -1,0 +1,148 @@
+import struct
+import tracemalloc
+import zlib
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from core.blocks import SampleBlock
+from core.quality import GOOD
+from service.live import LinkState
+from service.roles.link_news import LinkNews
+from service.stream.identity import UnitIdentity, fingerprint
+from service.stream.wire import decoded, encoded_block, encoded_link
+from service.stream.wire_errors import WireError
+
+OWN = UnitIdentity("U1", fingerprint("Plant"), fingerprint("sx"))
+
+
+def assert_same(found: object, sent: SampleBlock) -> None:
+    assert isinstance(found, SampleBlock)
+    for field in fields(SampleBlock):
+        if field.name != "samples":
+            assert getattr(found, field.name) == getattr(sent, field.name), field.name
+    assert found.samples.dtype == sent.samples.dtype
+    assert found.samples.shape == sent.samples.shape
+    assert found.samples.tobytes() == sent.samples.tobytes()
+
+
+def with_crc(body: bytes) -> bytes:
+    return body + struct.pack("<I", zlib.crc32(body))
+
+
+def test_a_block_comes_back_bit_for_bit(
+    block: SampleBlock, bad_block: SampleBlock, identity: UnitIdentity
+) -> None:
+    for sent in (block, bad_block, block.from_sample(7, 9), block.from_sample(60)):
+        assert_same(decoded(encoded_block(sent, identity), identity), sent)
+
+
+def test_news_of_a_link_come_back(identity: UnitIdentity) -> None:
+    for news in (
+        LinkNews("U1", LinkState.CONNECTED),
+        LinkNews("U1", LinkState.NOT_CONNECTED, "10.0.0.7 refuses: “no”"),
+    ):
+        assert decoded(encoded_link(news, identity), identity) == news
+
+
+def test_a_flipped_bit_anywhere_is_noticed(block: SampleBlock, identity: UnitIdentity) -> None:
+    message = encoded_block(block, identity)
+    for at in range(0, 8 * len(message), 5):
+        hurt = bytearray(message)
+        hurt[at // 8] ^= 1 << at % 8
+        with pytest.raises(WireError):
+            decoded(bytes(hurt), identity)
+
+
+def test_a_message_that_was_cut_or_grew_is_refused(
+    block: SampleBlock, identity: UnitIdentity
+) -> None:
+    message = encoded_block(block, identity)
+    for hurt in (b"", message[:3], message[:50], message[:-1], message + b"\0", message * 2):
+        with pytest.raises(WireError) as refused:
+            decoded(hurt, identity)
+        assert refused.value.kind in ("not_a_message", "wrong_length")
+
+
+@pytest.mark.parametrize(
+    ("other", "kind", "word"),
+    [
+        ({"plant": fingerprint("Elsewhere")}, "other_plant", "own stream"),
+        ({"make": fingerprint("sx", "sz")}, "other_configuration", "same plant file"),
+        ({"unit": "U2"}, "other_unit", "'U1'"),
+    ],
+)
+def test_a_message_of_somebody_else_is_refused_with_what_to_do(
+    block: SampleBlock, identity: UnitIdentity, other: dict[str, bytes], kind: str, word: str
+) -> None:
+    message = encoded_block(block, identity)
+    with pytest.raises(WireError, match=word) as refused:
+        decoded(message, replace(identity, **other))
+    assert refused.value.kind == kind
+
+
+def test_a_message_of_a_later_version_asks_for_an_upgrade(
+    block: SampleBlock, identity: UnitIdentity
+) -> None:
+    message = bytearray(encoded_block(block, identity)[:-4])
+    message[4:6] = struct.pack("<H", 9)
+    with pytest.raises(WireError, match=r"version 9.*upgrade `padwatch analyse`") as refused:
+        decoded(with_crc(bytes(message)), identity)
+    assert refused.value.kind == "other_version"
+
+
+def test_an_unknown_kind_is_refused(block: SampleBlock, identity: UnitIdentity) -> None:
+    message = bytearray(encoded_block(block, identity)[:-4])
+    message[6:8] = struct.pack("<H", 77)
+    with pytest.raises(WireError) as refused:
+        decoded(with_crc(bytes(message)), identity)
+    assert refused.value.kind == "unknown_kind"
+
+
+def forged(head: bytes, samples: bytes, kind: int = 1) -> bytes:
+    start = struct.pack(
+        "<4sHH16s16sII", b"PWSM", 1, kind, OWN.plant, OWN.make, len(head), len(samples)
+    )
+    return with_crc(start + head + samples)
+
+
+@given(st.binary(max_size=400), st.binary(max_size=40), st.sampled_from([1, 2]))
+@settings(max_examples=150, deadline=None)
+def test_hostile_bytes_within_a_good_frame_are_refused(
+    head: bytes, samples: bytes, kind: int
+) -> None:
+    with pytest.raises(WireError):
+        decoded(forged(head, samples, kind), OWN)
+
+
+@given(st.binary(max_size=2000))
+@settings(max_examples=150, deadline=None)
+def test_hostile_bytes_are_refused(message: bytes) -> None:
+    with pytest.raises(WireError):
+        decoded(message, OWN)
+
+
+def test_a_message_that_claims_much_takes_little_memory(block: SampleBlock) -> None:
+    whole = encoded_block(replace(block, channel_quality=(GOOD, GOOD)), OWN)
+    (n_head,) = struct.unpack_from("<I", whole, 40)
+    head = whole[48 : 48 + n_head].replace(b'"n_samples":60', b'"n_samples":9223372036854775807')
+    deep = b"[" * 100_000
+    lying = struct.pack("<4sHH16s16sII", b"PWSM", 1, 1, OWN.plant, OWN.make, 2**32 - 1, 2**32 - 1)
+    tracemalloc.start()
+    try:
+        for hurt in (forged(head, b"\0" * 480), forged(deep, b""), with_crc(lying)):
+            with pytest.raises(WireError):
+                decoded(hurt, OWN)
+        assert tracemalloc.get_traced_memory()[1] < 2_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_samples_are_float32_little_endian_whatever_they_were(
+    block: SampleBlock, identity: UnitIdentity
+) -> None:
+    turned = replace(block, samples=np.asfortranarray(block.samples))
+    assert encoded_block(turned, identity) == encoded_block(block, identity)
