@@ -138,6 +138,11 @@ class LiveView:
         """The newest blocks of a unit, oldest first, current or not."""
         return list(self._blocks.get(unit, ()))
 
+    def newest_block(self, unit: str) -> SampleBlock | None:
+        """The newest block of a unit, current or not; None if there has been none."""
+        blocks = self.blocks(unit)
+        return blocks[-1] if blocks else None
+
     def why_no_samples(self, unit: str) -> Reason | None:
         """Why the newest samples of a unit are not current; None if they are."""
         return self._why_not_current(unit, self.data_age_s(unit))

@@ -1,13 +1,13 @@
 """`AlarmEngine`: the alarms of all units, fed by the runner, the clock and people."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState, Condition
+from core.alarms.alarm import Alarm, AlarmKind, Condition
 from core.alarms.chatter import ChatterRule, ChatterWatch
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Action
@@ -15,6 +15,7 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import VectorReference
 from core.assessment import Assessment
 from core.blocks import SampleBlock
+from service.alarms.count import AlarmCount, count_of
 from service.alarms.service_alarms import ServiceAlarms
 from service.audit.acting import acting
 from service.heartbeats import UNHEARD, Pulse
@@ -27,31 +28,6 @@ TICK_S = 0.5
 NO_FILMS: Mapping[str, Condition] = MappingProxyType({})
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
-
-
-@dataclass(frozen=True)
-class AlarmCount:
-    """How many alarms are on the list.
-
-    Parameters
-    ----------
-    n_active
-        Active and not hidden.
-    n_danger
-        Of these, at the level of danger.
-    n_unacknowledged
-        Active or returned, not hidden, and nobody has seen their newest occurrence.
-    n_hidden
-        Shelved, suppressed or out of service.
-    n_unjudged
-        Not active, not hidden, and what they watch cannot be judged now.
-    """
-
-    n_active: int
-    n_danger: int
-    n_unacknowledged: int
-    n_hidden: int
-    n_unjudged: int
 
 
 class AlarmEngine:
@@ -189,16 +165,7 @@ class AlarmEngine:
 
     def count(self) -> AlarmCount:
         """How many alarms are on the list."""
-        alarms = self.alarms
-        hidden = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
-        shown = [alarm for alarm in alarms if alarm.state not in hidden]
-        return AlarmCount(
-            n_active=sum(alarm.level is not None for alarm in shown),
-            n_danger=sum(alarm.level is AlarmLevel.DANGER for alarm in shown),
-            n_unacknowledged=sum(not alarm.is_acknowledged for alarm in shown),
-            n_hidden=len(alarms) - len(shown),
-            n_unjudged=sum(a.level is None and not self.is_judged(a) for a in shown),
-        )
+        return count_of(self.alarms, self.is_judged)
 
     def _publish(self, news: list[AlarmNews]) -> None:
         """Store what no block has brought."""

@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from core.alarms.alarm import PLANT, AlarmLevel
 from core.alarms.chatter import ChatterRule
 from core.alarms.figures import AlarmFigures, figures_of, stale_alarms
-from service.alarms.engine import AlarmEngine
 from service.api.alarm_rate_models import AlarmFiguresModel, AlarmRatesModel, FrequentModel
 from service.api.alarm_views import LEVEL_NAMES, alarm_model
+from service.api.ports import AlarmBoard, FilmBoard
 from service.api.times import rfc3339
-from service.films.keeper import FilmKeeper
 from service.store.port import AlarmQuery, Store
 
 MAX_RATED = 100_000
@@ -70,7 +69,7 @@ def counted(store: Store, wanted: AlarmQuery, units: Sequence[str], rule: Chatte
 
 
 def alarm_rates_model(
-    engine: AlarmEngine, films: FilmKeeper, found: Counted, shown: Collection[str], now_ns: int
+    engine: AlarmBoard, films: FilmBoard, found: Counted, shown: Collection[str], now_ns: int
 ) -> AlarmRatesModel:
     """Figures with what is stale now of the units that are shown."""
     stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]

@@ -1,6 +1,5 @@
 """Alarms: the list, their history, and what people do to them."""
 
-import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Response
@@ -47,9 +46,6 @@ from service.store.port import AlarmQuery
 
 MAX_EVENTS = 1000
 
-STORED_WITHIN_S = 10.0
-"""How long an operator waits for the disk at most."""
-
 AlarmId = Annotated[
     str,
     Path(
@@ -70,7 +66,7 @@ ACTION_PROBLEMS = described_problems(
         404: "Unknown alarm",
         409: "Does not fit the alarm as it is now",
         422: "A wrong parameter",
-        503: "Done, but not on the disk yet",
+        503: "Not done, or not on the disk yet",
     }
 )
 
@@ -251,18 +247,9 @@ async def event_query(
 async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
     """Do it, and answer when it is on the disk."""
     try:
-        alarm = context.alarms.operate(id_, action)
+        alarm = await context.operators.operate(id_, action)
     except LookupError as error:
         raise ProblemError(404, "Unknown alarm", f"there is no alarm {id_!r}") from error
     except ActionRefusedError as error:
         raise ProblemError(409, "Does not fit", f"alarm {id_}: {error}") from error
-    try:
-        async with asyncio.timeout(STORED_WITHIN_S):
-            await context.recorder.stored()
-    except TimeoutError as error:
-        detail = (
-            f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
-            " a restart now would undo it. It is tried again until it is stored"
-        )
-        raise ProblemError(503, "Not on the disk yet", detail) from error
     return alarm_model(context.alarms, context.films, alarm)

@@ -9,7 +9,6 @@ from core.alarms.alarm import (
     Condition,
     Hold,
 )
-from service.alarms.engine import AlarmEngine
 from service.api.alarm_models import (
     AlarmCountModel,
     AlarmEventModel,
@@ -22,8 +21,9 @@ from service.api.alarm_models import (
 from service.api.alarm_names import AlarmLevelName
 from service.api.film_conditions import condition_model
 from service.api.film_models import FilmConditionModel
+from service.api.ports import AlarmBoard, FilmBoard
 from service.api.times import rfc3339
-from service.films.keeper import KINDS, FilmKeeper
+from service.films.keeper import KINDS
 from service.origin import Origin
 from service.store.port import StoredEvent
 
@@ -68,7 +68,7 @@ LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
 
 
 def alarm_list_model(
-    engine: AlarmEngine, films: FilmKeeper, origin: Origin, now_ns: int
+    engine: AlarmBoard, films: FilmBoard, origin: Origin, now_ns: int
 ) -> AlarmListModel:
     """The list of alarms as it stands."""
     alarms = engine.alarms
@@ -83,12 +83,12 @@ def alarm_list_model(
     )
 
 
-def alarm_count_model(engine: AlarmEngine) -> AlarmCountModel:
+def alarm_count_model(engine: AlarmBoard) -> AlarmCountModel:
     """How many alarms there are."""
     return AlarmCountModel(**vars(engine.count()))
 
 
-def alarm_model(engine: AlarmEngine, films: FilmKeeper, alarm: Alarm) -> AlarmModel:
+def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmModel:
     """One alarm as it is shown."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
@@ -118,7 +118,7 @@ def alarm_model(engine: AlarmEngine, films: FilmKeeper, alarm: Alarm) -> AlarmMo
     )
 
 
-def _film(films: FilmKeeper, identity: AlarmIdentity) -> FilmConditionModel | None:
+def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | None:
     """Condition of the newest reading of a film, if the alarm is about one."""
     if identity.kind not in KINDS.values():
         return None

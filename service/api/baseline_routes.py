@@ -171,7 +171,7 @@ async def _done(
     """Do it, and answer when it is on the disk."""
     place = watched_place(context, unit, bearing)
     try:
-        await context.films.act(place, action, actor_or(asked.actor), asked.reason)
+        await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
     except BaselineRefusedError as error:
         raise ProblemError(409, "Does not fit", f"{unit} {bearing}: {error}") from error
     return await asyncio.to_thread(_baselines, context, unit, bearing)

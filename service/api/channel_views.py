@@ -14,9 +14,9 @@ from service.api.channel_models import (
     SlowChannelModel,
     WaveformChannelModel,
 )
+from service.api.ports import LiveLook
 from service.api.times import rfc3339
 from service.api.views import quality_model
-from service.live import LiveView
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.modbus_sources import ModbusVectorSettings
@@ -38,10 +38,9 @@ UNIT_USES = ("speed_channel", "power_channel", "key_phase")
 """Those of a unit."""
 
 
-def channels_model(live: LiveView, settings: UnitSettings) -> ChannelsModel:
+def channels_model(live: LiveLook, settings: UnitSettings) -> ChannelsModel:
     """All channels of a unit, with the verdicts and readings of its newest block."""
-    blocks, why_not = live.blocks(settings.id), live.why_no_samples(settings.id)
-    newest = blocks[-1] if blocks else None
+    newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
     shown = newest if why_not is None else None
     why = why_not or Reason.WAITING_FOR_DATA
     uses = _uses(settings)

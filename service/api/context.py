@@ -7,19 +7,21 @@ from typing import Annotated
 from fastapi import Path
 
 from acquisition.clock import Clock
-from service.alarms.engine import AlarmEngine
 from service.api.access.desk import AccessDesk
+from service.api.delivery_look import DeliveryLook
+from service.api.ports import (
+    AlarmBoard,
+    CaptureLook,
+    FilmBoard,
+    LiveLook,
+    Operators,
+)
 from service.api.problems import ProblemError
 from service.audit.refusals import Refusals
-from service.capture.captures import Captures
-from service.delivery.deliveries import Deliveries
 from service.evidence.desk import EvidenceDesk
-from service.films.keeper import FilmKeeper
-from service.live import LiveView
 from service.metrics.polls import TimedSource
 from service.metrics.watched import Watched
 from service.origin import Origin
-from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.settings.bearings import BearingSettings
 from service.settings.units import UnitSettings
@@ -59,16 +61,16 @@ class Context:
 
     plant_name: str
     units: Mapping[str, UnitSettings]
-    live: LiveView
+    live: LiveLook
     store: Store
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
-    alarms: AlarmEngine
-    films: FilmKeeper
-    recorder: Recorder
-    captures: Captures
-    deliveries: Deliveries
+    alarms: AlarmBoard
+    films: FilmBoard
+    operators: Operators
+    captures: CaptureLook
+    deliveries: DeliveryLook
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
     evidence: EvidenceDesk | None = None

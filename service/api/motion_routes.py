@@ -1,5 +1,6 @@
 """The motion of a shaft in its bearing, sample by sample: now, and out of recordings."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
@@ -150,7 +151,7 @@ def recorded_motion_router(context: Context) -> APIRouter:
 def _newest(
     settings: UnitSettings,
     bearing: Bearing,
-    blocks: list[SampleBlock],
+    blocks: Sequence[SampleBlock],
     seconds: float,
     origin: MotionOrigin,
 ) -> MotionModel:

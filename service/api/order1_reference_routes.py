@@ -70,7 +70,7 @@ def order1_reference_router(context: Context) -> APIRouter:
             measured, context.clock.now_ns(), actor_or(asked.actor), asked.note
         )
         await asyncio.to_thread(context.store.order1_references.add, found)
-        context.alarms.refer_to(measured)
+        await context.operators.refer_to(measured)
         return _model(found)
 
     return router

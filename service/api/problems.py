@@ -10,6 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
+from service.api.elsewhere import NotCarriedOutError, NotHereError
 from service.api.methods import allowed_methods
 from service.store.port import QueryTooLargeError, StoreError
 
@@ -145,6 +146,14 @@ def install_problem_handlers(app: FastAPI) -> None:
     async def _store(request: Request, error: StoreError) -> JSONResponse:
         log.error("a query failed in the store", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
+
+    @app.exception_handler(NotHereError)
+    async def _not_here(request: Request, error: NotHereError) -> JSONResponse:
+        return _render(request, 409, "Not available here", str(error))
+
+    @app.exception_handler(NotCarriedOutError)
+    async def _not_carried_out(request: Request, error: NotCarriedOutError) -> JSONResponse:
+        return _render(request, 503, error.title, str(error))
 
     @app.exception_handler(Exception)
     async def _bug(request: Request, _: Exception) -> JSONResponse:

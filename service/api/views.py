@@ -17,6 +17,7 @@ from service.api.models import (
     WindowModel,
 )
 from service.api.plant_models import DeviceClockModel, SourceModel
+from service.api.ports import LiveLook
 from service.api.series_models import (
     OrbitModel,
     PlaceName,
@@ -24,7 +25,7 @@ from service.api.series_models import (
     SpectrumModel,
 )
 from service.api.times import rfc3339
-from service.live import CurrentBearing, LiveView, UnitStatus
+from service.live import CurrentBearing, UnitStatus
 
 LEVEL_NAMES: dict[Level, LevelName] = {
     Level.GOOD: "good",
@@ -95,7 +96,7 @@ def budget_model(name: str, time_ns: int, budget: Budget) -> BudgetModel:
     )
 
 
-def latest_model(live: LiveView, unit: str, bearing: str) -> LatestModel:
+def latest_model(live: LiveLook, unit: str, bearing: str) -> LatestModel:
     """A bearing as it may be shown now."""
     current = live.current(unit, bearing)
     newest = current.assessment
@@ -145,7 +146,7 @@ def window_model(window: AveragingWindow) -> WindowModel:
     )
 
 
-def source_model(live: LiveView, unit: str) -> SourceModel:
+def source_model(live: LiveLook, unit: str) -> SourceModel:
     """How the samples of a unit arrive."""
     status = live.status(unit)
     account = status.account

@@ -10,6 +10,7 @@ from functools import partial
 from service.api.access.desk import AccessDesk
 from service.api.app import create_app
 from service.api.context import Context
+from service.api.in_process import InProcess
 from service.audit.refusals import Refusals
 from service.bus import Bus
 from service.http.listening import url_of
@@ -92,7 +93,7 @@ def context_of(
         references=analysis.references,
         alarms=analysis.alarms,
         films=analysis.films,
-        recorder=analysis.recorder,
+        operators=InProcess(analysis.alarms, analysis.films, analysis.recorder),
         captures=analysis.captures,
         deliveries=analysis.deliveries,
         evidence=evidence_desk(plant, ground.store, analysis.evidence, ground.clock),

@@ -16,6 +16,7 @@ from service.alarms.engine import AlarmEngine
 from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
+from service.api.in_process import InProcess
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.delivery.deliveries import Deliveries
 from service.evidence.keeper import EvidenceKeeper
@@ -171,7 +172,7 @@ async def service(
         references=references,
         alarms=alarms,
         films=films,
-        recorder=recorder,
+        operators=InProcess(alarms, films, recorder),
         captures=captures,
         deliveries=Deliveries([], store.outbox, clock),
         max_shelf_s=7200.0,

@@ -11,7 +11,7 @@ import pytest
 
 from core.blocks import SampleBlock
 from core.quality import GOOD, Reading, Reason, bad
-from service.api import alarm_routes
+from service.api import in_process
 from service.recorder import Findings
 
 AsProblem = Callable[[httpx2.Response], dict[str, Any]]
@@ -326,7 +326,7 @@ async def test_a_wrong_question_is_refused_by_name(
 async def test_what_cannot_be_stored_is_said_and_kept(
     service: Any, probes: Probes, monkeypatch: pytest.MonkeyPatch, as_problem: AsProblem
 ) -> None:
-    monkeypatch.setattr(alarm_routes, "STORED_WITHIN_S", 0.05)
+    monkeypatch.setattr(in_process, "STORED_WITHIN_S", 0.05)
     probes.send(3, Reason.SENSOR_FAILURE)
     await probes.stored()
     with sqlite3.connect(service.store._path) as connection:

@@ -11,6 +11,7 @@ import httpx2
 from core.account import Gap
 from service.api.app import create_app
 from service.api.context import Context
+from service.api.in_process import InProcess
 from service.delivery.deliveries import Deliveries
 from service.recorder import Findings
 from service.references import ReferencesInForce
@@ -95,7 +96,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
             *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
             alarms=plant.alarms,
             films=plant.films,
-            recorder=plant.recorder,
+            operators=InProcess(plant.alarms, plant.films, plant.recorder),
             captures=plant.captures,
             deliveries=Deliveries([], plant.store.outbox, plant.clock),
         )

@@ -80,7 +80,7 @@ def access(service: Any, documents_with_metrics: dict[str, Any]) -> Access:
         bearings={unit: [bearing.id for bearing in s.bearing] for unit, s in context.units.items()},
         live=context.live,
         bus=Bus(1, service.clock),
-        recorder=context.recorder,
+        recorder=service.recorder,
         alarms=context.alarms,
         films=context.films,
         captures=context.captures,

@@ -1,0 +1,45 @@
+"""What people ask for, done in the process that analyses: `padwatch run`."""
+
+import asyncio
+
+from core.alarms.alarm import Alarm
+from core.alarms.operation import Action
+from core.alarms.vector_change import VectorReference
+from service.alarms.engine import AlarmEngine
+from service.api.elsewhere import NotCarriedOutError
+from service.films.actions import Action as BaselineAction
+from service.films.keeper import FilmKeeper
+from service.films.learning import FilmPlace
+from service.recorder import Recorder
+
+STORED_WITHIN_S = 10.0
+"""How long an operator waits for the disk at most."""
+
+
+class InProcess:
+    """Asks the engine and the keeper of this process."""
+
+    def __init__(self, alarms: AlarmEngine, films: FilmKeeper, recorder: Recorder) -> None:
+        self._alarms, self._films, self._recorder = alarms, films, recorder
+
+    async def operate(self, id_: str, action: Action) -> Alarm:
+        """Do something to an alarm, and return when it is on the disk."""
+        alarm = self._alarms.operate(id_, action)
+        try:
+            async with asyncio.timeout(STORED_WITHIN_S):
+                await self._recorder.stored()
+        except TimeoutError as error:
+            raise NotCarriedOutError(
+                "Not on the disk yet",
+                f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
+                " a restart now would undo it. It is tried again until it is stored",
+            ) from error
+        return alarm
+
+    async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
+        """Do something to the baselines of a bearing."""
+        await self._films.act(place, action, actor, reason)
+
+    async def refer_to(self, reference: VectorReference) -> None:
+        """Compare 1× vectors with a new reference."""
+        self._alarms.refer_to(reference)
