@@ -1,5 +1,6 @@
 """The manifest of a recording: what was recorded, how to read it, and what its files must be."""
 
+import hashlib
 import json
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,15 +27,20 @@ from core.machine import Measurand
 from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"
-VERSION = 2
-READABLE = (1, 2)
-"""Version 1 had no float32, and did not say on which grid its blocks were."""
+VERSION = 3
+READABLE = (1, 2, 3)
+"""Version 1 had no float32, and did not say on which grid its blocks were; before version 3 the
+manifest had no checksum of its own."""
+
+CHECKED = 3
+"""First version whose manifest has a checksum."""
 
 MANIFEST = "manifest.json"
 SAMPLES = "samples.parquet"
 BLOCKS = "blocks.parquet"
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
+Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 FileName = Literal["samples.parquet", "blocks.parquet"]
 SampleType = Literal["int16", "float32"]
 
@@ -116,7 +122,7 @@ class RecordedFile(ManifestPart):
     """What a file beside the manifest must be."""
 
     size: Annotated[int, Field(ge=1, le=2**50)]
-    sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+    sha256: Sha256
 
 
 class Manifest(RecordedUnit):
@@ -130,15 +136,18 @@ class Manifest(RecordedUnit):
         Program and person.
     n_samples
         Per channel.
+    checksum
+        SHA-256 of all else in it, so that no number of it changes unnoticed; see `manifest_text`.
     """
 
     format: Literal["padwatch-recording"]
-    version: Literal[1, 2]
+    version: Literal[1, 2, 3]
     made_by: Annotated[str, StringConstraints(max_length=200)]
     start: Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{9}Z$")]
     n_blocks: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     n_samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     files: Annotated[dict[FileName, RecordedFile], Field(min_length=2)]
+    checksum: Sha256 | None = None
 
     @validated(mode="after")
     def _check_version(self) -> Self:
@@ -171,25 +180,37 @@ def read_manifest(folder: Path) -> Manifest:
                 f"{path}: {head.format[:40]!r} version {head.version},"
                 f" this padwatch reads {FORMAT!r} version {' and '.join(map(str, READABLE))}"
             )
-        return Manifest.model_validate_json(text, strict=True)
+        found = Manifest.model_validate_json(text, strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = "".join(f".{part}"[:60] for part in first["loc"]).lstrip(".")
         words = f"{place}: {first['msg']}" if place else first["msg"]
         raise ConfigError(f"{path}: {words}") from error
+    is_checked = found.version >= CHECKED or found.checksum is not None
+    if is_checked and found.checksum != checksum_of(json.loads(text)):
+        raise ConfigError(f"{path}: damaged, or edited by hand: not what its checksum says")
+    return found
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """The manifest as its file has it: what it is comes first."""
-    values = manifest.model_dump(mode="json")
+    """The manifest as its file has it: what it is comes first, its checksum last."""
+    values = manifest.model_dump(mode="json", exclude={"checksum"})
     first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
-    return json.dumps(first | values, indent=1) + "\n"
+    checksum = {"checksum": checksum_of(first | values)} if manifest.version >= CHECKED else {}
+    return json.dumps(first | values | checksum, indent=1) + "\n"
 
 
 def start_text(start_ns: int) -> str:
     """Time with all its nanoseconds, for people."""
     seconds, ns = divmod(start_ns, NS_PER_S)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{ns:09d}Z"
+
+
+def checksum_of(document: dict[str, object]) -> str:
+    """Of all but the checksum itself, whatever the order and the spaces."""
+    rest = {name: value for name, value in document.items() if name != "checksum"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
 def _read(path: Path) -> bytes:

@@ -16,6 +16,7 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
+from acquisition.recording.manifest import checksum_of
 from acquisition.recording.reader import open_recording
 
 Record = Callable[[Iterable[RawBlock]], Path]
@@ -29,7 +30,8 @@ def folder(record: Record, numbered: Callable[..., RawBlock]) -> Path:
 
 def change_manifest(folder: Path, **changes: Any) -> None:
     path = folder / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    document = json.loads(path.read_text()) | changes
+    path.write_text(json.dumps(document | {"checksum": checksum_of(document)}))
 
 
 def reseal(folder: Path) -> None:
@@ -66,10 +68,10 @@ def test_the_recording_itself_is_sound(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"version": 3}, "'padwatch-recording' version 3, this padwatch reads"),
+        ({"version": 4}, "'padwatch-recording' version 4, this padwatch reads"),
         (
             {"format": "wav"},
-            "'wav' version 2, this padwatch reads 'padwatch-recording' version 1 and 2",
+            "'wav' version 3, this padwatch reads 'padwatch-recording' version 1 and 2 and 3",
         ),
         ({"version": "1"}, "version: Input should be a valid integer"),
         ({"unit": "../U1"}, "unit: String should match"),
@@ -93,6 +95,24 @@ def test_a_manifest_that_says_something_else_is_refused(
 ) -> None:
     change_manifest(folder, **changes)
     assert words in refusal(folder)
+
+
+@pytest.mark.parametrize("place", range(50, 1000, 67))
+def test_a_manifest_in_which_one_character_is_another_is_refused(folder: Path, place: int) -> None:
+    path = folder / "manifest.json"
+    text = bytearray(path.read_bytes())
+    while not chr(text[place]).isalnum():  # a space more or less says nothing else
+        place += 1
+    text[place] ^= 1
+    path.write_bytes(text)
+    assert refusal(folder)
+
+
+@pytest.mark.parametrize("checksum", [None, "0" * 64])
+def test_a_manifest_that_lost_its_checksum_is_refused(folder: Path, checksum: str | None) -> None:
+    path = folder / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"checksum": checksum}))
+    assert "damaged, or edited by hand" in refusal(folder)
 
 
 def test_a_manifest_cannot_lead_out_of_its_folder(folder: Path) -> None:

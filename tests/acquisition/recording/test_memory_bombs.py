@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from acquisition.raw import RawBlock
-from acquisition.recording.manifest import RecordedUnit
+from acquisition.recording.manifest import RecordedUnit, checksum_of
 from acquisition.recording.writer import RecordingWriter
 from core.blocks import Rejection
 
@@ -78,6 +78,7 @@ def with_content(sound: Path, name: str, content: bytes) -> Path:
         data = content if file == name else (sound / file).read_bytes()
         (folder / file).write_bytes(data)
         manifest["files"][file] = {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    manifest["checksum"] = checksum_of(manifest)
     (folder / "manifest.json").write_text(json.dumps(manifest))
     return folder
 
