@@ -8,7 +8,8 @@ from itertools import islice
 from pathlib import Path
 
 from service.origin import Origin
-from service.store.schema import APPLICATION_IDS, MIGRATIONS
+from service.store.schema import MIGRATIONS
+from service.store.sqlite.migrating import APPLICATION_IDS
 
 MAX_FINDINGS = 5
 """Of damage, in a message."""

@@ -10,9 +10,8 @@ from pydantic import TypeAdapter
 from service.audit.csv_file import write_csv
 from service.audit.walk import Verdict
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.store.audit import trail, verify_trail
 from service.store.port import StoreError
-from service.wiring.stores import database_path
+from service.wiring.stores import open_trail
 
 app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what to what.")
 
@@ -31,9 +30,9 @@ def verify(
     The service may go on running. Names the first entry that is wrong, and compares the last with
     the file beside the database.
     """
-    path = database_path(read_plant_file(plant_file))
+    trail = open_trail(read_plant_file(plant_file))
     try:
-        verdict = verify_trail(path)
+        verdict = trail.verify()
     except StoreError as error:
         fail(f"padwatch audit verify: {error}")
     told = [number for number in verdict.told if number not in (known or [])]
@@ -53,11 +52,11 @@ def export(
     out: Annotated[Path, typer.Argument(help="CSV file to write, a new one.", show_default=False)],
 ) -> None:
     """Write the whole audit trail, oldest first, as a CSV file that spreadsheets take for text."""
-    path = database_path(read_plant_file(plant_file))
+    trail = open_trail(read_plant_file(plant_file))
     if out.suffix != ".csv":
         fail(f"padwatch audit export: {out}: must end in .csv", code=2)
     try:
-        with trail(path) as entries, out.open("x", encoding="utf-8", newline="") as file:
+        with trail.entries() as entries, out.open("x", encoding="utf-8", newline="") as file:
             n_entries = write_csv(file, entries)
     except StoreError as error:
         fail(f"padwatch audit export: {error}")

@@ -1,4 +1,4 @@
-"""Keys, the set-up token, and all of access together, in SQLite."""
+"""Keys, the set-up token, and all of access together."""
 
 import json
 from typing import Any
@@ -6,12 +6,13 @@ from typing import Any
 from service.security.keys import ApiKey
 from service.security.roles import Role
 from service.store.access_deeds import account_deed, key_deed
-from service.store.accounts import Connect, SqliteAccounts, SqliteSessions, insert_account
+from service.store.accounts import SqlAccounts, SqlSessions, insert_account
 from service.store.audit_chain import AuditChain
+from service.store.database import Connect
 
 SELECT_KEYS = """
     SELECT id, name, digest, role, units, created_ns, expires_ns, used_ns, revoked_ns FROM api_key
-    WHERE :id IS NULL OR id = :id ORDER BY created_ns, id
+    WHERE CAST(:id AS TEXT) IS NULL OR id = :id ORDER BY created_ns, id
 """
 IS_TAKEABLE = """
     SELECT EXISTS (SELECT 1 FROM set_up_token WHERE digest = ? AND expires_ns > ?
@@ -19,13 +20,13 @@ IS_TAKEABLE = """
 """
 
 
-class SqliteKeys:
+class SqlKeys:
     """The keys of one database.
 
     Parameters
     ----------
     write, read, audit
-        As for `SqliteAccounts`.
+        As for `SqlAccounts`.
     """
 
     def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
@@ -65,13 +66,13 @@ class SqliteKeys:
         return is_news
 
 
-class SqliteSetUp:
+class SqlSetUp:
     """The set-up token of one database.
 
     Parameters
     ----------
     write, read, audit
-        As for `SqliteAccounts`.
+        As for `SqlAccounts`.
     """
 
     def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
@@ -80,8 +81,9 @@ class SqliteSetUp:
     def offer(self, digest: bytes, expires_ns: int) -> bool:
         """Put a token in the place of any before it; not if there is an account."""
         offer = """
-            INSERT OR REPLACE INTO set_up_token
-            SELECT 1, ?, ? WHERE NOT EXISTS (SELECT 1 FROM account)
+            INSERT INTO set_up_token SELECT 1, ?, ? WHERE NOT EXISTS (SELECT 1 FROM account)
+            ON CONFLICT (id) DO UPDATE SET
+            digest = excluded.digest, expires_ns = excluded.expires_ns
         """
         with self._write() as writer:
             return writer.execute(offer, (digest, expires_ns)).rowcount == 1
@@ -102,20 +104,20 @@ class SqliteSetUp:
         return True
 
 
-class SqliteAccess:
+class SqlAccess:
     """All that one database says about who may come in.
 
     Parameters
     ----------
     write, read, audit
-        As for `SqliteAccounts`.
+        As for `SqlAccounts`.
     """
 
     def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
-        self.accounts = SqliteAccounts(write, read, audit)
-        self.sessions = SqliteSessions(write, read)
-        self.keys = SqliteKeys(write, read, audit)
-        self.set_up = SqliteSetUp(write, read, audit)
+        self.accounts = SqlAccounts(write, read, audit)
+        self.sessions = SqlSessions(write, read)
+        self.keys = SqlKeys(write, read, audit)
+        self.set_up = SqlSetUp(write, read, audit)
 
 
 def _key(row: tuple[Any, ...]) -> ApiKey:

@@ -1,8 +1,5 @@
-"""Accounts and their sessions behind the store's interface, in SQLite."""
+"""Accounts and their sessions behind the store's interface."""
 
-import sqlite3
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import Any
 
 from service.security.roles import Role
@@ -10,15 +7,14 @@ from service.security.sessions import Session
 from service.store.access_deeds import account_deed
 from service.store.access_port import AccessRefusedError, Account
 from service.store.audit_chain import AuditChain
-
-Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
+from service.store.database import Connect, Connection
 
 MAX_SESSIONS = 16
 """Of one account; the oldest end when there are more."""
 
 SELECT_ACCOUNTS = """
     SELECT name, role, password_hash, password_number, created_ns, password_ns FROM account
-    WHERE :name IS NULL OR name = :name ORDER BY name
+    WHERE CAST(:name AS TEXT) IS NULL OR name = :name ORDER BY name
 """
 IS_OTHER_ADMIN = "SELECT EXISTS (SELECT 1 FROM account WHERE role = 'admin' AND name <> ?)"
 IS_OTHER = "SELECT EXISTS (SELECT 1 FROM account WHERE name <> ?)"
@@ -37,7 +33,7 @@ END_OLDEST = """
 """
 
 
-class SqliteAccounts:
+class SqlAccounts:
     """The accounts of one database.
 
     Parameters
@@ -109,13 +105,13 @@ class SqliteAccounts:
             self._audit.add(writer, [account_deed("removed", name, now_ns, before=role)])
 
 
-class SqliteSessions:
+class SqlSessions:
     """The sessions of one database.
 
     Parameters
     ----------
     write, read
-        As for `SqliteAccounts`; logins are told of where they are asked for.
+        As for `SqlAccounts`; logins are told of where they are asked for.
     """
 
     def __init__(self, write: Connect, read: Connect) -> None:
@@ -152,7 +148,7 @@ class SqliteSessions:
 
 
 def insert_account(
-    writer: sqlite3.Connection, name: str, role: Role, password_hash: str, now_ns: int
+    writer: Connection, name: str, role: Role, password_hash: str, now_ns: int
 ) -> bool:
     """Add an account unless there is one of that name; whether it was added."""
     row = (name, role.value, password_hash, now_ns, now_ns)
@@ -160,13 +156,13 @@ def insert_account(
     return writer.execute(insert, row).rowcount == 1
 
 
-def _require_other_admin(writer: sqlite3.Connection, name: str, role: Role) -> None:
+def _require_other_admin(writer: Connection, name: str, role: Role) -> None:
     """Refuse what would leave no admin; an account that is no admin may change as it likes."""
     if role is Role.ADMIN and not writer.execute(IS_OTHER_ADMIN, (name,)).fetchone()[0]:
         raise AccessRefusedError(f"{name} is the only admin; make somebody else one first")
 
 
-def _role(writer: sqlite3.Connection, name: str) -> Role:
+def _role(writer: Connection, name: str) -> Role:
     """Role of an account that is about to be changed; refused if there is none such."""
     row = writer.execute("SELECT role FROM account WHERE name = ?", (name,)).fetchone()
     if row is None:

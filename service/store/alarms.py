@@ -1,6 +1,5 @@
-"""Alarms in SQLite: what each is now, and every event there ever was, numbered without a hole."""
+"""Alarms: what each is now, and every event there ever was, numbered without a hole."""
 
-import sqlite3
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -16,6 +15,7 @@ from core.alarms.alarm import (
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from service.audit.entry import Deed
 from service.store.audit_deeds import alarm_deeds
+from service.store.database import Connection
 from service.store.outbox import insert_letters
 from service.store.outbox_port import Address, nobody
 from service.store.port import AlarmQuery, StoredEvent, StoreError
@@ -26,11 +26,11 @@ ALARM_COLUMNS = (
     " shelf_actor, shelf_reason, shelf_since_ns, shelf_until_ns,"
     " outage_actor, outage_reason, outage_since_ns"
 )
-N_ALARM_COLUMNS = len(ALARM_COLUMNS.split(","))
+ALARM_COLUMN = ALARM_COLUMNS.split(", ")
 UPSERT = (
-    f"INSERT OR REPLACE INTO alarm ({ALARM_COLUMNS})"  # noqa: S608
-    f" SELECT {', '.join(f'?{n + 1}' for n in range(N_ALARM_COLUMNS))}"
-    " WHERE NOT EXISTS (SELECT 1 FROM alarm WHERE id = ?1 AND n_events > ?9)"
+    f"INSERT INTO alarm ({ALARM_COLUMNS}) VALUES ({', '.join('?' * len(ALARM_COLUMN))})"  # noqa: S608
+    f" ON CONFLICT (id) DO UPDATE SET {', '.join(f'{c} = excluded.{c}' for c in ALARM_COLUMN)}"
+    " WHERE alarm.n_events <= excluded.n_events"
 )
 """What is written twice, as after an interrupted write, never overwrites what came later."""
 
@@ -45,18 +45,18 @@ INSERT_EVENT = (
 SELECT_EVENTS = f"""
     SELECT id, {EVENT_COLUMNS} FROM alarm_event
     WHERE id < :before
-    AND (:alarm IS NULL OR alarm = :alarm)
-    AND (:unit IS NULL OR unit = :unit)
-    AND (:kind IS NULL OR kind = :kind)
+    AND (CAST(:alarm AS TEXT) IS NULL OR alarm = :alarm)
+    AND (CAST(:unit AS TEXT) IS NULL OR unit = :unit)
+    AND (CAST(:kind AS TEXT) IS NULL OR kind = :kind)
     AND time_ns >= :start_ns AND time_ns < :end_ns
     ORDER BY id DESC LIMIT :limit
 """  # noqa: S608
 
 
 def insert_alarms(
-    writer: sqlite3.Connection,
+    writer: Connection,
     news: Iterable[AlarmNews],
-    tell: Callable[[sqlite3.Connection, Iterable[Deed]], None],
+    tell: Callable[[Connection, Iterable[Deed]], None],
     address: Address = nobody,
 ) -> None:
     """Add events, queue what tells of them, and bring the alarms to what they are after them."""
@@ -68,12 +68,12 @@ def insert_alarms(
         writer.execute(UPSERT, _alarm_row(told.alarm))
 
 
-def select_alarms(reader: sqlite3.Connection) -> list[Alarm]:
+def select_alarms(reader: Connection) -> list[Alarm]:
     """Every alarm that ever had an event, as it was after its newest."""
     return [_alarm(row) for row in reader.execute(f"SELECT {ALARM_COLUMNS} FROM alarm ORDER BY id")]  # noqa: S608
 
 
-def select_events(reader: sqlite3.Connection, query: AlarmQuery) -> list[StoredEvent]:
+def select_events(reader: Connection, query: AlarmQuery) -> list[StoredEvent]:
     """Events, newest first."""
     rows = reader.execute(SELECT_EVENTS, vars(query))
     return [StoredEvent(int(row[0]), _event(row[1:])) for row in rows]
@@ -107,7 +107,7 @@ def _event_row(event: AlarmEvent) -> tuple[object, ...]:
 
 
 def _alarm(row: tuple[Any, ...]) -> Alarm:
-    found = dict(zip(ALARM_COLUMNS.split(", "), row, strict=True))
+    found = dict(zip(ALARM_COLUMN, row, strict=True))
     try:
         return Alarm(
             identity=_identity(found),

@@ -1,34 +1,30 @@
-"""The audit trail in SQLite."""
+"""The audit trail."""
 
-import sqlite3
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from service.audit.entry import AuditEntry, Deed
-from service.audit.head import AuditHead, HeadError, head_path, read_head
+from service.audit.head import AuditHead, HeadError, read_head
 from service.audit.walk import Verdict, place_of, walk
 from service.store.audit_chain import COLUMNS, AuditChain, entry_of, newest_of
 from service.store.audit_port import AuditQuery
-from service.store.port import StoreError
-
-Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
+from service.store.database import Connect, Connection, Reading
 
 SELECT = f"""
     SELECT {COLUMNS} FROM audit
     WHERE number < :before
-    AND (:actor IS NULL OR actor = :actor)
-    AND (:action IS NULL OR action = :action)
-    AND (:object IS NULL OR object = :object)
+    AND (CAST(:actor AS TEXT) IS NULL OR actor = :actor)
+    AND (CAST(:action AS TEXT) IS NULL OR action = :action)
+    AND (CAST(:object AS TEXT) IS NULL OR object = :object)
     AND time_ns >= :start_ns AND time_ns < :end_ns
     ORDER BY number DESC LIMIT :limit
 """  # noqa: S608
-SELECT_ALL = f"SELECT {COLUMNS} FROM audit ORDER BY number"  # noqa: S608
+SELECT_NEXT = f"SELECT {COLUMNS} FROM audit WHERE number > ? ORDER BY number LIMIT ?"  # noqa: S608
+AT_ONCE = 1000
 
-BUSY_TIMEOUT_S = 5.0
 
-
-class SqliteAudit:
+class SqlAudit:
     """The audit trail of one database.
 
     Parameters
@@ -39,7 +35,7 @@ class SqliteAudit:
         Opens a connection that only reads.
     """
 
-    def __init__(self, writing: Connect, reading: Connect, chain: AuditChain) -> None:
+    def __init__(self, writing: Connect, reading: Reading, chain: AuditChain) -> None:
         self._writing, self._reading, self._chain = writing, reading, chain
 
     @property
@@ -60,66 +56,61 @@ class SqliteAudit:
 
     def entries(self, query: AuditQuery) -> list[AuditEntry]:
         """Read entries, newest first."""
-        with self._reading() as reader:
-            reader.text_factory = _readable
+        with self._reading("replace") as reader:
             return [entry_of(row) for row in reader.execute(SELECT, vars(query))]
 
 
-def verify_trail(database: Path) -> Verdict:
-    """Walk the audit trail of a database that may be in use, without changing it.
+class Trail:
+    """The audit trail of a database that may be in use, for those who read no more than that.
 
-    Raises
-    ------
-    StoreError
-        If there is none, or it cannot be read.
+    Parameters
+    ----------
+    reading
+        Opens a look at the database, in which text tells every byte from every other.
+    head
+        File that names the newest entry.
     """
-    head = _head(database)  # first: it may lag, but not lead
-    with _opened(database) as reader:
-        last = newest_of(reader).number
-        return walk(_all(reader), head, lambda entry: place_of(entry, last))
+
+    def __init__(self, reading: Connect, head: Path) -> None:
+        self._reading, self._head = reading, head
+
+    def verify(self) -> Verdict:
+        """Walk all of it, without changing anything.
+
+        Raises
+        ------
+        StoreError
+            If there is none, or it cannot be read.
+        """
+        head = self._read_head()  # first: it may lag, but not lead
+        with self._reading() as reader:
+            last = newest_of(reader).number
+            return walk(_all(reader), head, lambda entry: place_of(entry, last))
+
+    @contextmanager
+    def entries(self) -> Iterator[Iterator[AuditEntry]]:
+        """All of its entries, oldest first.
+
+        Raises
+        ------
+        StoreError
+            If there are none, or they cannot be read.
+        """
+        with self._reading() as reader:
+            yield _all(reader)
+
+    def _read_head(self) -> AuditHead | str:
+        try:
+            return read_head(self._head)
+        except HeadError as error:
+            return str(error)
 
 
-def _head(database: Path) -> AuditHead | str:
-    try:
-        return read_head(head_path(database))
-    except HeadError as error:
-        return str(error)
-
-
-@contextmanager
-def trail(database: Path) -> Iterator[Iterator[AuditEntry]]:
-    """All entries of a database, oldest first, for those who read no more than that.
-
-    Raises
-    ------
-    StoreError
-        If there is none, or it cannot be read.
-    """
-    with _opened(database) as reader:
-        yield _all(reader)
-
-
-def _all(reader: sqlite3.Connection) -> Iterator[AuditEntry]:
-    return map(entry_of, reader.execute(SELECT_ALL))
-
-
-@contextmanager
-def _opened(database: Path) -> Iterator[sqlite3.Connection]:
-    if not database.exists():
-        raise StoreError(f"{database.absolute()}: there is no database")
-    uri = f"{database.absolute().as_uri()}?mode=ro"
-    try:
-        with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader:
-            reader.text_factory = _exact
-            yield reader
-    except (OSError, sqlite3.Error) as error:
-        raise StoreError(f"{database}: {error}") from error
-
-
-def _exact(text: bytes) -> str:
-    """Text that tells every byte from every other, also where it is not UTF-8."""
-    return text.decode("utf-8", "surrogateescape")
-
-
-def _readable(text: bytes) -> str:
-    return text.decode("utf-8", "replace")
+def _all(reader: Connection) -> Iterator[AuditEntry]:
+    """Every entry, some at a time, so that no trail needs more memory than another."""
+    after = -(2**63)
+    while rows := reader.execute(SELECT_NEXT, (after, AT_ONCE)).fetchall():
+        yield from map(entry_of, rows)
+        if rows[-1][0] <= after:  # a damaged index leads in a circle
+            return
+        after = rows[-1][0]

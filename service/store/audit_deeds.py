@@ -1,6 +1,5 @@
 """What is told of changes in the store: alarms, baselines and references."""
 
-import sqlite3
 from collections.abc import Sequence
 from dataclasses import asdict
 
@@ -10,6 +9,7 @@ from service.audit.acting import acting
 from service.audit.entry import Deed, Source
 from service.films.versions import Versions, versions_after
 from service.store.baselines import select_steps
+from service.store.database import Connection
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference
 from service.store.references import select_history
@@ -43,7 +43,7 @@ def alarm_deeds(event: AlarmEvent, told: AlarmNews) -> list[Deed]:
     return [deed]
 
 
-def step_deeds(writer: sqlite3.Connection, steps: Sequence[StoredStep]) -> list[Deed]:
+def step_deeds(writer: Connection, steps: Sequence[StoredStep]) -> list[Deed]:
     """What is about to be done to baselines, and where they stand before and after it."""
     deeds = []
     for place in dict.fromkeys((step.unit, step.bearing) for step in steps):
@@ -58,7 +58,7 @@ def step_deeds(writer: sqlite3.Connection, steps: Sequence[StoredStep]) -> list[
     return deeds
 
 
-def reference_deed(writer: sqlite3.Connection, reference: GapReference) -> Deed:
+def reference_deed(writer: Connection, reference: GapReference) -> Deed:
     """A reference that is about to be set, after the one that rules until then."""
     history = select_history(writer, reference.unit, reference.bearing)
     return Deed(

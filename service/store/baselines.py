@@ -1,12 +1,12 @@
-"""Baselines in SQLite: kept as they were learned, with all that was done to them."""
+"""Baselines: kept as they were learned, with all that was done to them."""
 
-import sqlite3
 from collections.abc import Iterable
 
 from core.baseline.baseline import BearingBaseline
 from core.baseline.exchange import from_json, response_from_json, response_to_json, to_json
 from core.baseline.response import ShaftResponse
 from core.estimators import Estimator
+from service.store.database import Connection
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 from service.store.port import StoreError
 
@@ -27,7 +27,7 @@ SET_RESPONSE = """
 """
 
 
-def insert_baseline(writer: sqlite3.Connection, baseline: BearingBaseline) -> None:
+def insert_baseline(writer: Connection, baseline: BearingBaseline) -> None:
     """Add a baseline to those of its bearing."""
     origin = baseline.origin
     writer.execute(
@@ -40,7 +40,7 @@ def insert_baseline(writer: sqlite3.Connection, baseline: BearingBaseline) -> No
     )
 
 
-def insert_steps(writer: sqlite3.Connection, steps: Iterable[StoredStep]) -> None:
+def insert_steps(writer: Connection, steps: Iterable[StoredStep]) -> None:
     """Add what was done to baselines."""
     writer.executemany(
         INSERT_STEP,
@@ -51,7 +51,7 @@ def insert_steps(writer: sqlite3.Connection, steps: Iterable[StoredStep]) -> Non
     )
 
 
-def select_baselines(reader: sqlite3.Connection, unit: str, bearing: str) -> list[BaselineEntry]:
+def select_baselines(reader: Connection, unit: str, bearing: str) -> list[BaselineEntry]:
     """Every baseline of a bearing, newest first."""
     rows = reader.execute(
         f"SELECT {ENTRY_COLUMNS} FROM baseline"  # noqa: S608
@@ -65,7 +65,7 @@ def select_baselines(reader: sqlite3.Connection, unit: str, bearing: str) -> lis
 
 
 def select_baseline(
-    reader: sqlite3.Connection, unit: str, bearing: str, version: int
+    reader: Connection, unit: str, bearing: str, version: int
 ) -> BearingBaseline | None:
     """One baseline whole.
 
@@ -85,7 +85,7 @@ def select_baseline(
         raise StoreError(f"{name}: {error}") from error
 
 
-def select_steps(reader: sqlite3.Connection, unit: str, bearing: str) -> list[StoredStep]:
+def select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredStep]:
     """What was done to the baselines of a bearing, oldest first."""
     rows = reader.execute(
         f"SELECT {STEP_COLUMNS} FROM baseline_step"  # noqa: S608
@@ -98,14 +98,12 @@ def select_steps(reader: sqlite3.Connection, unit: str, bearing: str) -> list[St
     ]
 
 
-def set_response(
-    writer: sqlite3.Connection, unit: str, response: ShaftResponse, now_ns: int
-) -> None:
+def set_response(writer: Connection, unit: str, response: ShaftResponse, now_ns: int) -> None:
     """Put a unit's response in the place of the one before."""
     writer.execute(SET_RESPONSE, (unit, now_ns, response_to_json(response)))
 
 
-def select_responses(reader: sqlite3.Connection) -> dict[str, ShaftResponse]:
+def select_responses(reader: Connection) -> dict[str, ShaftResponse]:
     """How shafts answer, by unit.
 
     Raises

@@ -1,7 +1,6 @@
 """Readings as bytes: one float64 and one quality byte for each column of a layout."""
 
 import json
-import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,6 +11,7 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.quality import Quality, Reading, Reason
 from core.quantities import Quantity
+from service.store.database import Connection
 
 LEVEL_SHIFT = 6
 """A quality byte is the level in its two top bits and the number of the reason below."""
@@ -81,7 +81,7 @@ def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Qualit
     return np.nan if number is None else number, reading.quality
 
 
-def remember_layout(writer: sqlite3.Connection, layout: Layout) -> int:
+def remember_layout(writer: Connection, layout: Layout) -> int:
     """Number of a layout, given one within a transaction if it has none."""
     key = layout.dumps()
     writer.execute(

@@ -1,8 +1,7 @@
-"""Film readings in SQLite: one row for each reading, one column for each number."""
+"""Film readings: one row for each reading, one column for each number."""
 
 import math
-import sqlite3
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,11 @@ from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_reading import FilmValue
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from service.store.conditions import BETWEEN_BOUNDS, IN_STATES
+from service.store.database import Connection
 from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision
 from service.store.port import StoreError
+from service.store.series import series_of
 
 DECISION = "padwatch-decision"
 
@@ -73,25 +75,21 @@ SELECT = f"""
     SELECT {", ".join(READ_NUMBERS)}, provenance FROM film_reading
     WHERE series = (SELECT id FROM series WHERE unit = :unit AND bearing = :bearing)
     AND estimator = :estimator AND time_ns >= :start_ns AND time_ns < :end_ns
-    AND (:states = '' OR instr(:states, ',' || operating_state || ',') > 0)
-    AND (:eccentricity_low IS NULL OR eccentricity_ratio >= :eccentricity_low)
-    AND (:eccentricity_high IS NULL OR eccentricity_ratio <= :eccentricity_high)
-    AND (:oil_low IS NULL OR oil_temperature_c >= :oil_low)
-    AND (:oil_high IS NULL OR oil_temperature_c <= :oil_high)
+    AND {IN_STATES}
+    AND {BETWEEN_BOUNDS}
     ORDER BY time_ns DESC LIMIT :newest
 """  # noqa: S608
 
 
 def insert_film_news(
-    writer: sqlite3.Connection,
+    writer: Connection,
     news: Iterable[FilmNews],
-    series_of: Callable[[str, str], int],
     provenance: Provenance = Provenance.MEASURED,
 ) -> None:
     """Add readings, and note where their decisions stand."""
     for told in news:
         reading = told.reading
-        series = series_of(reading.unit, reading.bearing)
+        series = series_of(writer, reading.unit, reading.bearing)
         writer.execute(INSERT, _row(series, told, provenance))
         for direction, finding, decision in zip(
             DIRECTIONS, told.findings, told.decisions, strict=True
@@ -134,7 +132,7 @@ def _or_null(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def select_decisions(reader: sqlite3.Connection, unit: str, bearing: str) -> list[StoredDecision]:
+def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
     """Where the decisions of a bearing stood last.
 
     Raises
@@ -162,7 +160,7 @@ def select_decisions(reader: sqlite3.Connection, unit: str, bearing: str) -> lis
         raise StoreError(f"a decision of unit {unit} bearing {bearing}: {error}") from error
 
 
-def select_film_history(reader: sqlite3.Connection, query: FilmQuery) -> FilmHistory:
+def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:
     """Readings of one film, oldest first."""
     rows = reader.execute(SELECT, _arguments(query)).fetchall()[::-1]
     numbers = np.array([row[:-1] for row in rows], dtype=np.float64)
@@ -183,7 +181,7 @@ def _arguments(query: FilmQuery) -> dict[str, Any]:
         "eccentricity_high": query.eccentricity_ratio.high,
         "oil_low": query.oil_temperature_c.low,
         "oil_high": query.oil_temperature_c.high,
-        "newest": -1 if query.newest is None else query.newest,
+        "newest": 2**63 - 1 if query.newest is None else query.newest,
     }
 
 

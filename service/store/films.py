@@ -1,8 +1,6 @@
-"""Films behind the store's interface, in SQLite."""
+"""Films behind the store's interface."""
 
-import sqlite3
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Mapping, Sequence
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
@@ -21,6 +19,7 @@ from service.store.baselines import (
     set_response,
 )
 from service.store.codec import Layout, remember_layout
+from service.store.database import Connect, Connection
 from service.store.film_port import (
     BaselineEntry,
     FilmHistory,
@@ -30,12 +29,11 @@ from service.store.film_port import (
     StoredStep,
 )
 from service.store.film_readings import insert_film_news, select_decisions, select_film_history
+from service.store.series import series_of
 from service.store.simulated_past import insert_past, select_past_end
 
-Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
 
-
-class SqliteFilms:
+class SqlFilms:
     """The film tables of one database.
 
     Parameters
@@ -44,8 +42,6 @@ class SqliteFilms:
         Opens a transaction that is durable when left.
     reading
         Opens a connection that only reads.
-    series_of
-        Number of a unit's bearing, given one within a transaction if it has none.
     audit
         Takes what is done to baselines.
     """
@@ -54,16 +50,14 @@ class SqliteFilms:
         self,
         writing: Connect,
         reading: Connect,
-        series_of: Callable[[str, str], int],
         audit: AuditChain,
     ) -> None:
-        self._writing, self._reading, self._series_of = writing, reading, series_of
-        self._audit = audit
+        self._writing, self._reading, self._audit = writing, reading, audit
 
     def add_simulated(self, readings: Iterable[FilmNews]) -> None:
         """Write readings of a simulation, marked as such."""
         with self._writing() as writer:
-            insert_film_news(writer, readings, self._series_of, Provenance.SIMULATED)
+            insert_film_news(writer, readings, Provenance.SIMULATED)
 
     def add_past(
         self,
@@ -76,7 +70,8 @@ class SqliteFilms:
         """Write a bearing's simulated past: readings of its film, and results for its trends."""
         with self._writing() as writer:
             layout = remember_layout(writer, Layout.of(tuple(values)))
-            insert_past(writer, self._series_of(unit, bearing), layout, estimator, films, values)
+            series = series_of(writer, unit, bearing)
+            insert_past(writer, series, layout, estimator, films, values)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
         """Until when a bearing's past is simulated; None if none of it is."""
@@ -124,7 +119,7 @@ class SqliteFilms:
         with self._writing() as writer:
             self._add_steps(writer, steps)
 
-    def _add_steps(self, writer: sqlite3.Connection, steps: Sequence[StoredStep]) -> None:
+    def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
         self._audit.add(writer, step_deeds(writer, steps))
         insert_steps(writer, steps)
 

@@ -1,9 +1,8 @@
 """The newest stored result of a bearing, with qualities as they were."""
 
-import sqlite3
-
 from core.quality import Level, Quality, Reading, Reason
 from service.store.codec import LEVEL_SHIFT, Layout
+from service.store.database import Connection
 from service.store.port import StoredReadings
 
 SELECT_NEWEST = """
@@ -14,7 +13,7 @@ SELECT_NEWEST = """
 """
 
 
-def select_newest(reader: sqlite3.Connection, unit: str, bearing: str) -> StoredReadings | None:
+def select_newest(reader: Connection, unit: str, bearing: str) -> StoredReadings | None:
     """The readings with the latest time; None if there are none at all."""
     row = reader.execute(SELECT_NEWEST, (unit, bearing)).fetchone()
     if row is None:

@@ -1,14 +1,11 @@
-"""The outbox in SQLite: letters are queued in the transaction that stores what they tell."""
+"""The outbox: letters are queued in the transaction that stores what they tell."""
 
-import sqlite3
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Iterable
 from typing import Any
 
 from core.alarms.event import AlarmEvent
+from service.store.database import Connect, Connection
 from service.store.outbox_port import DEAD, Backlog, Letter, LetterState, StoredLetter
-
-Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
 
 MAX_ANSWER = 500
 """Characters of what a receiver has said that are kept."""
@@ -17,10 +14,10 @@ INSERT = """
     INSERT INTO outbox
     (receiver, event_id, alarm, number, body, queued_ns, is_urgent, is_active)
     SELECT :receiver, :event_id, :alarm, :number, :body, :queued_ns, :is_urgent, :is_active
-    WHERE NOT :closes OR (
+    WHERE :closes = 0 OR (
         SELECT is_active FROM outbox WHERE receiver = :receiver AND alarm = :alarm
         ORDER BY number DESC LIMIT 1
-    )
+    ) = 1
 """
 """What was told last says whether a receiver takes an alarm for active."""
 
@@ -29,7 +26,7 @@ SELECT_WAITING = f"""
     SELECT {COLUMNS} FROM outbox WHERE receiver = ? AND state = 'waiting' ORDER BY id LIMIT ?
 """  # noqa: S608
 SELECT_URGENT = """
-    SELECT EXISTS (SELECT 1 FROM outbox WHERE receiver = ? AND state = 'waiting' AND is_urgent)
+    SELECT EXISTS (SELECT 1 FROM outbox WHERE receiver = ? AND state = 'waiting' AND is_urgent = 1)
 """
 SELECT_LAST = f"""
     SELECT {COLUMNS} FROM outbox WHERE receiver = ? AND state = ? ORDER BY id DESC LIMIT 1
@@ -54,15 +51,13 @@ COUNT = """
 """
 
 
-def insert_letters(
-    writer: sqlite3.Connection, event: AlarmEvent, letters: Iterable[Letter]
-) -> None:
+def insert_letters(writer: Connection, event: AlarmEvent, letters: Iterable[Letter]) -> None:
     """Queue what tells of an event that has just been stored for the first time."""
     of = {"alarm": event.identity.id, "number": event.number}
     writer.executemany(INSERT, [{**vars(letter), **of} for letter in letters])
 
 
-class SqliteOutbox:
+class SqlOutbox:
     """The outbox of a database.
 
     Parameters
@@ -108,12 +103,11 @@ class SqliteOutbox:
     def backlogs(self) -> list[Backlog]:
         """Look at everyone for whom there ever was a letter."""
         with self._read() as reader:
-            reader.execute("BEGIN")  # one look at all of it
             names = reader.execute("SELECT DISTINCT receiver FROM outbox ORDER BY receiver")
             return [_backlog(reader, str(name)) for (name,) in names.fetchall()]
 
 
-def _backlog(reader: sqlite3.Connection, receiver: str) -> Backlog:
+def _backlog(reader: Connection, receiver: str) -> Backlog:
     n_waiting, oldest_ns = reader.execute(COUNT, (receiver, LetterState.WAITING.value)).fetchone()
     dead = [reader.execute(COUNT, (receiver, state.value)).fetchone()[0] for state in DEAD]
     ends = [_last(reader, receiver, state) for state in DEAD]
@@ -128,7 +122,7 @@ def _backlog(reader: sqlite3.Connection, receiver: str) -> Backlog:
     )
 
 
-def _last(reader: sqlite3.Connection, receiver: str, state: LetterState) -> StoredLetter | None:
+def _last(reader: Connection, receiver: str, state: LetterState) -> StoredLetter | None:
     row = reader.execute(SELECT_LAST, (receiver, state.value)).fetchone()
     return _letter(row) if row else None
 

@@ -1,7 +1,6 @@
-"""References in SQLite: rows are added and never changed, the newest of a bearing rules."""
+"""References: rows are added and never changed, the newest of a bearing rules."""
 
-import sqlite3
-
+from service.store.database import Connection
 from service.store.gap_reference import GapReference, MicrometrePair, ReferenceSource
 from service.store.port import StoreError
 
@@ -23,7 +22,7 @@ HISTORY = (
 Row = tuple[str, str, int, str, float, float, float | None, float | None, str, str]
 
 
-def insert_reference(writer: sqlite3.Connection, reference: GapReference) -> None:
+def insert_reference(writer: Connection, reference: GapReference) -> None:
     """Add a reference to its bearing's history."""
     opposite = reference.opposite_reference_um or (None, None)
     writer.execute(
@@ -41,12 +40,12 @@ def insert_reference(writer: sqlite3.Connection, reference: GapReference) -> Non
     )
 
 
-def select_in_force(reader: sqlite3.Connection) -> list[GapReference]:
+def select_in_force(reader: Connection) -> list[GapReference]:
     """The newest reference of every bearing that has one."""
     return [_reference(row) for row in reader.execute(IN_FORCE)]
 
 
-def select_history(reader: sqlite3.Connection, unit: str, bearing: str) -> list[GapReference]:
+def select_history(reader: Connection, unit: str, bearing: str) -> list[GapReference]:
     """The references of one bearing, newest first."""
     return [_reference(row) for row in reader.execute(HISTORY, (unit, bearing, MAX_HISTORY))]
 

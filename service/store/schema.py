@@ -1,19 +1,19 @@
-"""The SQLite schema and its migrations: numbered, atomic, never edited once released."""
+"""The schema and its migrations: numbered, atomic, never edited once released.
 
-import sqlite3
+They are written as SQLite takes them. PostgreSQL gets the same ones, translated by
+:mod:`service.store.postgres.dialect`, which knows column types, ``STRICT``, ``WITHOUT ROWID`` and
+triggers; one that it cannot translate is written for PostgreSQL beside it, in
+:mod:`service.store.postgres.schema`. So whoever adds a migration appends it here, and runs the
+tests of the store, which go over both.
+"""
 
-from service.origin import Origin
 from service.store.access_schema import ACCESS_TABLES
 from service.store.audit_schema import AUDIT_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
-from service.store.port import StoreError
 from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.vector_references import VECTOR_REFERENCE_TABLES
-
-APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
-"""Mark the file as padwatch's, and as what it is (``PRAGMA application_id``)."""
 
 MIGRATIONS = (
     """
@@ -138,52 +138,4 @@ MIGRATIONS = (
     SPECTRA_TABLES,
     ROLLUP_TABLES,
 )
-"""Statement lists; the n-th leads from schema n to schema n + 1 (``PRAGMA user_version``)."""
-
-
-def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.LIVE) -> None:
-    """Bring a database to the newest schema, one transaction a step.
-
-    Raises
-    ------
-    StoreError
-        If the file belongs to another program, to a newer padwatch, or to the other origin.
-    """
-    connection.execute("BEGIN")  # one look at all three: another process may be upgrading
-    n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
-    version = int(connection.execute("PRAGMA user_version").fetchone()[0])
-    application = int(connection.execute("PRAGMA application_id").fetchone()[0])
-    connection.execute("COMMIT")
-    _require_origin(application, name, origin)
-    if application not in (0, APPLICATION_IDS[origin]) or (application == 0 and n_tables > 0):
-        raise StoreError(f"{name} is not a padwatch database; choose another data folder")
-    if version > len(MIGRATIONS):
-        raise StoreError(
-            f"{name} has schema {version}, this padwatch knows up to {len(MIGRATIONS)};"
-            " run the padwatch that wrote it, or restore a backup"
-        )
-    for number in range(version, len(MIGRATIONS)):
-        _step(connection, number, APPLICATION_IDS[origin])
-
-
-def _require_origin(application: int, name: str, origin: Origin) -> None:
-    for other, application_id in APPLICATION_IDS.items():
-        if other is not origin and application == application_id:
-            raise StoreError(
-                f"{name} holds {other} results and is not opened for {origin} ones;"
-                " choose another data folder"
-            )
-
-
-def _step(connection: sqlite3.Connection, number: int, application_id: int) -> None:
-    """Lead from one schema to the next, unless another process has done so meanwhile."""
-    try:
-        connection.executescript(
-            f"BEGIN IMMEDIATE; PRAGMA application_id = {application_id};"
-            f"{MIGRATIONS[number]} PRAGMA user_version = {number + 1}; COMMIT;"
-        )
-    except sqlite3.Error:
-        if connection.in_transaction:
-            connection.execute("ROLLBACK")
-        if int(connection.execute("PRAGMA user_version").fetchone()[0]) <= number:
-            raise
+"""Statement lists; the n-th leads from schema n to schema n + 1."""

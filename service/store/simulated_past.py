@@ -1,6 +1,5 @@
-"""A simulated past in SQLite: readings without samples, marked as such, in whole columns."""
+"""A simulated past: readings without samples, marked as such, in whole columns."""
 
-import sqlite3
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +12,7 @@ from core.quality import GOOD, Reason, bad
 from core.speed import SpeedSource
 from core.stiffness_history import DIRECTIONS, Evidence
 from service.store.codec import LEVEL_SHIFT
+from service.store.database import Connection
 from service.store.film_port import FilmHistory, Provenance
 from service.store.film_readings import COLUMNS, CONDITION_COLUMNS, INSERT
 
@@ -25,12 +25,15 @@ INSERT_RESULT = """
 MARK = """
     INSERT INTO simulated_past VALUES (:series, :start_ns, :end_ns)
     ON CONFLICT (series) DO UPDATE SET
-    start_ns = min(start_ns, excluded.start_ns), end_ns = max(end_ns, excluded.end_ns)
+    start_ns = CASE WHEN excluded.start_ns < simulated_past.start_ns
+        THEN excluded.start_ns ELSE simulated_past.start_ns END,
+    end_ns = CASE WHEN excluded.end_ns > simulated_past.end_ns
+        THEN excluded.end_ns ELSE simulated_past.end_ns END
 """
 
 
 def insert_past(
-    writer: sqlite3.Connection,
+    writer: Connection,
     series: int,
     layout: int,
     estimator: Estimator,
@@ -53,7 +56,7 @@ def insert_past(
     writer.execute(MARK, span)
 
 
-def select_past_end(reader: sqlite3.Connection, unit: str, bearing: str) -> int | None:
+def select_past_end(reader: Connection, unit: str, bearing: str) -> int | None:
     """Until when a bearing's past is simulated; None if none of it is."""
     row = reader.execute(
         "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"

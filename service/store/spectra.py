@@ -1,8 +1,6 @@
-"""Spectra over time in SQLite: one row for each stretch of time, in two densities."""
+"""Spectra over time: one row for each stretch of time, in two densities."""
 
-import sqlite3
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +9,8 @@ from core.arrays import FloatArray
 from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
 from core.quality import Level, Quality, Reason, worst
+from service.store.database import Connect, Connection
+from service.store.series import series_of
 from service.store.spectra_codec import checksum, decode, encode
 from service.store.spectra_port import (
     N_CHANNELS,
@@ -36,8 +36,9 @@ INSERT = f"""
 """  # noqa: S608
 IS_TAKEN = "SELECT 1 FROM spectrum WHERE series = ? AND tier = ? AND slot = ?"
 TRIM = """
-    DELETE FROM spectrum WHERE id IN (
-        SELECT id FROM spectrum WHERE series = ? AND tier = ? ORDER BY id DESC LIMIT -1 OFFSET ?
+    DELETE FROM spectrum WHERE series = :series AND tier = :tier AND id <= (
+        SELECT id FROM spectrum WHERE series = :series AND tier = :tier
+        ORDER BY id DESC LIMIT 1 OFFSET :n_kept
     )
 """
 """By the order of writing: a device whose clock was wrong for a while drives nothing out."""
@@ -56,26 +57,23 @@ JUDGED = tuple(
     f"order1_{place}_{axis}_um_pk" for place in ("shaft", "bearing") for axis in ("x", "y")
 )
 
-Read = Callable[[], AbstractContextManager[sqlite3.Connection]]
-
 
 def insert_spectra(
-    writer: sqlite3.Connection,
+    writer: Connection,
     assessments: Iterable[Assessment],
-    series_of: Callable[[str, str], int],
     limits: SpectraLimits,
 ) -> None:
     """Keep the first spectrum of each stretch of time; within the writer's transaction."""
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():
-            series = series_of(assessment.unit, assessment.bearing)
+            series = series_of(writer, assessment.unit, assessment.bearing)
             for tier, its in limits.tiers:
                 _insert(writer, assessment, series, (tier, its), limits.n_most_lines)
 
 
 def _insert(
-    writer: sqlite3.Connection,
+    writer: Connection,
     assessment: Assessment,
     series: int,
     kept: tuple[Tier, TierLimits],
@@ -89,7 +87,7 @@ def _insert(
     amplitudes = encode(_amplitudes(assessment)[:, :n_most_lines])
     sealed = (*facts, amplitudes, checksum(facts, amplitudes))
     writer.execute(INSERT, (int(tier), slot, *sealed))
-    writer.execute(TRIM, (series, int(tier), limits.n_most))
+    writer.execute(TRIM, {"series": series, "tier": int(tier), "n_kept": limits.n_most})
 
 
 def _amplitudes(assessment: Assessment) -> FloatArray:
@@ -124,7 +122,7 @@ def _number(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 
-class SqliteSpectra:
+class SqlSpectra:
     """The spectra of one database.
 
     Parameters
@@ -133,7 +131,7 @@ class SqliteSpectra:
         Opens a connection for one short read.
     """
 
-    def __init__(self, read: Read) -> None:
+    def __init__(self, read: Connect) -> None:
         self._read = read
 
     def read(self, query: SpectraQuery) -> Spectra:

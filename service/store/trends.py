@@ -1,12 +1,13 @@
 """Single readings out of the rows of assessments."""
 
-import sqlite3
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from core.quality import Level
 from service.store.codec import Layout
+from service.store.conditions import BETWEEN_BOUNDS, IN_STATES
+from service.store.database import Connection
 from service.store.port import QueryTooLargeError, TrendQuery
 from service.store.summaries import Summaries
 
@@ -16,17 +17,14 @@ MAX_ROWS = 1_000_000
 ROWS_AT_ONCE = 4000
 """Whole rows in memory; of the others only the columns asked for."""
 
-SELECT_ROWS = """
+SELECT_ROWS = f"""
     SELECT time_ns, layout, reading_values, reading_qualities FROM assessment
     WHERE series = (SELECT id FROM series WHERE unit = :unit AND bearing = :bearing)
     AND time_ns >= :start_ns AND time_ns < :end_ns
-    AND (:eccentricity_low IS NULL OR eccentricity_ratio >= :eccentricity_low)
-    AND (:eccentricity_high IS NULL OR eccentricity_ratio <= :eccentricity_high)
-    AND (:oil_low IS NULL OR oil_temperature_c >= :oil_low)
-    AND (:oil_high IS NULL OR oil_temperature_c <= :oil_high)
-    AND (:states = '' OR instr(:states, ',' || operating_state || ',') > 0)
+    AND {BETWEEN_BOUNDS}
+    AND {IN_STATES}
     ORDER BY time_ns LIMIT :most
-"""
+"""  # noqa: S608
 
 Span = tuple[int, int]
 """From the first time, up to but not including the second, ns."""
@@ -35,14 +33,14 @@ Row = tuple[int, int, bytes, bytes]
 """Time, layout, values and qualities of a reading."""
 
 
-def select_page(reader: sqlite3.Connection, query: TrendQuery) -> Summaries:
+def select_page(reader: Connection, query: TrendQuery) -> Summaries:
     """The first readings of one bearing, oldest first, and one more than a page holds."""
     rows = reader.execute(SELECT_ROWS, arguments(query) | {"most": query.max_points + 1})
     return decoded_rows(rows.fetchall(), select_layouts(reader), query.quantities)
 
 
 def select_readings(
-    reader: sqlite3.Connection, query: TrendQuery, spans: Iterable[Span], width_ns: int
+    reader: Connection, query: TrendQuery, spans: Iterable[Span], width_ns: int
 ) -> tuple[int, Summaries]:
     """How many readings of one bearing there are in some spans of time, and they, oldest first.
 
@@ -67,18 +65,18 @@ def select_readings(
     return n_readings, Summaries.together([*summed, *single])
 
 
-def _chunks(
-    reader: sqlite3.Connection, query: TrendQuery, spans: Iterable[Span]
-) -> Iterator[list[Row]]:
+def _chunks(reader: Connection, query: TrendQuery, spans: Iterable[Span]) -> Iterator[list[Row]]:
     left = MAX_ROWS
     for start_ns, end_ns in spans:
-        asked = {"start_ns": storable(start_ns), "end_ns": storable(end_ns), "most": left + 1}
-        found = reader.execute(SELECT_ROWS, arguments(query) | asked)
-        while rows := found.fetchmany(ROWS_AT_ONCE):
+        asked = arguments(query) | {"start_ns": storable(start_ns), "end_ns": storable(end_ns)}
+        while rows := reader.execute(SELECT_ROWS, asked | {"most": ROWS_AT_ONCE}).fetchall():
             left -= len(rows)
             if left < 0:
                 raise too_large()
             yield rows
+            if len(rows) < ROWS_AT_ONCE:
+                break
+            asked["start_ns"] = rows[-1][0] + 1
 
 
 def too_large() -> QueryTooLargeError:
@@ -89,7 +87,7 @@ def too_large() -> QueryTooLargeError:
     )
 
 
-def select_layouts(reader: sqlite3.Connection) -> dict[int, Layout]:
+def select_layouts(reader: Connection) -> dict[int, Layout]:
     """Every layout by its number."""
     return {
         id_: Layout.loads(quantities, reasons)

@@ -1,14 +1,12 @@
-"""Reference vectors of 1× in SQLite: rows are added and never changed, the newest rules."""
+"""Reference vectors of 1×: rows are added and never changed, the newest rules."""
 
 import json
-import sqlite3
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import vector_deed
+from service.store.database import Connect
 from service.store.port import StoreError
 from service.store.vector_reference_port import SetVectorReference
 
@@ -51,13 +49,13 @@ HISTORY = (
 Row = tuple[str, str, int, int, str, str, str]
 
 
-class SqliteVectorReferences:
+class SqlVectorReferences:
     """Reference vectors in the database of a store."""
 
     def __init__(
         self,
-        writing: Callable[[], AbstractContextManager[sqlite3.Connection]],
-        reading: Callable[[], AbstractContextManager[sqlite3.Connection]],
+        writing: Connect,
+        reading: Connect,
         audit: AuditChain,
     ) -> None:
         self._writing, self._reading, self._audit = writing, reading, audit

@@ -15,7 +15,7 @@ from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
 from harness.tape import Acknowledged, Step, python, record
 
-from service.store.audit import verify_trail
+from service.store.sqlite.trail import verify_trail
 from service.store.sqlite import SqliteStore
 
 N_DEEDS = 240

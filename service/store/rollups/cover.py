@@ -1,12 +1,12 @@
 """A range of time covered with as few roll-ups as will do, and single readings for the rest."""
 
-import sqlite3
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
+from service.store.database import Connection
 from service.store.port import TrendQuery
 from service.store.rollups.cells import Cells, Conditions
 from service.store.rollups.rolling import select_mark
@@ -50,7 +50,7 @@ class Cover:
 
 
 def covered(
-    reader: sqlite3.Connection,
+    reader: Connection,
     query: TrendQuery,
     whole: Span,
     widths_ns: Sequence[int],
@@ -79,9 +79,7 @@ def covered(
 
 
 class _Covering:
-    def __init__(
-        self, reader: sqlite3.Connection, query: TrendQuery, series: int, bucket_ns: int
-    ) -> None:
+    def __init__(self, reader: Connection, query: TrendQuery, series: int, bucket_ns: int) -> None:
         self._reader, self._series, self._bucket_ns = reader, series, bucket_ns
         self._names = query.quantities
         self._mark_ns = select_mark(reader, series)

@@ -1,10 +1,7 @@
 """Trends out of roll-ups and rows: as buckets, or as single readings where they are few."""
 
-import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from service.store.buckets import bucket_width_ns, bucketed, page, single_points
+from service.store.database import Connection
 from service.store.port import Trend, TrendQuery
 from service.store.rollups.cover import Cover, covered
 from service.store.rollups.widths import WIDTHS_NS
@@ -12,7 +9,7 @@ from service.store.summaries import Summaries
 from service.store.trends import Span, select_page, select_readings, storable
 
 
-def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
+def read_trend(reader: Connection, query: TrendQuery) -> Trend:
     """Read trends of one bearing, gathered into buckets if they are many.
 
     Raises
@@ -24,11 +21,10 @@ def read_trend(reader: sqlite3.Connection, query: TrendQuery) -> Trend:
         return page(select_page(reader, query), query.max_points, query.hole_ns)
     whole = (storable(query.start_ns), storable(query.end_ns))
     width_ns = bucket_width_ns(*whole, query.max_points)
-    with _one_state(reader):
-        return _read(reader, query, whole, width_ns)
+    return _read(reader, query, whole, width_ns)
 
 
-def _read(reader: sqlite3.Connection, query: TrendQuery, whole: Span, width_ns: int) -> Trend:
+def _read(reader: Connection, query: TrendQuery, whole: Span, width_ns: int) -> Trend:
     fitting_ns = [width for width in WIDTHS_NS if width_ns % width == 0]
     cover = covered(reader, query, whole, fitting_ns, width_ns)
     n_single, singles = select_readings(reader, query, cover.spans, width_ns)
@@ -37,17 +33,6 @@ def _read(reader: sqlite3.Connection, query: TrendQuery, whole: Span, width_ns: 
     if cover.n_rolled:
         _, singles = select_readings(reader, query, _all_spans(cover), width_ns)
     return single_points(singles, query.hole_ns)
-
-
-@contextmanager
-def _one_state(reader: sqlite3.Connection) -> Iterator[None]:
-    """Read all from one state of the database, whatever is written meanwhile."""
-    reader.execute("BEGIN")
-    try:
-        yield
-    finally:
-        if reader.in_transaction:  # some errors have ended it already
-            reader.execute("ROLLBACK")
 
 
 def _all_spans(cover: Cover) -> list[Span]:

@@ -1,12 +1,12 @@
 """Gathering readings into roll-ups, a bounded number at a time, within one transaction."""
 
-import sqlite3
 from itertools import pairwise
 
 import numpy as np
 
 from core.quantities import CATALOGUE
 from service.store.codec import Layout, columns_of, remember_layout
+from service.store.database import Connection
 from service.store.rollups.cells import NO_STATE, Cells, Conditions
 from service.store.rollups.codec import encoded, parts_of
 from service.store.rollups.rows import select_cells
@@ -38,7 +38,7 @@ SET_MARK = """
 """
 
 
-def gather_next(writer: sqlite3.Connection, series: int, now_ns: int) -> None:
+def gather_next(writer: Connection, series: int, now_ns: int) -> None:
     """Gather what has come since the mark, as far as its minutes are over, and set the mark."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
@@ -47,7 +47,7 @@ def gather_next(writer: sqlite3.Connection, series: int, now_ns: int) -> None:
         writer.execute(SET_MARK, (series, until_ns))
 
 
-def gather_anew(writer: sqlite3.Connection, series: int) -> None:
+def gather_anew(writer: Connection, series: int) -> None:
     """Gather the hours again that have got readings since they were gathered."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
@@ -63,7 +63,7 @@ def gather_anew(writer: sqlite3.Connection, series: int) -> None:
         )
 
 
-def select_mark(reader: sqlite3.Connection, series: int) -> int:
+def select_mark(reader: Connection, series: int) -> int:
     """Up to when the readings of a bearing have been gathered; 0 if none have."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
@@ -71,7 +71,7 @@ def select_mark(reader: sqlite3.Connection, series: int) -> int:
     return 0 if found is None else int(found[0])
 
 
-def _until(writer: sqlite3.Connection, series: int, mark_ns: int, now_ns: int) -> int:
+def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
     """Up to when to gather now: whole minutes, after which there is a reading already."""
     end_ns = now_ns + 1
     times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
@@ -82,7 +82,7 @@ def _until(writer: sqlite3.Connection, series: int, mark_ns: int, now_ns: int) -
     return first_ns + MINUTE_NS if is_one_minute else max(mark_ns, last_ns)
 
 
-def _gather(writer: sqlite3.Connection, series: int, span: Span) -> None:
+def _gather(writer: Connection, series: int, span: Span) -> None:
     """Fill the spans of every width that end within a span of time."""
     minutes = _minutes(writer, series, span)
     if minutes is not None:
@@ -94,7 +94,7 @@ def _gather(writer: sqlite3.Connection, series: int, span: Span) -> None:
             insert_cells(writer, series, width_ns, cells.gathered(width_ns))
 
 
-def _minutes(writer: sqlite3.Connection, series: int, span: Span) -> Cells | None:
+def _minutes(writer: Connection, series: int, span: Span) -> Cells | None:
     rows = writer.execute(SELECT_WHOLE, (series, *span)).fetchall()
     if not rows:
         return None
@@ -104,7 +104,7 @@ def _minutes(writer: sqlite3.Connection, series: int, span: Span) -> Cells | Non
     return Cells(Conditions.of(state, eccentricity, oil_c), summaries).gathered(MINUTE_NS)
 
 
-def insert_cells(writer: sqlite3.Connection, series: int, width_ns: int, cells: Cells) -> None:
+def insert_cells(writer: Connection, series: int, width_ns: int, cells: Cells) -> None:
     """Write roll-ups of one width, within a transaction."""
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
@@ -133,7 +133,7 @@ def _cell_rows(
     return [(series, width_s, *row) for row in zip(*columns, strict=True)]
 
 
-def _forget(writer: sqlite3.Connection, series: int, span: Span) -> None:
+def _forget(writer: Connection, series: int, span: Span) -> None:
     layouts = [row[0] for row in writer.execute("SELECT id FROM layout").fetchall()]
     for width_ns in WIDTHS_NS:
         its = (series, width_ns // NS_PER_S)

@@ -1,6 +1,5 @@
 """Roll-ups out of their tables: which cells there are in a span of time, and their numbers."""
 
-import sqlite3
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -8,6 +7,8 @@ import numpy.typing as npt
 
 from core.quality import Level
 from service.store.codec import Layout
+from service.store.conditions import IN_STATES, at_least, at_most
+from service.store.database import Connection
 from service.store.rollups.cells import NO_STATE, Cells, Conditions
 from service.store.rollups.codec import decoded
 from service.store.rollups.widths import NS_PER_S
@@ -22,14 +23,14 @@ ANYTHING: Mapping[str, object] = {
     "states": "",
 }
 
-OVERLAPPING = """
+OVERLAPPING = f"""
     cell.series = :series AND cell.width_s = :width_s
     AND cell.start_ns >= :start_ns AND cell.start_ns < :end_ns
-    AND (:states = '' OR instr(:states, ',' || cell.operating_state || ',') > 0)
-    AND (:eccentricity_low IS NULL OR cell.eccentricity_high >= :eccentricity_low)
-    AND (:eccentricity_high IS NULL OR cell.eccentricity_low <= :eccentricity_high)
-    AND (:oil_low IS NULL OR cell.oil_high_c >= :oil_low)
-    AND (:oil_high IS NULL OR cell.oil_low_c <= :oil_high)
+    AND {IN_STATES}
+    AND {at_least("cell.eccentricity_high", "eccentricity_low")}
+    AND {at_most("cell.eccentricity_low", "eccentricity_high")}
+    AND {at_least("cell.oil_high_c", "oil_low")}
+    AND {at_most("cell.oil_low_c", "oil_high")}
 """
 SELECT_CELLS = f"""
     SELECT start_ns, slot, operating_state, n_readings,
@@ -53,7 +54,7 @@ MOST_SLOTS = 1 << 20
 
 
 def select_cells(
-    reader: sqlite3.Connection,
+    reader: Connection,
     series: int,
     width_ns: int,
     span: Span,

@@ -11,7 +11,7 @@ import pytest
 
 from service.audit.entry import Deed
 from service.audit.head import head_path
-from service.store.audit import verify_trail
+from service.store.sqlite.trail import verify_trail
 from service.store.audit_chain import COLUMNS
 from service.store.sqlite import SqliteStore
 

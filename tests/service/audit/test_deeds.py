@@ -18,7 +18,7 @@ from core.condition.operating_state import OperatingState
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import AuditEntry, Source
 from service.audit.life import Release, start_deeds, stop_deed
-from service.store.audit import verify_trail
+from service.store.sqlite.trail import verify_trail
 from service.store.audit_port import AuditQuery
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference, ReferenceSource

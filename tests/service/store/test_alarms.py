@@ -159,7 +159,9 @@ def test_no_event_is_ever_changed_or_taken_away(
 
 
 def test_a_database_from_before_alarms_is_brought_up_to_date(path: Path) -> None:
-    from service.store.schema import APPLICATION_IDS, MIGRATIONS, Origin
+    from service.origin import Origin
+    from service.store.schema import MIGRATIONS
+    from service.store.sqlite.migrating import APPLICATION_IDS
 
     path.parent.mkdir(parents=True)
     connection = sqlite3.connect(path)

@@ -3,9 +3,9 @@
 import pytest
 
 from service.asker import ASKER, Asker
-from service.store import readers, sqlite
+from service.store import sql_store
 from service.store.port import QueryTooLargeError, StoreError
-from service.store.sqlite import SqliteStore
+from service.store.sqlite import SqliteStore, readers
 
 
 def test_a_read_ends_when_its_asker_has_gone(store: SqliteStore, query, monkeypatch) -> None:
@@ -25,7 +25,7 @@ def test_a_read_ends_when_its_asker_has_gone(store: SqliteStore, query, monkeypa
 
 
 def test_more_gaps_than_anybody_reads_are_refused(store: SqliteStore, gap, monkeypatch) -> None:
-    monkeypatch.setattr(sqlite, "MAX_GAPS", 2)
+    monkeypatch.setattr(sql_store, "MAX_GAPS", 2)
     store.append([], [gap(stop_ns, first_index=stop_ns) for stop_ns in (1, 2, 3)])
 
     assert len(store.gaps("U1", 0, 3)) == 2

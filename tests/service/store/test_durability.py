@@ -16,8 +16,9 @@ from core.assessment import Assessment
 from service.origin import Origin
 from service.store import schema
 from service.store.port import StoreError, TrendQuery, UnitGap
-from service.store.schema import APPLICATION_IDS, MIGRATIONS
+from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.migrating import APPLICATION_IDS
 
 Build = Callable[..., Assessment]
 BuildGap = Callable[..., UnitGap]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from core.assessment import Assessment
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
 from core.quantities import CATALOGUE
-from service.store import sqlite, trends
+from service.store import sql_store, trends
 from service.store.codec import Layout
 from service.store.port import QueryTooLargeError, StoreError, TrendQuery, UnitGap
 from service.store.sqlite import SqliteStore
@@ -178,7 +178,7 @@ def test_a_quantity_that_an_older_padwatch_did_not_know_is_null_there(
 ) -> None:
     older = tuple(q for q in reversed(CATALOGUE) if q.name != "vortex_coherence_xx")
     with monkeypatch.context() as at_that_time:
-        at_that_time.setattr(sqlite, "CATALOGUE", older)
+        at_that_time.setattr(sql_store, "CATALOGUE", older)
         old = SqliteStore(path)  # type: ignore[arg-type]
         old.append([assessment(at(0), speed_rpm=92.3, vortex_coherence_xx=0.5)], [])
         old.close()

@@ -11,7 +11,7 @@ import pytest
 
 from core.assessment import Assessment
 from core.quality import Reading, Reason, missing, uncertain
-from service.store import schema, sqlite
+from service.store import schema, sql_store
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -183,15 +183,15 @@ def test_the_newest_readings_come_with_their_qualities(
     assert newest.readings["gap_x_um"] == doubtful
     assert newest.readings["gap_y_um"] == Reading(2003.1)
     assert newest.readings["speed_rpm"] == missing(Reason.NOT_MEASURED)
-    assert set(newest.readings) == {quantity.name for quantity in sqlite.CATALOGUE}
+    assert set(newest.readings) == {quantity.name for quantity in sql_store.CATALOGUE}
     assert store.newest("U2", "UJB") is None
 
 
 def test_only_the_newest_thousand_of_a_history_are_handed_out(store: SqliteStore) -> None:
-    with store._transaction():
-        store._writer.executemany(
-            "INSERT INTO gap_reference"
-            " VALUES (NULL,'U1','UJB',?,'A. Name',2000.0,2000.0,NULL,NULL,'given','')",
+    with store._writing() as writer:
+        writer.executemany(
+            "INSERT INTO gap_reference (unit, bearing, set_ns, author, x_um, y_um, source, note)"
+            " VALUES ('U1','UJB',?,'A. Name',2000.0,2000.0,'given','')",
             [(T0 + n,) for n in range(1001)],
         )
 

@@ -21,6 +21,7 @@ from service.store.rollups import cover, rolling
 from service.store.rollups.cells import bins
 from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.migrating import migrate
 from service.store.value_range import ValueRange
 
 Build = Callable[..., Assessment]
@@ -347,7 +348,7 @@ def test_a_database_from_before_roll_ups_is_gathered_after_its_upgrade(
     with closing(sqlite3.connect(path_of("old"), isolation_level=None)) as old:
         with monkeypatch.context() as at_that_time:
             at_that_time.setattr(schema, "MIGRATIONS", before)
-            schema.migrate(old, "old")
+            migrate(old, "old")
         old.execute("ATTACH ? AS other", (str(path_of("plain")),))
         for table in ("layout", "series", "assessment"):
             old.execute(f"INSERT INTO {table} SELECT * FROM other.{table}")  # noqa: S608

@@ -24,6 +24,7 @@ from service.store.spectra_codec import HIGHEST_UM, LOWEST_UM, decode, encode
 from service.store.spectra_port import Spectra, SpectraLimits, SpectraQuery, Tier, TierLimits
 from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.migrating import migrate
 
 S = 1_000_000_000
 T0 = 1_767_225_600 * S
@@ -233,7 +234,7 @@ def test_an_older_database_gets_its_table_of_spectra(
     path.parent.mkdir()
     with monkeypatch.context() as earlier, closing(sqlite3.connect(path)) as connection:
         earlier.setattr(schema, "MIGRATIONS", before)
-        schema.migrate(connection, str(path))
+        migrate(connection, str(path))
 
     with closing(SqliteStore(path)) as store:
         store.append([found(0.0)], [])

@@ -4,7 +4,8 @@ import sqlite3
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from service.store.schema import MIGRATIONS, migrate
+from service.store.schema import MIGRATIONS
+from service.store.sqlite.migrating import migrate
 
 
 def test_both_find_the_newest_schema(tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ class Readers:
             asker = ASKER.get()
             if asker is not None:
                 reader.set_progress_handler(lambda: asker.has_gone, LOOK_AFTER_STEPS)
+            reader.execute("BEGIN")  # one state of the database until the end
             yield reader
             reader.set_progress_handler(None, 0)
             if reader.in_transaction:

@@ -1,12 +1,7 @@
-"""Roll-ups behind the store's interface, in SQLite."""
+"""Roll-ups behind the store's interface."""
 
-import sqlite3
-from collections.abc import Callable
-from contextlib import AbstractContextManager
-
+from service.store.database import Connect
 from service.store.rollups.rolling import MINUTE_NS, gather_anew, gather_next
-
-Connect = Callable[[], AbstractContextManager[sqlite3.Connection]]
 
 DUE = """
     SELECT id FROM (
@@ -15,14 +10,14 @@ DUE = """
             ORDER BY time_ns DESC LIMIT 1
         ) AS newest_ns
         FROM series LEFT JOIN rollup_mark ON rollup_mark.series = id
-    )
+    ) AS bearing
     WHERE newest_ns - newest_ns % :width_ns > until_ns
     OR id IN (SELECT series FROM rollup_redo)
     ORDER BY until_ns
 """
 
 
-class SqliteRollups:
+class SqlRollups:
     """The tables of roll-ups of one database.
 
     Parameters

@@ -1,0 +1,58 @@
+"""Bringing a SQLite file to the newest schema."""
+
+import sqlite3
+
+from service.origin import Origin
+from service.store import schema
+from service.store.port import StoreError
+
+APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
+"""Mark the file as padwatch's, and as what it is (``PRAGMA application_id``)."""
+
+
+def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.LIVE) -> None:
+    """Bring a database to the newest schema, one transaction a step.
+
+    Raises
+    ------
+    StoreError
+        If the file belongs to another program, to a newer padwatch, or to the other origin.
+    """
+    connection.execute("BEGIN")  # one look at all three: another process may be upgrading
+    n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+    version = int(connection.execute("PRAGMA user_version").fetchone()[0])
+    application = int(connection.execute("PRAGMA application_id").fetchone()[0])
+    connection.execute("COMMIT")
+    _require_origin(application, name, origin)
+    if application not in (0, APPLICATION_IDS[origin]) or (application == 0 and n_tables > 0):
+        raise StoreError(f"{name} is not a padwatch database; choose another data folder")
+    if version > len(schema.MIGRATIONS):
+        raise StoreError(
+            f"{name} has schema {version}, this padwatch knows up to {len(schema.MIGRATIONS)};"
+            " run the padwatch that wrote it, or restore a backup"
+        )
+    for number in range(version, len(schema.MIGRATIONS)):
+        _step(connection, number, APPLICATION_IDS[origin])
+
+
+def _require_origin(application: int, name: str, origin: Origin) -> None:
+    for other, application_id in APPLICATION_IDS.items():
+        if other is not origin and application == application_id:
+            raise StoreError(
+                f"{name} holds {other} results and is not opened for {origin} ones;"
+                " choose another data folder"
+            )
+
+
+def _step(connection: sqlite3.Connection, number: int, application_id: int) -> None:
+    """Lead from one schema to the next, unless another process has done so meanwhile."""
+    try:
+        connection.executescript(
+            f"BEGIN IMMEDIATE; PRAGMA application_id = {application_id};"
+            f"{schema.MIGRATIONS[number]} PRAGMA user_version = {number + 1}; COMMIT;"
+        )
+    except sqlite3.Error:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        if int(connection.execute("PRAGMA user_version").fetchone()[0]) <= number:
+            raise

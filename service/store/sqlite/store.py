@@ -1,0 +1,54 @@
+"""The store in a SQLite file."""
+
+from pathlib import Path
+
+from service.audit.head import head_path
+from service.origin import Origin
+from service.store.audit_chain import begin_head
+from service.store.outbox_port import Address, nobody
+from service.store.port import StoreError
+from service.store.spectra_port import SpectraLimits
+from service.store.sql_store import SqlStore
+from service.store.sqlite.database import SqliteDatabase
+
+
+class SqliteStore(SqlStore):
+    """One database file; may be used from several threads, writes are taken one at a time.
+
+    Parameters
+    ----------
+    path
+        Created, with its folder, if it does not exist.
+    origin
+        What it is to hold; a file that holds the other is refused.
+    address
+        Who is to be told of events of alarms.
+    spectra
+        How many spectra are kept.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be opened, is not padwatch's, is damaged, or is newer than this program.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        origin: Origin = Origin.LIVE,
+        address: Address = nobody,
+        spectra: SpectraLimits | None = None,
+    ) -> None:
+        self._path = path
+        database = SqliteDatabase(path, origin)
+        self._writer, self._lock = database.writer, database.lock
+        try:
+            if not database.had_trail:
+                begin_head(head_path(path))
+            super().__init__(database, head_path(path), address, spectra)
+        except OSError as error:
+            database.close()
+            raise StoreError(f"{path}: {error}") from error
+        except BaseException:
+            database.close()
+            raise
