@@ -25,3 +25,9 @@ def times(pytestconfig: pytest.Config) -> Callable[[int], int]:
     """Number of repetitions, of the number that the whole torture takes."""
     whole = bool(pytestconfig.getoption("--torture", False))
     return lambda number: number if whole else max(1, number // N_SHORT)
+
+
+@pytest.fixture(scope="session")
+def is_whole(pytestconfig: pytest.Config) -> bool:
+    """Whether this is the whole torture."""
+    return bool(pytestconfig.getoption("--torture", False))

@@ -1,0 +1,160 @@
+"""What alarms must have told of the exceedances that the truth holds: each once, with a letter."""
+
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from core.alarms.event import AlarmChange, AlarmEvent
+from harness.ledger_daq import Offered
+from harness.ledger_plant import ALERT_UM_PK, DEADBAND_UM, RECEIVER, LedgerPlant
+from harness.lives import ALWAYS, index_of
+from harness.truth import BEARINGS, Spell, Truth
+from service.store.port import AlarmQuery, Store, TrendQuery
+
+if TYPE_CHECKING:
+    from harness.checker import Findings
+
+PAGE = 5000
+Told = tuple[str, AlarmChange, int]
+"""Alarm, what happened to it, when."""
+
+
+def alarm_faults(
+    found: "Findings",
+    plant: LedgerPlant,
+    store: Store,
+    offered: Offered,
+    shown: Collection[tuple[str, int]],
+) -> None:
+    """Add what is wrong with the alarms of a store to what was found."""
+    events = list(_events(store))
+    chains: dict[str, list[AlarmEvent]] = defaultdict(list)
+    for event in events:
+        chains[event.identity.id].append(event)
+    for alarm, chain in chains.items():
+        _check_chain(found, alarm, chain)
+    there = {(event.identity.id, event.number) for event in events}
+    found.lost += [
+        f"event {number} of {alarm}" for alarm, number in shown if (alarm, number) not in there
+    ]
+    for number, unit in enumerate(plant.units, start=1):
+        _check_unit(
+            found, plant, store, offered, unit, Truth(plant.seed, number, plant.rate_hz), chains
+        )
+    _check_letters(found, store, events)
+
+
+def _events(store: Store) -> Iterator[AlarmEvent]:
+    """All, oldest first."""
+    pages, before = [], 2**63 - 1
+    while page := store.alarm_events(AlarmQuery(before=before, limit=PAGE)):
+        pages += page
+        before = page[-1].id
+    return (stored.event for stored in reversed(pages))
+
+
+def _check_chain(found: "Findings", alarm: str, chain: Sequence[AlarmEvent]) -> None:
+    """An alarm goes on where it was, whatever happened to the service in between."""
+    numbers = [event.number for event in chain]
+    if numbers != list(range(1, len(chain) + 1)):
+        found.alarms.append(f"{alarm}: events {numbers}")
+    for before, event in pairwise(chain):
+        if event.state_before != before.state_after:
+            found.alarms.append(f"{alarm}: {before.state_after} became {event.state_before}")
+        if event.change is before.change is AlarmChange.RAISED:
+            found.alarms.append(f"{alarm}: raised twice, {before.time_ns} and {event.time_ns}")
+
+
+def _check_unit(
+    found: "Findings",
+    plant: LedgerPlant,
+    store: Store,
+    offered: Offered,
+    unit: str,
+    truth: Truth,
+    chains: dict[str, list[AlarmEvent]],
+) -> None:
+    spells = list(truth.spells(0, offered.samples[unit, 1]))
+    for number, bearing in enumerate(BEARINGS):
+        mine = [spell for spell in spells if spell.bearing == number]
+        for axis in "xy":
+            values = list(_values(store, unit, bearing, f"order1_shaft_{axis}_um_pk"))
+            alarm = f"{unit}:{bearing}:order1_shaft_{axis}"
+            chain = chains.get(alarm, [])
+            told = [
+                (alarm, event.change, event.time_ns)
+                for event in chain
+                if event.change in (AlarmChange.RAISED, AlarmChange.RETURNED)
+            ]
+            _compare(found, list(_expected(alarm, values)), told)
+            stops = [index_of(time_ns, offered.t0_ns, plant.rate_hz) for time_ns, _ in values]
+            raised = [
+                index_of(time_ns, offered.t0_ns, plant.rate_hz)
+                for _, change, time_ns in told
+                if change is AlarmChange.RAISED
+            ]
+            for spell in _demanded(mine, stops, plant):
+                found.n_exceedances += 1
+                if not any(spell.start < at for at in raised if at <= spell.stop):
+                    found.alarms.append(f"{alarm}: {spell} was not told of")
+
+
+def _values(store: Store, unit: str, bearing: str, name: str) -> Iterator[tuple[int, float | None]]:
+    start_ns: int | None = 0
+    while start_ns is not None:
+        query = TrendQuery(unit, bearing, (name,), start_ns, ALWAYS[1], PAGE, 2**62, is_page=True)
+        trend = store.trend(query)
+        yield from zip(map(int, trend.time_ns), trend.series[name].mean, strict=True)
+        start_ns = trend.next_ns
+
+
+def _expected(alarm: str, values: Sequence[tuple[int, float | None]]) -> Iterator[Told]:
+    """What results amount to, without delays; what is not known changes nothing."""
+    is_active = False
+    for time_ns, value in values:
+        if value is None:
+            continue
+        if not is_active and value > ALERT_UM_PK:
+            is_active = True
+            yield alarm, AlarmChange.RAISED, time_ns
+        elif is_active and value < ALERT_UM_PK - DEADBAND_UM:
+            is_active = False
+            yield alarm, AlarmChange.RETURNED, time_ns
+
+
+def _compare(found: "Findings", expected: Sequence[Told], told: Sequence[Told]) -> None:
+    wanted, there = Counter(expected), Counter(told)
+    found.alarms += [f"not told: {one}" for one in wanted - there]
+    found.alarms += [f"told for nothing: {one}" for one in there - wanted]
+
+
+def _demanded(spells: Sequence[Spell], stops: Sequence[int], plant: LedgerPlant) -> Iterator[Spell]:
+    """Exceedances that begin and last within results, for longer than an average and two polls."""
+    there = set(stops)
+    least = plant.n_segments * plant.hop_samples + plant.segment_samples
+    lost = [spell for spell in spells if spell.kind == "lost"]
+    for spell in spells:
+        if spell.kind != "exceedance" or spell.stop - spell.start < least:
+            continue
+        if any(other.start < spell.stop and other.stop > spell.start for other in lost):
+            continue
+        mine = [stop for stop in stops if spell.start < stop <= spell.stop]
+        before = bool(mine) and mine[0] - plant.hop_samples in there
+        whole = all(b - a == plant.hop_samples for a, b in pairwise(mine))
+        if before and whole and (len(mine) + 1) * plant.hop_samples >= least:
+            yield spell
+
+
+def _check_letters(found: "Findings", store: Store, events: Sequence[AlarmEvent]) -> None:
+    letters = store.outbox.waiting(RECEIVER, 1_000_000)
+    queued = Counter(letter.event_id for letter in letters)
+    found.duplicated += [f"letter {id_}" for id_, n in queued.items() if n > 1]
+    raised = [
+        event
+        for event in events
+        if event.change in (AlarmChange.RAISED, AlarmChange.RETURNED)
+        and event.identity.kind in ("order1_shaft_x", "order1_shaft_y")
+    ]
+    if len(raised) != len(letters):
+        found.alarms.append(f"{len(raised)} events have {len(letters)} letters")

@@ -1,0 +1,190 @@
+"""What a store holds beside what was offered: lost, altered, unexpected, duplicated, gaps.
+
+The words are those of Jepsen. Everything is read through the store's interface, and every stored
+number is computed again from seed, channel, epoch and index by the real monitor.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
+from pathlib import Path
+
+from core.account import Gap
+from harness.alarm_ledger import alarm_faults
+from harness.ledger_daq import Offered
+from harness.ledger_plant import LedgerPlant
+from harness.lives import ALWAYS, Replay, Rows, Run, index_of, runs_of, stored_rows, uncovered
+from service.settings.loading import load_plant_file
+from service.store.port import Store
+from service.wiring.stores import open_store
+
+Shown = Mapping[tuple[str, str], Mapping[int, float | None]]
+"""What a client was shown as stored: by unit and bearing, by index of the result's last sample."""
+
+
+@dataclass
+class Findings:
+    """What is wrong; nothing is, if all lists are empty. The counts are for the table.
+
+    Parameters
+    ----------
+    lost
+        Shown to a client as stored, and not there.
+    altered
+        There with other values than the samples lead to.
+    unexpected
+        There, and never offered; or of samples that a gap says were missing.
+    duplicated
+        There twice.
+    missing
+        Results that the samples which were taken must have led to, before later ones did.
+    gaps
+        Samples that are neither in a result nor in a gap, in two gaps, or in both.
+    alarms
+        Events that should be there and are not, or are there twice, or have no letter.
+    """
+
+    lost: list[str] = field(default_factory=list)
+    altered: list[str] = field(default_factory=list)
+    unexpected: list[str] = field(default_factory=list)
+    duplicated: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+    gaps: list[str] = field(default_factory=list)
+    alarms: list[str] = field(default_factory=list)
+    n_offered: int = 0
+    n_in_results: int = 0
+    n_in_gaps: int = 0
+    n_without_result: int = 0
+    n_results: int = 0
+    n_shown: int = 0
+    n_exceedances: int = 0
+    n_probes_lost: int = 0
+
+    @property
+    def wrong(self) -> dict[str, list[str]]:
+        """What is wrong, the first of each kind."""
+        named = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {
+            name: value[:5] for name, value in named.items() if isinstance(value, list) and value
+        }
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How much there was of everything."""
+        named = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: len(v) if isinstance(v, list) else v for name, v in named.items()}
+
+
+def check(
+    plant: LedgerPlant,
+    plant_file: Path,
+    offered: Offered,
+    lives: Mapping[str, Sequence[int]],
+    shown: Shown,
+    events_shown: Collection[tuple[str, int]] = (),
+) -> Findings:
+    """Compare the store of a service that does not run with the truth.
+
+    Parameters
+    ----------
+    lives
+        For each unit, the number of the newest sample offered as each process was started.
+    events_shown
+        Events of alarms that clients were shown: alarm and number.
+    """
+    found = Findings()
+    file = load_plant_file(plant_file)
+    store = open_store(file)
+    try:
+        for unit in plant.units:
+            replay = Replay(plant, file, unit, offered.t0_ns)
+            _check_unit(found, plant, store, unit, offered, lives[unit], replay, shown)
+        alarm_faults(found, plant, store, offered, events_shown)
+    finally:
+        store.close()
+    return found
+
+
+def _check_unit(
+    found: Findings,
+    plant: LedgerPlant,
+    store: Store,
+    unit: str,
+    offered: Offered,
+    lives: Sequence[int],
+    replay: Replay,
+    shown: Shown,
+) -> None:
+    rows = stored_rows(store, unit)
+    index = {key: index_of(key[1], offered.t0_ns, plant.rate_hz) for key in rows}
+    runs = runs_of(index.values(), plant, lives)
+    n_offered = offered.samples[unit, 1]
+    found.n_offered += n_offered
+    found.n_results += len(rows)
+    _check_shown(found, unit, rows, index, shown)
+    _check_values(found, unit, rows, replay, runs)
+    gaps = sorted(store.gaps(unit, *ALWAYS), key=lambda gap: gap.first_index)
+    _check_gaps(found, unit, gaps, runs, n_offered)
+
+
+def _check_shown(
+    found: Findings, unit: str, rows: Rows, index: Mapping[tuple[str, int], int], shown: Shown
+) -> None:
+    there = {(bearing, index[bearing, time_ns]): (bearing, time_ns) for bearing, time_ns in rows}
+    repeated = Counter((key[0], n) for key, n in index.items())
+    found.duplicated += [f"{unit} {key}" for key, n in repeated.items() if n > 1]
+    for (shown_unit, bearing), values in shown.items():
+        if shown_unit != unit:
+            continue
+        found.n_shown += len(values)
+        for stop, value in values.items():
+            key = there.get((bearing, stop))
+            if key is None:
+                found.lost.append(f"{unit} {bearing} to sample {stop}")
+            elif rows[key]["order1_shaft_x_um_pk"][0] != value:
+                found.altered.append(f"{unit} {bearing} to sample {stop}: shown as {value}")
+
+
+def _check_values(
+    found: Findings, unit: str, rows: Rows, replay: Replay, runs: Sequence[Run]
+) -> None:
+    left = dict(rows)
+    for assessment in replay.results(runs):
+        key = (assessment.bearing, assessment.time_ns)
+        row = left.pop(key, None)
+        if row is None:
+            found.missing.append(f"{unit} {key}")
+            continue
+        for name, reading in assessment.readings.items():
+            value, level = row[name]
+            if value != reading.value or level != reading.quality.level:
+                found.altered.append(
+                    f"{unit} {key} {name}: {value} {level}, not {reading.value} {reading.quality}"
+                )
+                break
+    found.unexpected += [f"{unit} {key}" for key in left]
+
+
+def _check_gaps(
+    found: Findings, unit: str, gaps: Sequence[Gap], runs: Sequence[Run], n_offered: int
+) -> None:
+    """Between two runs everything is in a gap, but what was taken and led to no result."""
+    found.n_in_results += sum(run.stop - run.start for run in runs)
+    found.n_in_gaps += sum(gap.n_samples for gap in gaps)
+    for before, gap in pairwise(gaps):
+        if before.first_index + before.n_samples > gap.first_index:
+            found.gaps.append(f"{unit}: {before} and {gap} tell of the same samples")
+    for gap in gaps:
+        stop = gap.first_index + gap.n_samples
+        if stop > n_offered:
+            found.gaps.append(f"{unit}: {gap} is of samples that were never offered")
+        if any(run.start < stop and gap.first_index < run.stop for run in runs):
+            found.gaps.append(f"{unit}: {gap} is of samples that led to results")
+    for run, after in pairwise(runs):
+        left = uncovered(gaps, run.stop, after.start)
+        found.n_without_result += sum(b - a for a, b in left)
+        if any(a != run.stop for a, b in left) or not gaps:
+            found.gaps.append(f"{unit}: nothing tells of {left} between {run} and {after}")
+        elif left and left[0][1] == after.start:
+            found.gaps.append(f"{unit}: no gap is recorded between {run} and {after}")

@@ -1,0 +1,154 @@
+"""Start, load, kill -9 and start again, any number of times; then look at all that is left."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from harness.checker import Findings, check
+from harness.ledger_daq import LedgerDaq
+from harness.ledger_plant import LedgerPlant
+from harness.service_rig import UNREACHABLE, Api, RefusedError, ServiceRig
+from harness.watch import Watch, silent_healthy_s
+
+LIFE_S, LONGEST_LIFE_S = 3.0, 12.0
+"""For how long a service runs once it is ready: on average, and at most."""
+
+RECOVERY_S = 0.5
+"""A kill in recovery comes within so long after the start of the process, or of its readiness."""
+
+Trouble = Callable[[int, ServiceRig], None]
+"""What else goes wrong in a cycle."""
+
+
+@dataclass
+class Cycles:
+    """What was done and found."""
+
+    findings: Findings = field(default_factory=Findings)
+    ready_s: list[float] = field(default_factory=list)
+    silent_healthy_s: float = 0.0
+    alarms: list[str] = field(default_factory=list)
+    n_cycles: int = 0
+    n_in_recovery: int = 0
+    n_answers: int = 0
+
+    def table(self) -> str:
+        """One line for each figure."""
+        ready = sorted(self.ready_s)
+        p99 = ready[min(len(ready) - 1, int(0.99 * len(ready)))] if ready else 0.0
+        figures = {
+            "cycles": self.n_cycles,
+            "of them killed in recovery": self.n_in_recovery,
+            **self.findings.counts,
+            "alarms not as before": len(self.alarms),
+            "silent-healthy seconds": round(self.silent_healthy_s, 3),
+            "ready after p50, s": round(ready[len(ready) // 2], 2) if ready else None,
+            "ready after p99, s": round(p99, 2),
+            "answers to the client": self.n_answers,
+        }
+        return "\n".join(f"  {name:<32}{value}" for name, value in figures.items())
+
+
+def kill_cycles(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
+    rig: ServiceRig,
+    plant_file: Path,
+    n_cycles: int,
+    rng: np.random.Generator,
+    life_s: float = LIFE_S,
+    trouble: Trouble | None = None,
+) -> Cycles:
+    """Kill a service at random moments; every fourth time within half a second of its start."""
+    done = Cycles()
+    watch = Watch(plant, daq.offered)
+    lives: dict[str, list[int]] = {unit: [] for unit in plant.units}
+    for number in range(n_cycles):
+        for unit, n in daq.offered().samples.items():
+            lives[unit[0]].append(n)
+        rig.start()
+        done.n_cycles += 1
+        if number % 4 == 1:
+            done.n_in_recovery += 1
+            _kill_in_recovery(number, rig, rng, done)
+            continue
+        done.ready_s.append(rig.wait_ready())
+        with rig.api() as api:
+            done.alarms += alarms_not_as_before(api)
+        watch.begin(rig.url)
+        if trouble is not None:
+            trouble(number, rig)
+        with rig.api() as api:
+            act(api, number)
+        if number % 4 == 0:
+            watch.wait_for_result()
+        time.sleep(min(rng.exponential(life_s), LONGEST_LIFE_S))
+        rig.kill()
+        watch.end()
+    for unit, n in daq.offered().samples.items():
+        lives[unit[0]].append(n)
+    rig.start()
+    done.ready_s.append(rig.wait_ready())
+    with rig.api() as api:
+        done.alarms += alarms_not_as_before(api)
+    time.sleep(3.0 * plant.refresh_s)
+    rig.stop()
+    done.findings = check(plant, plant_file, daq.offered(), lives, watch.shown, watch.events)
+    done.silent_healthy_s = silent_healthy_s(plant, daq.offered(), watch.looks)
+    done.n_answers = watch.n_answers
+    return done
+
+
+def _kill_in_recovery(number: int, rig: ServiceRig, rng: np.random.Generator, done: Cycles) -> None:
+    """Half of them before it is ready, half just after."""
+    if number % 8 == 5:
+        done.ready_s.append(rig.wait_ready())
+    time.sleep(rng.uniform(0.0, RECOVERY_S))
+    rig.kill()
+
+
+def alarms_not_as_before(api: Api) -> list[str]:
+    """Alarms that are not as their newest event left them, right after a start."""
+    for _ in range(20):
+        newest = _newest_states(api)
+        shown = {one["id"]: one["state"] for one in api.get("/api/v1/alarms")["alarms"]}
+        wrong = [
+            f"{alarm} was {state} and is {shown.get(alarm, 'normal')}"
+            for alarm, state in newest.items()
+            if shown.get(alarm, "normal") != state
+        ]
+        if not wrong:
+            return []
+        time.sleep(0.05)  # a block may have come between the two questions
+    return wrong
+
+
+def _newest_states(api: Api) -> dict[str, str]:
+    states: dict[str, str] = {}
+    before = ""
+    for _ in range(20):
+        page = api.get(f"/api/v1/alarms/events?limit=500{before}")
+        for event in page["events"]:
+            states.setdefault(event["alarm"], event["state_after"])
+        if page["next_before"] is None:
+            break
+        before = f"&before={page['next_before']}"
+    return states
+
+
+def act(api: Api, number: int) -> None:
+    """Be an operator: acknowledge everything, now and then shelve something."""
+    try:
+        for alarm in api.get("/api/v1/alarms")["alarms"]:
+            path = f"/api/v1/alarms/{alarm['id']}"
+            if not alarm["is_acknowledged"]:
+                asked = {"actor": "H", "occurrence": alarm["occurrence"]}
+                api.post(f"{path}/acknowledge", asked)
+        if number % 5 == 1:
+            what = {"actor": "H", "reason": "torture", "duration_s": 4.0}
+            api.post("/api/v1/alarms/U1:device:clock_drift/shelve", what)
+    except (*UNREACHABLE, RefusedError):
+        return  # what was not answered was not promised

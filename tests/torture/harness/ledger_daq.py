@@ -1,0 +1,130 @@
+"""The ledger DAQ: a process of its own that nobody kills, and which logs what it has offered.
+
+``python -m harness.ledger_daq FILE PLANT`` with a plant as JSON: serves a block ring over Modbus
+TCP for every unit, says on its first line where, takes the commands of ``padwatch daq --control``
+on its standard input and ends with it. Into FILE goes one line for every slot that it offers.
+"""
+
+import asyncio
+import dataclasses
+import json
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from acquisition.clock import SystemClock
+from acquisition.daq.ledger import Ledger
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
+from harness.ledger_feed import LedgerFeed
+from harness.ledger_plant import LedgerPlant
+from service.daq_program import run_daq
+
+ROOT = Path(__file__).parents[3]
+
+
+class OfferedLog(Ledger):
+    """Writes a line for all that is offered: unit, epoch, first index, number, host's time."""
+
+    def __init__(self, file: IO[str]) -> None:
+        super().__init__()
+        self._file = file
+        self._next: dict[tuple[str, int], int] = defaultdict(int)
+
+    def offer(self, unit: str, epoch: int, n_samples: int) -> None:
+        """Book samples."""
+        first = self._next[unit, epoch]
+        self._next[unit, epoch] = first + n_samples
+        self._file.write(f"{unit} {epoch} {first} {n_samples} {time.time_ns()}\n")
+        self._file.flush()
+
+
+def main() -> None:
+    """Serve until the standard input ends."""
+    plant = LedgerPlant(**json.loads(sys.argv[2]))
+    clock = SystemClock()
+    with Path(sys.argv[1]).open("w", encoding="ascii") as file:
+        ledger = OfferedLog(file)
+        t0_ns = time.time_ns() // 1_000_000 * 1_000_000
+        file.write(f"t0 {t0_ns}\n")
+        servers = {}
+        for number, unit in enumerate(plant.units, start=1):
+            settings = RingDeviceSettings(
+                samples_per_slot=plant.slot_samples, n_slots=plant.n_slots
+            )
+            device = RingDevice(LedgerFeed(plant, number, t0_ns), unit, settings, ledger)
+            servers[unit] = ModbusRingServer(device, clock)
+        asyncio.run(run_daq(servers, lambda line: print(line, flush=True), controlled=True))
+
+
+@dataclass
+class Offered:
+    """What has been offered, read from the log."""
+
+    t0_ns: int
+    samples: dict[tuple[str, int], int]
+    """Per channel, by unit and epoch: all from 0 on."""
+
+
+class LedgerDaq:
+    """A running ledger DAQ."""
+
+    def __init__(
+        self, process: "subprocess.Popen[str]", log: Path, ports: Mapping[str, int]
+    ) -> None:
+        self.process, self.log, self.ports = process, log, ports
+
+    def offered(self) -> Offered:
+        """What it has offered so far."""
+        lines = self.log.read_text(encoding="ascii").splitlines()
+        found = Offered(int(lines[0].split()[1]), {})
+        for line in lines[1:]:
+            words = line.split()
+            if len(words) < 5:
+                break  # the line that is being written
+            unit, epoch, first, n = words[0], *map(int, words[1:4])
+            found.samples[unit, epoch] = max(found.samples.get((unit, epoch), 0), first + n)
+        return found
+
+    def tell(self, command: str) -> None:
+        """Let it do something wrong: ``UNIT FAULT [COUNT]``."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(command + "\n")
+        self.process.stdin.flush()
+        answer = json.loads(self.process.stdout.readline())
+        assert "done" in answer, answer
+
+
+@contextmanager
+def ledger_daq(plant: LedgerPlant, folder: Path) -> Iterator[LedgerDaq]:
+    """Run one, until the end of the block or of this process."""
+    log = folder / "offered.txt"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness.ledger_daq", log, json.dumps(dataclasses.asdict(plant))],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": f"{ROOT}:{ROOT / 'tests' / 'torture'}", "OPENBLAS_NUM_THREADS": "1"},
+    )
+    try:
+        assert process.stdout is not None
+        found = json.loads(process.stdout.readline())
+        yield LedgerDaq(process, log, {unit: int(at["port"]) for unit, at in found.items()})
+    finally:
+        process.terminate()
+        process.wait(10)
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
+
+
+if __name__ == "__main__":
+    main()

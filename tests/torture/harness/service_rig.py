@@ -1,0 +1,180 @@
+"""`ServiceRig`: the real program, started, watched, killed and started again."""
+
+import http.client
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, Self
+from urllib.parse import urlsplit
+
+ROOT = Path(__file__).parents[3]
+PATIENCE_S = 120.0
+"""Until a test gives up on a busy machine; nothing waits so long when all is well."""
+
+
+class RefusedError(Exception):
+    """The service answered with something else than 2xx."""
+
+    def __init__(self, status: int, body: str) -> None:
+        super().__init__(f"{status}: {body[:300]}")
+        self.status = status
+
+
+class Api:
+    """One connection to a service; what goes wrong with it is an OSError or an HTTPException."""
+
+    def __init__(self, url: str, timeout_s: float = 10.0) -> None:
+        self._at = urlsplit(url).netloc
+        self._timeout_s = timeout_s
+        self._connection = http.client.HTTPConnection(self._at, timeout=timeout_s)
+
+    def get(self, path: str) -> Any:
+        """Ask for something; the answer as JSON."""
+        return self._ask("GET", path, None)
+
+    def post(self, path: str, body: dict[str, Any]) -> Any:
+        """Ask for something to be done."""
+        return self._ask("POST", path, json.dumps(body))
+
+    def _ask(self, method: str, path: str, body: str | None) -> Any:
+        headers = {} if body is None else {"Content-Type": "application/json"}
+        try:
+            self._connection.request(method, path, body, headers)
+            answer = self._connection.getresponse()
+            text = answer.read().decode()
+        except (OSError, http.client.HTTPException):
+            self._connection.close()
+            raise
+        if not 200 <= answer.status < 300:
+            raise RefusedError(answer.status, text)
+        return json.loads(text)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._connection.close()
+
+
+UNREACHABLE = (OSError, http.client.HTTPException)
+
+
+class ServiceRig:
+    """One `padwatch run` after another on the same plant file.
+
+    Parameters
+    ----------
+    program
+        Module that is run instead of the command, as one with a planted bug.
+    before
+        Words before the interpreter, such as ``strace``.
+    """
+
+    def __init__(
+        self,
+        plant_file: Path,
+        program: str = "service.cli.main",
+        before: tuple[str, ...] = (),
+        environment: dict[str, str] | None = None,
+    ) -> None:
+        self._plant_file, self._program, self._before = plant_file, program, before
+        self._environment = environment or {}
+        self.log = plant_file.with_name("service.log")
+        self.process: subprocess.Popen[str] | None = None
+        self.url = ""
+        self.started_s = 0.0
+
+    @property
+    def pid(self) -> int:
+        """Of the running service."""
+        assert self.process is not None
+        return self.process.pid
+
+    def start(self) -> None:
+        """Start it; returns at once."""
+        assert self.process is None
+        environment = {
+            **os.environ,
+            "PYTHONPATH": f"{ROOT}:{ROOT / 'tests' / 'torture'}",
+            "PYTHONUNBUFFERED": "1",
+            **self._environment,
+        }
+        command = [sys.executable, "-m", self._program, "run", str(self._plant_file), "--port", "0"]
+        with self.log.open("a", encoding="utf-8") as log:
+            self.process = subprocess.Popen(
+                [*self._before, *command],
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                env=environment,
+            )
+        self.started_s = time.monotonic()
+        self.url = ""
+
+    def wait_ready(self) -> float:
+        """Wait until it says that it is ready; seconds since the start."""
+        assert self.process is not None
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if line.startswith("padwatch: http"):
+                self.url = line.split()[-1].rstrip("/")
+                return time.monotonic() - self.started_s
+        raise AssertionError(f"the service did not start: {self.newest_log()}")
+
+    def api(self) -> Api:
+        """A connection to it."""
+        return Api(self.url)
+
+    def kill(self) -> None:
+        """End it without a word, as kill -9 does."""
+        self._end(signal.SIGKILL)
+
+    def stop(self) -> int:
+        """Ask it to end; its exit code."""
+        return self._end(signal.SIGTERM)
+
+    def signal(self, number: int) -> None:
+        """Send a signal, such as SIGSTOP."""
+        os.kill(self.pid, number)
+
+    def newest_log(self) -> str:
+        """The end of what it has logged."""
+        return self.log.read_text(encoding="utf-8")[-3000:] if self.log.exists() else ""
+
+    def _end(self, number: int) -> int:
+        process, self.process = self.process, None
+        if process is None:
+            return 0
+        process.send_signal(number)
+        try:
+            return process.wait(PATIENCE_S)
+        finally:
+            process.kill()
+            process.wait()
+            if process.stdout is not None:
+                process.stdout.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+
+
+def until(look: Any, within_s: float = PATIENCE_S) -> Any:
+    """Look until there is something; what is unreachable is looked for again."""
+    end_s = time.monotonic() + within_s
+    found = None
+    while time.monotonic() < end_s:
+        try:
+            found = look()
+        except (*UNREACHABLE, RefusedError):
+            found = None
+        if found:
+            return found
+        time.sleep(0.05)
+    raise AssertionError(f"{look} never came to be so")

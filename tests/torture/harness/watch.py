@@ -1,0 +1,157 @@
+"""`Watch`: a client that never stops asking, and remembers what it was shown.
+
+What it was shown as stored must be there for ever. What it was shown as current and good must be so
+in truth: the seconds for which it was not are *silent-healthy seconds*.
+"""
+
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from harness.ledger_daq import Offered
+from harness.ledger_plant import LedgerPlant
+from harness.lives import NS_PER_S
+from harness.service_rig import PATIENCE_S, UNREACHABLE, Api, RefusedError
+from harness.truth import BEARINGS, Truth
+
+PERIOD_S = 0.1
+TREND_S = 8.0
+"""How far back a client looks at trends; longer than the newest that it can have missed."""
+
+POLL_S = 0.5
+
+
+@dataclass(frozen=True)
+class Look:
+    """One bearing as it was shown.
+
+    Parameters
+    ----------
+    at_ns
+        When the answer had come, by the host's clock.
+    result_ns
+        End of the samples of the result that was shown.
+    """
+
+    at_ns: int
+    unit: str
+    bearing: str
+    result_ns: int
+
+
+class Watch:
+    """Asks one service after the other, again and again, in a thread."""
+
+    def __init__(self, plant: LedgerPlant, offered: Callable[[], Offered]) -> None:
+        self._plant, self._t0_ns = plant, offered().t0_ns
+        self.shown: dict[tuple[str, str], dict[int, float | None]] = defaultdict(dict)
+        self.events: set[tuple[str, int]] = set()
+        self.looks: list[Look] = []
+        self.n_answers = 0
+        self._stopped = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def begin(self, url: str) -> None:
+        """Ask this service from now on."""
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(Api(url, 5.0), self._stopped))
+        self._thread.start()
+
+    def wait_for_result(self, within_s: float = PATIENCE_S) -> None:
+        """Wait until a result has been shown as stored that had not been shown before."""
+        n_before, end_s = self._n_shown, time.monotonic() + within_s
+        while self._n_shown == n_before and time.monotonic() < end_s:
+            time.sleep(0.02)
+
+    @property
+    def _n_shown(self) -> int:
+        return sum(len(values) for values in list(self.shown.values()))
+
+    def end(self) -> None:
+        """Ask no more; call it before or after the service has been ended."""
+        self._stopped.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self, api: Api, stopped: threading.Event) -> None:
+        number = 0
+        with api:
+            while not stopped.wait(PERIOD_S):
+                try:
+                    self._ask(api, number)
+                    self.n_answers += 1
+                except (*UNREACHABLE, RefusedError):
+                    continue  # it was killed, or is busy: nothing was shown
+                number += 1
+
+    def _ask(self, api: Api, number: int) -> None:
+        self._look(api.get("/api/v1/overview"))
+        units = self._plant.units
+        unit, bearing = units[number % len(units)], BEARINGS[number // len(units) % len(BEARINGS)]
+        self._note_trend(unit, bearing, api)
+        for event in api.get("/api/v1/alarms/events?limit=50")["events"]:
+            self.events.add((event["alarm"], event["number"]))
+
+    def _look(self, overview: dict[str, Any]) -> None:
+        at_ns = time.time_ns()
+        for unit in overview["units"]:
+            for bearing in unit["bearings"]:
+                if bearing["quality"]["level"] == "good":
+                    time_ns = round(datetime.fromisoformat(bearing["time"]).timestamp() * NS_PER_S)
+                    self.looks.append(Look(at_ns, unit["id"], bearing["bearing"], time_ns))
+
+    def _note_trend(self, unit: str, bearing: str, api: Api) -> None:
+        now_s = time.time()
+        start, end = (
+            f"{datetime.fromtimestamp(at).astimezone().isoformat()}".replace("+00:00", "Z")
+            for at in (now_s - TREND_S, now_s + 5.0)
+        )
+        found = api.get(
+            f"/api/v1/units/{unit}/bearings/{bearing}/trends?quantity=order1_shaft_x_um_pk"
+            f"&start={start}&end={end}&max_points=1000"
+        )
+        for time_s, value in zip(
+            found["time"], found["series"]["order1_shaft_x_um_pk"]["mean"], strict=True
+        ):
+            stop = round((time_s - self._t0_ns / NS_PER_S) * self._plant.rate_hz)
+            self.shown[unit, bearing][stop] = value
+
+
+def silent_healthy_s(plant: LedgerPlant, offered: Offered, looks: list[Look]) -> float:
+    """For how long anything was shown as current and good that in truth was absent or faulty.
+
+    Counted from the time on by which it must have been noticed: two and a half refreshes for
+    results that do not come, a segment and two polls for a probe that is lost.
+    """
+    total_s = 0.0
+    last_ns: dict[tuple[str, str], int] = {}
+    for look in sorted(looks, key=lambda one: one.at_ns):
+        key = (look.unit, look.bearing)
+        since_ns = look.at_ns - last_ns.get(key, look.at_ns)
+        last_ns[key] = look.at_ns
+        if _is_wrong(plant, offered, look):
+            total_s += min(max(since_ns / NS_PER_S, PERIOD_S), 1.0)
+    return total_s
+
+
+def _is_wrong(plant: LedgerPlant, offered: Offered, look: Look) -> bool:
+    age_s = (look.at_ns - look.result_ns) / NS_PER_S
+    if age_s > detect_s(plant):
+        return True
+    truth = Truth(plant.seed, plant.units.index(look.unit) + 1, plant.rate_hz)
+    stop = round((look.result_ns - offered.t0_ns) * plant.rate_hz / NS_PER_S)
+    start = stop - plant.segment_samples
+    bearing = BEARINGS.index(look.bearing)
+    return any(
+        spell.kind == "lost" and spell.bearing == bearing
+        for spell in truth.spells(max(0, start), stop)
+    )
+
+
+def detect_s(plant: LedgerPlant) -> float:
+    """Longest age of the samples of what is shown as current: its staleness and its way."""
+    return 2.5 * plant.refresh_s + plant.refresh_s + 2 * POLL_S + 1.0

@@ -1,0 +1,53 @@
+"""The service is killed at random moments under load: nothing that it promised is gone."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.kill_cycles import Cycles, kill_cycles
+from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_plant import LedgerPlant
+from harness.service_rig import ServiceRig
+
+N_CYCLES, N_FEW = 200, 3
+LOAD = 2.0
+SHORT_LIFE_S = 0.7
+ACCOUNTED_S = 2 * 3600.0
+
+
+@pytest.fixture
+def plant(torture_seed: int) -> LedgerPlant:
+    """Two units with twelve channels at twice 600 Hz, and a result every 0.75 s."""
+    return LedgerPlant(seed=torture_seed, load=LOAD)
+
+
+@pytest.fixture
+def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
+    """A DAQ that goes on offering samples whatever happens to the service."""
+    with ledger_daq(plant, tmp_path) as running:
+        yield running
+
+
+@pytest.mark.timeout(ACCOUNTED_S)
+def test_a_killed_service_has_kept_what_it_has_shown(
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture_seed: int, is_whole: bool
+) -> None:
+    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
+    rng = np.random.default_rng(torture_seed)
+    n_cycles = N_CYCLES if is_whole else N_FEW
+    with ServiceRig(plant_file) as rig:
+        if is_whole:
+            done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng)
+        else:
+            done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng, SHORT_LIFE_S)
+    print(f"\nkill -9, seed {torture_seed}\n{done.table()}")
+    assert_all_accounted_for(done)
+    assert done.findings.n_results > 0
+    assert done.findings.n_shown > 0
+
+
+def assert_all_accounted_for(done: Cycles) -> None:
+    assert {kind: some for kind, some in done.findings.wrong.items() if kind != "gaps"} == {}
+    assert done.alarms == []
+    assert done.silent_healthy_s == 0.0
