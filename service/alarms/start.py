@@ -7,8 +7,10 @@ from types import MappingProxyType
 
 from acquisition.clock import Clock
 from core.alarms.chatter import SHOWN_NS
+from core.alarms.event import AlarmNews
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
+from core.blocks import SampleBlock
 from core.films.film_rules import FilmRules
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import LookAtHealth
@@ -24,6 +26,8 @@ from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.store.port import AlarmQuery, Store
 
+Listener = Callable[[SampleBlock, Sequence[AlarmNews]], None]
+
 MAX_RECALLED = 10_000
 """Most events that are looked at for chattering alarms after a restart."""
 
@@ -37,6 +41,7 @@ async def alarm_engine(
     captures: Captures | None = None,
     rows: Mapping[str, Sequence[str]] = MappingProxyType({}),
     look: LookAtHealth | None = None,
+    tape: Callable[[SampleBlock], None] | None = None,
 ) -> AlarmEngine:
     """Put the engine together and let it go on where the service stopped.
 
@@ -48,6 +53,8 @@ async def alarm_engine(
         Of units whose blocks do not have a row for each channel: which channel each row is about.
     look
         How the service itself does.
+    tape
+        Takes every block, if all samples are kept.
 
     Raises
     ------
@@ -67,7 +74,7 @@ async def alarm_engine(
     seen = look if origin is Origin.LIVE else None
     service = ServiceAlarms(units, service_rules_of(plant.alarms), seen)
     chatter = chatter_rule_of(plant.alarms)
-    listener = captures.take if captures else None
+    listener = _listener(captures, tape)
     engine = AlarmEngine(units, put, clock, listener, service, chatter)
     engine.restore(await asyncio.to_thread(store.alarms))
     for found in await asyncio.to_thread(store.order1_references.in_force):
@@ -76,6 +83,21 @@ async def alarm_engine(
     events = await asyncio.to_thread(store.alarm_events, lately)
     engine.recall(stored.event for stored in reversed(events))
     return engine
+
+
+def _listener(
+    captures: Captures | None, tape: Callable[[SampleBlock], None] | None
+) -> Listener | None:
+    take = captures.take if captures else None
+    if tape is None:
+        return take
+
+    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        if take is not None:
+            take(block, news)
+        tape(block)
+
+    return listen
 
 
 def _rules(plant: PlantFile, unit: UnitSettings, origin: Origin) -> UnitRules:

@@ -10,6 +10,8 @@ from service.alarms.health import health_of
 from service.alarms.start import alarm_engine
 from service.bus import Bus
 from service.capture.captures import Captures
+from service.continuous.pressure import Pressure
+from service.continuous.tape import Tape
 from service.delivery.deliveries import Deliveries
 from service.delivery.facts import Around
 from service.evidence.keeper import EvidenceKeeper
@@ -27,6 +29,7 @@ from service.wiring.delivery import receivers_of
 from service.wiring.evidence import evidence_of, watch
 from service.wiring.sources import vector_rows
 from service.wiring.space import space_watch
+from service.wiring.tapes import tape_of
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class Analysis:
     recorder: Recorder
     deliveries: Deliveries
     captures: Captures
+    tape: Tape
     alarms: AlarmEngine
     films: FilmKeeper
     evidence: EvidenceKeeper
@@ -52,6 +56,7 @@ class Analysis:
             "references": self.references.run,
             "alarms": self.alarms.run,
             "captures": self.captures.run,
+            "tape": self.tape.run,
             "evidence": self.evidence.run,
             "gather": self.rolling.run,
             "space": self.space.run,
@@ -66,6 +71,7 @@ class Analysis:
         await self.captures.close()
         await self.recorder.flush()
         await self.evidence.close()
+        await self.tape.close()
 
 
 async def analysis_on(
@@ -91,10 +97,11 @@ async def analysis_on(
     commits = ground.timings.commits
     recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)
     captures = captures_of(plant, origin, clock)
+    tape = tape_of(plant, origin, clock, Pressure(bus).look)
     space = space_watch(plant, clock)
     look = health_of(monitors, live, recorder, captures, bus, space)
     alarms = await alarm_engine(
-        plant, origin, store, recorder.put, clock, captures, vector_rows(plant), look
+        plant, origin, store, recorder.put, clock, captures, vector_rows(plant), look, tape.take
     )
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
@@ -109,6 +116,7 @@ async def analysis_on(
         recorder=recorder,
         deliveries=deliveries,
         captures=captures,
+        tape=tape,
         alarms=alarms,
         films=films,
         evidence=evidence,

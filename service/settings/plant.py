@@ -15,6 +15,7 @@ from service.settings.evidence import EvidenceSettings
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.http_limits import HostName, HttpLimitSettings
 from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.recording import RecordingSettings
 from service.settings.space import SpaceSettings
 from service.settings.spectra import SpectraSettings
 from service.settings.units import UnitSettings
@@ -197,6 +198,9 @@ class PlantFile(Settings):
     capture: CaptureSettings = CaptureSettings()
     """Samples that are kept around an alarm."""
 
+    recording: RecordingSettings = RecordingSettings()
+    """All samples, kept for a while."""
+
     evidence: EvidenceSettings = EvidenceSettings()
     """What is kept of alarms beside their samples."""
 
@@ -216,6 +220,7 @@ class PlantFile(Settings):
     def _check(self) -> Self:
         refuse_twice(("unit", n, "id", unit.id) for n, unit in enumerate(self.unit))
         self.delivery.require_units(tuple(unit.id for unit in self.unit))
+        self.recording.require_units(tuple(unit.id for unit in self.unit))
         for unit in self.unit:
             if not isinstance(unit.source, ModbusVectorSettings):
                 self._check_analysis(unit)

@@ -1,0 +1,134 @@
+"""A kill at any moment costs no more than the part that was being written."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.recording.manifest import RecordedUnit
+from acquisition.recording.reader import Recording, open_recording
+from acquisition.recording.summary import summary_of
+from core.blocks import SampleBlock
+from service.continuous.joining import clear_unfinished, join, unjoined
+from service.continuous.last import last_end
+from service.continuous.pieces import TapeSettings
+from service.continuous.unit_tape import UnitTape
+
+BLOCK = 10
+SETTINGS = TapeSettings(stretch_s=4.0, part_s=2.0)
+N_BLOCKS = 30
+DEEDS = ("mkdir", "rename", "unlink", "rmdir")
+
+
+class Killed(BaseException):
+    """The process ends here."""
+
+
+@contextmanager
+def killed_at(deed: int, patch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """End the process instead of the n-th thing that is done to a folder."""
+    done: list[str] = []
+
+    def counted(name: str) -> Callable[..., Any]:
+        original = getattr(Path, name)
+
+        def do(path: Path, *how: Any, **more: Any) -> Any:
+            if len(done) == deed:
+                raise Killed
+            done.append(name)
+            return original(path, *how, **more)
+
+        return do
+
+    with patch.context() as inner:
+        for name in DEEDS:
+            inner.setattr(Path, name, counted(name))
+        yield done
+
+
+def recover(root: Path) -> None:
+    left = unjoined(root)
+    clear_unfinished(root)
+    for folder in left:
+        join(folder)
+
+
+def record(root: Path, unit: RecordedUnit, blocks: list[SampleBlock], synced: list[int]) -> None:
+    """Record as the service does, and note up to where samples were on the disk."""
+    tape = UnitTape(root, unit, SETTINGS, last_end(root, unit.unit))
+    for block in blocks:
+        tape.write(block, 0.0)
+        synced[0] = max(synced[0], tape.n_written)
+        for folder in tape.ended:
+            join(folder)
+        tape.ended.clear()
+    tape.end()
+    for folder in tape.ended:
+        join(folder)
+
+
+def account(recordings: list[Recording]) -> tuple[list[int], int]:
+    """Numbers of the samples, and how many are told to be missing."""
+    found = [int(v) for each in recordings for raw in each.raw_blocks() for v in raw.counts[0]]
+    missing = sum(s.n_gap_samples + sum(s.rejected.values()) for s in map(summary_of, recordings))
+    return found, missing
+
+
+def recordings_in(root: Path) -> list[Recording]:
+    return [open_recording(folder) for folder in sorted(root.iterdir())]
+
+
+def n_deeds(
+    tmp_path: Path, unit: RecordedUnit, blocks: list[SampleBlock], patch: pytest.MonkeyPatch
+) -> int:
+    with killed_at(10**9, patch) as done:
+        record(tmp_path / "whole", unit, blocks, [0])
+    return len(done)
+
+
+def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
+    tmp_path: Path, unit: Any, block: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocks = [block(n) for n in range(N_BLOCKS)]
+    later = [block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
+    total = n_deeds(tmp_path, unit("U1"), blocks, monkeypatch)
+    assert total > 25
+    for deed in range(total):
+        root, synced = tmp_path / f"{deed}", [0]
+        with killed_at(deed, monkeypatch), pytest.raises(Killed):
+            record(root, unit("U1"), blocks, synced)
+        recover(root)
+        record(root, unit("U1"), later, [0])
+        found, missing = account(recordings_in(root))
+
+        assert found == sorted(set(found)), f"killed at {deed}: twice"
+        assert found[: synced[0]] == list(range(synced[0])), f"killed at {deed}: lost"
+        n_before = len(found) - len(later) * BLOCK
+        assert n_before >= synced[0]
+        told = (N_BLOCKS + 15) * BLOCK if n_before else len(later) * BLOCK
+        assert len(found) + missing == told, f"killed at {deed}: not accounted for"
+
+
+def test_a_kill_during_recovery_changes_nothing(
+    tmp_path: Path, unit: Any, block: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocks = [block(n) for n in range(15)]
+
+    def crashed(root: Path) -> None:
+        tape = UnitTape(root, unit("U1"), SETTINGS)
+        for each in blocks:
+            tape.write(each, 0.0)
+
+    crashed(tmp_path / "whole")
+    with killed_at(10**9, monkeypatch) as done:
+        recover(tmp_path / "whole")
+    for deed in range(len(done)):
+        root = tmp_path / f"{deed}"
+        crashed(root)
+        with killed_at(deed, monkeypatch), pytest.raises(Killed):
+            recover(root)
+        recover(root)
+
+        assert account(recordings_in(root)) == (list(range(100)), 0), f"killed at {deed}"

@@ -1,0 +1,191 @@
+"""All samples of a unit are kept, and what is not is told by number and reason."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.recording.reader import Recording, open_recording
+from acquisition.recording.summary import summary_of
+from service.continuous import tape, unit_tape
+from service.continuous.pieces import Shed
+
+BLOCK = 10
+Samples = Callable[[Recording], list[int]]
+
+
+def numbers(first_block: int, stop_block: int) -> list[int]:
+    return list(range(first_block * BLOCK, stop_block * BLOCK))
+
+
+async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root) as rig:
+        rig.send(20, 120)
+    first, second, third = rig.recordings()
+
+    assert samples(first) == numbers(20, 50)
+    assert samples(second) == numbers(50, 100)
+    assert samples(third) == numbers(100, 120)
+    assert first.folder.name == "U1-20260101T000004.000Z-continuous"
+    assert first.manifest.sample_type == "int16"
+    assert rig.tape.n_written == 1000
+    assert not rig.tape.n_shed.total()
+
+
+async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete(
+    running: Any, root: Path
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 25)
+        await rig.until(lambda: rig.tape.n_written == 200)
+        [parts] = root.iterdir()
+        assert parts.name.endswith(".parts")
+        assert sum(not part.name.endswith(".incomplete") for part in parts.iterdir()) == 2
+        rig.clock.s = 3.0
+        await rig.until(lambda: rig.tape.n_written == 250)  # old enough, if not long enough
+
+
+async def test_two_units_are_recorded_side_by_side(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root, ("U1", "U2")) as rig:
+        rig.send(0, 20)
+        rig.send(3, 30, "U2")
+        rig.send(0, 9, "U3")
+    one, two = rig.recordings()
+
+    assert (one.manifest.unit, two.manifest.unit) == ("U1", "U2")
+    assert (samples(one), samples(two)) == (numbers(0, 20), numbers(3, 30))
+
+
+@pytest.mark.parametrize("reason", [Shed.ANALYSIS_BEHIND, Shed.DISK_FULL])
+async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
+    running: Any, root: Path, samples: Samples, reason: Shed
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 10)
+        rig.reason = reason
+        rig.send(10, 17)
+        assert rig.tape.trouble is not None
+        rig.reason = None
+        rig.send(17, 30)
+        rig.clock.s = 61.0
+        assert rig.tape.trouble is None
+    [recording] = rig.recordings()
+
+    assert samples(recording) == numbers(0, 10) + numbers(17, 30)
+    assert summary_of(recording).rejected == {reason.value: 70}
+    assert rig.tape.n_shed == {reason: 70, Shed.DISK_REFUSED: 0}
+
+
+async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 10)
+        rig.clock.s = tape.MAX_WAIT_S + 1.0  # nothing of it was written meanwhile
+        rig.send(10, 13)
+        await rig.until(lambda: rig.tape.n_written > 0)
+        rig.send(13, 20)
+    [recording] = rig.recordings()
+
+    assert samples(recording) == numbers(0, 10) + numbers(13, 20)
+    assert summary_of(recording).rejected == {"disk_slow": 30}
+
+
+async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
+    running: Any, root: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class RefusedStretch:
+        def __init__(self, *_: object) -> None:
+            raise OSError(28, "No space left on device")
+
+    async with running(root) as rig:
+        with monkeypatch.context() as patch:
+            patch.setattr(unit_tape, "Stretch", RefusedStretch)
+            rig.send(0, 10)
+            await rig.until(lambda: rig.tape.error is not None)
+        assert "No space left on device" in rig.tape.trouble
+        rig.send(10, 20)
+        await rig.until(lambda: rig.tape.error is None)
+    [recording] = rig.recordings()
+
+    assert samples(recording) == numbers(10, 20)
+    assert summary_of(recording).rejected == {"disk_refused": 100}
+    assert rig.tape.n_shed[Shed.DISK_REFUSED] == 100
+
+
+async def test_samples_that_are_missing_or_repeated_are_so_in_the_recording(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 10)
+        rig.send(5, 10)
+        rig.send(12, 30)
+    [recording] = rig.recordings()
+
+    assert samples(recording) == numbers(0, 10) + numbers(12, 30)
+    assert [gap.n_samples for gap in summary_of(recording).gaps] == [20]
+
+
+async def test_a_hole_between_two_recordings_is_told_by_the_second(
+    running: Any, root: Path
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 45)
+        rig.send(55, 60)
+    _, second = rig.recordings()
+
+    assert summary_of(second).rejected == {"gap_before": 100}
+
+
+async def test_the_hole_of_an_outage_is_told_exactly(running: Any, root: Path) -> None:
+    async with running(root) as rig:
+        rig.send(0, 20)
+    async with running(root) as rig:
+        rig.send(33, 40)
+    _, second = rig.recordings()
+
+    assert summary_of(second).rejected == {"not_running": 130}
+
+
+async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root) as rig:
+        rig.send(10, 20)
+        rig.send(20, 30, epoch=2)
+    [recording] = rig.recordings()
+
+    assert summary_of(recording).epochs == (1, 2)
+    assert samples(recording) == numbers(10, 30)
+
+
+async def test_samples_that_turn_out_to_be_no_counts_begin_another_recording(
+    running: Any, root: Path
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 12)
+        rig.send(12, 20, by=0.25)
+    first, second = rig.recordings()
+
+    assert (first.manifest.n_samples, second.manifest.n_samples) == (120, 80)
+    assert (first.manifest.sample_type, second.manifest.sample_type) == ("int16", "float32")
+
+
+async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 30)
+        await rig.until(lambda: rig.tape.n_written == 300)
+        [parts] = root.iterdir()
+        file = parts / "00001" / "samples.parquet"
+        file.write_bytes(b"\0" + file.read_bytes()[1:])
+    aside, whole = sorted(root.iterdir(), key=lambda path: not path.name.endswith(".damaged"))
+
+    assert aside.name == "U1-20260101T000000.000Z-continuous-00001.damaged"
+    assert samples(open_recording(whole)) == numbers(0, 10) + numbers(20, 30)
