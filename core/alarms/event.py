@@ -74,11 +74,15 @@ class AlarmNews:
     ----------
     peer
         Address from which somebody asked for them; None if nobody did, or it is not known.
+    command
+        Which command asked for them, where it came through the database: it is answered by being
+        stored with them.
     """
 
     alarm: Alarm
     events: Sequence[AlarmEvent]
     peer: str | None = None
+    command: str | None = None
 
 
 def changed(

@@ -134,7 +134,8 @@ class AlarmEngine:
         """
         own = self._owner(id_)
         news = own.operate(id_, action, self._clock.now_ns())
-        self._publish([replace(told, peer=acting().peer) for told in news])
+        who = acting()
+        self._publish([replace(told, peer=who.peer, command=who.command) for told in news])
         return own.alarm(id_)
 
     def alarm(self, id_: str) -> Alarm:

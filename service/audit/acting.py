@@ -18,11 +18,14 @@ class Acting:
         Address of a request, or the user of the operating system.
     actor
         Who that is, once it is known; empty until then.
+    command
+        Which command in the database is being carried out; None where none is.
     """
 
     source: Source = Source.PADWATCH
     peer: str | None = None
     actor: str = ""
+    command: str | None = None
 
 
 NOBODY = Acting()

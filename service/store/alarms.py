@@ -15,6 +15,8 @@ from core.alarms.alarm import (
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from service.audit.entry import Deed
 from service.store.audit_deeds import alarm_deeds
+from service.store.commands import answer_command
+from service.store.commands_port import DONE
 from service.store.database import Connection
 from service.store.outbox import insert_letters
 from service.store.outbox_port import Address, nobody
@@ -66,6 +68,9 @@ def insert_alarms(
                 insert_letters(writer, event, address(told.alarm, event))
                 tell(writer, alarm_deeds(event, told))
         writer.execute(UPSERT, _alarm_row(told.alarm))
+        if told.command is not None:
+            # with what it did, so that whoever finds it unanswered knows that nothing was done
+            answer_command(writer, told.command, DONE, told.events[-1].time_ns)
 
 
 def select_alarms(reader: Connection) -> list[Alarm]:

@@ -9,10 +9,12 @@ tests of the store, which go over both.
 
 from service.store.access_schema import ACCESS_TABLES
 from service.store.audit_schema import AUDIT_TABLES
+from service.store.commands import COMMAND_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
 from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.spectra_schema import SPECTRA_TABLES
+from service.store.unit_states import UNIT_STATUS_TABLES
 from service.store.vector_references import VECTOR_REFERENCE_TABLES
 
 MIGRATIONS = (
@@ -137,5 +139,11 @@ MIGRATIONS = (
     ACCESS_TABLES,
     SPECTRA_TABLES,
     ROLLUP_TABLES,
+    """
+    ALTER TABLE gap ADD COLUMN start_ns INTEGER;
+    ALTER TABLE gap ADD COLUMN is_estimated INTEGER NOT NULL DEFAULT 0
+        CHECK (is_estimated IN (0, 1));
+    """,
+    UNIT_STATUS_TABLES + COMMAND_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1."""
