@@ -1,17 +1,38 @@
-"""How long the torture takes, and by which seed."""
+"""How long the torture takes, by which seed, and what is said at its end."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
+from harness import summary
 
 N_SHORT = 25
 """By how much the short torture of every test run is less than the whole one."""
+
+TABLE = Path(__file__).parents[2] / "build" / "torture.txt"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of ``make torture``; a run of all tests knows none of them."""
     parser.addoption("--torture", action="store_true", help="as long as the issue of it asks for")
     parser.addoption("--torture-seed", type=int, default=1, help="of everything that is random")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Note which tests plant a bug."""
+    summary.note_planted(items)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say what the whole torture has found, and write it down."""
+    config = terminalreporter.config
+    if not config.getoption("--torture", False):
+        return
+    found = summary.lines(terminalreporter.stats, int(config.getoption("--torture-seed")))
+    terminalreporter.section("torture")
+    for line in found:
+        terminalreporter.write_line(line)
+    summary.write(TABLE, found)
 
 
 @pytest.fixture(scope="session")
@@ -31,3 +52,9 @@ def times(pytestconfig: pytest.Config) -> Callable[[int], int]:
 def is_whole(pytestconfig: pytest.Config) -> bool:
     """Whether this is the whole torture."""
     return bool(pytestconfig.getoption("--torture", False))
+
+
+@pytest.fixture
+def figure(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
+    """Adds a row to the table at the end of the torture."""
+    return lambda row: record_property(summary.FIGURE, row)

@@ -15,8 +15,8 @@ from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
 from harness.tape import Acknowledged, Step, python, record
 
-from service.store.sqlite.trail import verify_trail
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.trail import verify_trail
 
 N_DEEDS = 240
 N_CUTS = 5000
@@ -93,12 +93,16 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
         assert verify_trail(path).is_whole
 
 
+def _planted(bug: str, what: str) -> object:
+    return pytest.param(bug, what, marks=pytest.mark.planted(bug), id=bug)
+
+
 @pytest.mark.parametrize(
     ("bug", "what"),
     [
-        ("synchronous_normal", "lost"),
-        ("acknowledged_before_commit", "lost"),
-        ("two_transactions", "torn"),
+        _planted("synchronous_normal", "lost"),
+        _planted("acknowledged_before_commit", "lost"),
+        _planted("two_transactions", "torn"),
     ],
 )
 def test_a_store_that_promises_too_much_is_found_out(

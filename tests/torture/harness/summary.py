@@ -1,0 +1,59 @@
+"""What `make torture` says at its end: a table of figures, and which planted bugs were caught.
+
+A test records a figure by its fixture ``figure``: a row of the table and what was found. A test
+that plants a bug is marked ``planted`` with the bug's name; it passes if the harness catches it.
+"""
+
+import os
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+FIGURE, PLANTED = "figure", "planted"
+
+Property = tuple[str, object]
+
+
+def note_planted(items: Iterable[pytest.Item]) -> None:
+    """Let the reports of tests that plant a bug name it."""
+    for item in items:
+        for marker in item.iter_markers(PLANTED):
+            item.user_properties += [(PLANTED, name) for name in marker.args]
+
+
+def properties(reports: Iterable[pytest.TestReport], kind: str) -> list[object]:
+    """What tests have recorded of a kind, each once."""
+    found = [value for report in reports for name, value in report.user_properties if name == kind]
+    return list(dict.fromkeys(found))
+
+
+def lines(stats: Mapping[str, Sequence[pytest.TestReport]], seed: int) -> list[str]:
+    """The table, and the planted bugs."""
+    everything = [
+        report
+        for reports in stats.values()
+        for report in reports
+        if isinstance(report, pytest.TestReport)
+    ]
+    passed = [report for report in stats.get("passed", ()) if report.when == "call"]
+    planted, caught = properties(everything, PLANTED), properties(passed, PLANTED)
+    failed = [report for kind in ("failed", "error") for report in stats.get(kind, ())]
+    missed = [bug for bug in planted if bug not in caught]
+    return [
+        f"seed {seed}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {os.cpu_count()} cores,"
+        f" {platform.system()}, Python {platform.python_version()}",
+        *(str(row) for row in properties(everything, FIGURE)),
+        f"planted bugs caught: {len(caught)} of {len(planted)}",
+        *(f"  caught: {bug}" for bug in caught),
+        *(f"  NOT CAUGHT: {bug}" for bug in missed),
+        f"tests failed: {len(failed)}",
+    ]
+
+
+def write(path: Path, found: Sequence[str]) -> None:
+    """Keep the table."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("\n".join(found) + "\n", encoding="utf-8")
