@@ -10,7 +10,6 @@ from core.alarms.event import AlarmEvent, AlarmNews
 from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
 from core.films.film_judge import FilmNews
-from core.outage import Reach
 from core.quality import Level, Reading
 from service.store.access_port import AccessStore
 from service.store.audit_port import AuditStore
@@ -18,7 +17,6 @@ from service.store.commands_port import Commands
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.outbox_port import Outbox
-from service.store.retention.port import RetentionStore
 from service.store.rollups.port import RollupStore
 from service.store.spectra_port import SpectraStore
 from service.store.unit_states_port import UnitStates
@@ -91,16 +89,12 @@ class Trend:
         Width of the buckets, whose time is their start; None if every reading stands alone.
     next_ns
         Time of the first reading of the next page; None if there is none.
-    coarse_until_ns
-        Up to when single readings are gone, where the range begins before; only buckets tell of
-        that time.
     """
 
     bucket_ns: int | None
     time_ns: Sequence[int]
     series: Mapping[str, TrendSeries]
     next_ns: int | None = None
-    coarse_until_ns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -171,11 +165,6 @@ class Store(Protocol):
         ...
 
     @property
-    def retention(self) -> RetentionStore:
-        """Deletes what is old."""
-        ...
-
-    @property
     def order1_references(self) -> VectorReferenceStore:
         """Where 1× vectors were when all was well."""
         ...
@@ -217,10 +206,6 @@ class Store(Protocol):
         QueryTooLargeError
             If they are too many.
         """
-        ...
-
-    def reach(self, unit: str) -> Reach | None:
-        """Read up to where the stored results of a unit reach; None if there are none."""
         ...
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:
