@@ -7,8 +7,10 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BeforeValidator
 
+from core.account import Gap
 from core.estimators import STIFFNESS_OF
 from core.quantities import BY_NAME
+from core.units import ns_from_s
 from service.api.access.declared import needs
 from service.api.bearing_models import BearingModel
 from service.api.bearing_views import bearing_model
@@ -148,19 +150,26 @@ def gap_router(context: Context) -> APIRouter:
 
     @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
     async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
-        """Recorded gaps in the samples of a unit that ended within a range of time."""
+        """Recorded gaps in the samples of a unit, stops of the service too, by when they ended."""
         found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
-        return [
-            GapModel(
-                epoch=gap.epoch,
-                first_index=gap.first_index,
-                n_samples=gap.n_samples,
-                end=rfc3339(gap.stop_ns),
-            )
-            for gap in found
-        ]
+        rate_hz = context.unit(unit).sampling_hz
+        return [_gap_model(gap, rate_hz) for gap in found]
 
     return router
+
+
+def _gap_model(gap: Gap, rate_hz: float) -> GapModel:
+    start_ns = gap.start_ns
+    if start_ns is None:
+        start_ns = gap.stop_ns - ns_from_s(gap.n_samples / rate_hz)
+    return GapModel(
+        epoch=gap.epoch,
+        first_index=gap.first_index,
+        n_samples=gap.n_samples,
+        start=rfc3339(start_ns),
+        end=rfc3339(gap.stop_ns),
+        is_estimated=gap.is_estimated,
+    )
 
 
 def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:

@@ -96,7 +96,7 @@ class TrendModel(ApiModel):
 
 
 class GapModel(ApiModel):
-    """Samples that the device counted but nobody delivered."""
+    """Samples that nobody delivered, or that nobody was there to take."""
 
     epoch: int
     """Of the device's count."""
@@ -107,8 +107,15 @@ class GapModel(ApiModel):
     n_samples: int
     """How many are missing, per channel."""
 
+    start: Time
+    """Time of the first missing sample."""
+
     end: Time
     """Time of the first sample after the gap."""
+
+    is_estimated: bool
+    """Whether the device began to count anew in it: `n_samples` is worked out from the times then,
+    and otherwise exact."""
 
 
 class SpectrumChannelModel(ApiModel):

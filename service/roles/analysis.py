@@ -93,6 +93,9 @@ async def analysis_on(
     """
     plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
     live = ground.live
+    if origin is Origin.LIVE:  # a replay begins anew, and misses nothing
+        for unit, monitor in monitors.items():
+            monitor.go_on(await asyncio.to_thread(store.reach, unit))
     deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
     commits = ground.timings.commits
     recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)

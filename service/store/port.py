@@ -10,6 +10,7 @@ from core.alarms.event import AlarmEvent, AlarmNews
 from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
 from core.films.film_judge import FilmNews
+from core.outage import Reach
 from core.quality import Level, Reading
 from service.store.access_port import AccessStore
 from service.store.audit_port import AuditStore
@@ -206,6 +207,10 @@ class Store(Protocol):
         QueryTooLargeError
             If they are too many.
         """
+        ...
+
+    def reach(self, unit: str) -> Reach | None:
+        """Read up to where the stored results of a unit reach; None if there are none."""
         ...
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:

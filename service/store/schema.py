@@ -140,5 +140,10 @@ MIGRATIONS = (
     SPECTRA_TABLES,
     ROLLUP_TABLES,
     UNIT_STATUS_TABLES + COMMAND_TABLES,
+    """
+    ALTER TABLE gap ADD COLUMN start_ns INTEGER;
+    ALTER TABLE gap ADD COLUMN is_estimated INTEGER NOT NULL DEFAULT 0
+        CHECK (is_estimated IN (0, 1));
+    """,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1."""

@@ -8,6 +8,7 @@ from core.alarms.alarm import Alarm
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from core.films.film_judge import FilmNews
+from core.outage import Reach
 from core.quantities import CATALOGUE
 from service.store.access import SqlAccess
 from service.store.alarms import insert_alarms, select_alarms, select_events
@@ -32,6 +33,7 @@ from service.store.port import (
     TrendQuery,
     UnitGap,
 )
+from service.store.reach import gap_of, select_reach
 from service.store.references import insert_reference, select_history, select_in_force
 from service.store.rollups.gathering import SqlRollups
 from service.store.rollups.reading import read_trend
@@ -49,7 +51,10 @@ INSERT_ASSESSMENT = """
     INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
     ON CONFLICT (series, time_ns) DO NOTHING
 """
-INSERT_GAP = "INSERT INTO gap VALUES (?,?,?,?,?) ON CONFLICT DO NOTHING"
+INSERT_GAP = """
+    INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns, start_ns, is_estimated)
+    VALUES (?,?,?,?,?,?,?) ON CONFLICT DO NOTHING
+"""
 """Not OR IGNORE, which would silently drop a row that breaks any other rule, too."""
 
 
@@ -127,15 +132,20 @@ class SqlStore:
         """Read the recorded gaps whose end lies in a range of time, oldest first."""
         with self._reader() as reader:
             rows = reader.execute(
-                "SELECT epoch, first_index, n_samples, stop_ns FROM gap"
+                "SELECT epoch, first_index, n_samples, stop_ns, start_ns, is_estimated FROM gap"
                 " WHERE unit = ? AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index"
                 " LIMIT ?",
                 (unit, storable(start_ns), storable(end_ns), MAX_GAPS + 1),
             )
-            found = [Gap(*row) for row in rows]
+            found = [gap_of(row) for row in rows]
         if len(found) > MAX_GAPS:
             raise QueryTooLargeError(f"more than {MAX_GAPS} gaps: ask for a shorter time")
         return found
+
+    def reach(self, unit: str) -> Reach | None:
+        """Up to where the stored results of a unit reach; None if there are none."""
+        with self._reader() as reader:
+            return select_reach(reader, unit)
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:
         """Read the newest readings of a bearing; None if there are none."""
@@ -200,4 +210,5 @@ class SqlStore:
 
 def _gap_row(found: UnitGap) -> tuple[object, ...]:
     gap = found.gap
-    return (found.unit, gap.epoch, gap.first_index, gap.n_samples, gap.stop_ns)
+    counted = (found.unit, gap.epoch, gap.first_index, gap.n_samples, gap.stop_ns)
+    return (*counted, gap.start_ns, int(gap.is_estimated))

@@ -23,7 +23,9 @@ async def test_gaps_are_listed_with_their_exact_length(running: Any) -> None:
             "epoch": 1,
             "first_index": 60_000,
             "n_samples": 450,
+            "start": "2026-01-01T00:01:39.750Z",
             "end": "2026-01-01T00:01:40.500Z",
+            "is_estimated": False,
         }
     ]
     later = {"start": "2026-01-01T00:01:41Z", "end": "2026-01-02T00:00:00Z"}
