@@ -23,6 +23,7 @@ from service.store.spectra_port import SpectraStore
 from service.store.unit_states_port import UnitStates
 from service.store.value_range import ValueRange
 from service.store.vector_reference_port import VectorReferenceStore
+from service.store.waveform_port import WaveformStore
 
 
 class StoreError(Exception):
@@ -168,6 +169,11 @@ class Store(Protocol):
     @property
     def order1_references(self) -> VectorReferenceStore:
         """Where 1× vectors were when all was well."""
+        ...
+
+    @property
+    def waveforms(self) -> WaveformStore:
+        """Which recordings there are, and in which state."""
         ...
 
     @property

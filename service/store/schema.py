@@ -16,6 +16,7 @@ from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.unit_states import UNIT_STATUS_TABLES
 from service.store.vector_references import VECTOR_REFERENCE_TABLES
+from service.store.waveforms import WAVEFORM_TABLES
 
 MIGRATIONS = (
     """
@@ -145,5 +146,6 @@ MIGRATIONS = (
     ALTER TABLE gap ADD COLUMN is_estimated INTEGER NOT NULL DEFAULT 0
         CHECK (is_estimated IN (0, 1));
     """,
+    WAVEFORM_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1."""

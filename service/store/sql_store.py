@@ -43,6 +43,7 @@ from service.store.spectra_port import SpectraLimits
 from service.store.trends import storable
 from service.store.unit_states import StoredUnitStates
 from service.store.vector_references import SqlVectorReferences
+from service.store.waveforms import StoredWaveforms
 
 MAX_GAPS = 5000
 """Most gaps that are handed out at once."""
@@ -92,6 +93,7 @@ class SqlStore:
         self.access = SqlAccess(self._writing, self._reader, self._chain)
         self.rollups = SqlRollups(self._writing, self._reader)
         self.unit_states = StoredUnitStates(database.writing, self._reader)
+        self.waveforms = StoredWaveforms(database.writing, self._reader)
         self.commands = StoredCommands(database.writing, self._reader)
         self._layout = Layout.of(columns_of(CATALOGUE))
         with database.writing() as writer:
