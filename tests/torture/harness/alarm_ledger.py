@@ -1,7 +1,7 @@
 """What alarms must have told of the exceedances that the truth holds: each once, with a letter."""
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from harness.ledger_daq import Offered
 from harness.ledger_plant import ALERT_UM_PK, DEADBAND_UM, RECEIVER, LedgerPlant
 from harness.lives import ALWAYS, index_of
 from harness.truth import BEARINGS, Spell, Truth
+from harness.watch import Watch
 from service.store.port import AlarmQuery, Store, TrendQuery
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def alarm_faults(
     plant: LedgerPlant,
     store: Store,
     offered: Offered,
-    shown: Collection[tuple[str, int]],
+    watch: Watch,
 ) -> None:
     """Add what is wrong with the alarms of a store to what was found."""
     events = list(_events(store))
@@ -36,8 +37,13 @@ def alarm_faults(
         _check_chain(found, alarm, chain)
     there = {(event.identity.id, event.number) for event in events}
     found.lost += [
-        f"event {number} of {alarm}" for alarm, number in shown if (alarm, number) not in there
+        f"event {number} of {alarm}"
+        for alarm, number in watch.events
+        if (alarm, number) not in there
     ]
+    kept = {(event.identity.id, str(event.change), event.occurrence) for event in events}
+    found.lost += [f"promised: {one}" for one in watch.promised - kept]
+    found.n_promised = len(watch.promised)
     for number, unit in enumerate(plant.units, start=1):
         _check_unit(
             found, plant, store, offered, unit, Truth(plant.seed, number, plant.rate_hz), chains

@@ -11,6 +11,7 @@ from harness.checker import Findings, check
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import UNREACHABLE, Api, RefusedError, ServiceRig
+from harness.truth import BEARINGS
 from harness.watch import Watch, silent_healthy_s
 
 LIFE_S, LONGEST_LIFE_S = 3.0, 12.0
@@ -19,7 +20,7 @@ LIFE_S, LONGEST_LIFE_S = 3.0, 12.0
 RECOVERY_S = 0.5
 """A kill in recovery comes within so long after the start of the process, or of its readiness."""
 
-Trouble = Callable[[int, ServiceRig], None]
+Trouble = Callable[[int], None]
 """What else goes wrong in a cycle."""
 
 
@@ -80,12 +81,12 @@ def kill_cycles(
             done.alarms += alarms_not_as_before(api)
         watch.begin(rig.url)
         if trouble is not None:
-            trouble(number, rig)
-        with rig.api() as api:
-            act(api, number)
+            trouble(number)
         if number % 4 == 0:
             watch.wait_for_result()
         time.sleep(min(rng.exponential(life_s), LONGEST_LIFE_S))
+        with rig.api() as api:
+            act(api, number, watch)
         rig.kill()
         watch.end()
     for unit, n in daq.offered().samples.items():
@@ -96,7 +97,7 @@ def kill_cycles(
         done.alarms += alarms_not_as_before(api)
     time.sleep(3.0 * plant.refresh_s)
     rig.stop()
-    done.findings = check(plant, plant_file, daq.offered(), lives, watch.shown, watch.events)
+    done.findings = check(plant, plant_file, daq.offered(), lives, watch)
     done.silent_healthy_s = silent_healthy_s(plant, daq.offered(), watch.looks)
     done.n_answers = watch.n_answers
     return done
@@ -139,16 +140,23 @@ def _newest_states(api: Api) -> dict[str, str]:
     return states
 
 
-def act(api: Api, number: int) -> None:
+def act(api: Api, number: int, watch: Watch) -> None:
     """Be an operator: acknowledge everything, now and then shelve something."""
     try:
         for alarm in api.get("/api/v1/alarms")["alarms"]:
             path = f"/api/v1/alarms/{alarm['id']}"
             if not alarm["is_acknowledged"]:
-                asked = {"actor": "H", "occurrence": alarm["occurrence"]}
-                api.post(f"{path}/acknowledge", asked)
-        if number % 5 == 1:
-            what = {"actor": "H", "reason": "torture", "duration_s": 4.0}
-            api.post("/api/v1/alarms/U1:device:clock_drift/shelve", what)
+                api.post(f"{path}/acknowledge", {"actor": "H", "occurrence": alarm["occurrence"]})
+                watch.promised.add((alarm["id"], "acknowledged", alarm["occurrence"]))
+        if number % 3 == 2:
+            _shelve(api, number, watch)
     except (*UNREACHABLE, RefusedError):
         return  # what was not answered was not promised
+
+
+def _shelve(api: Api, number: int, watch: Watch) -> None:
+    """Shelve what the ledger does not look at, each time something else."""
+    alarm = f"U1:{BEARINGS[number // 3 % len(BEARINGS)].lower()}_bearing_x:channel_not_ok"
+    what = {"actor": "H", "reason": "torture", "duration_s": 3600.0}
+    found = api.post(f"/api/v1/alarms/{alarm}/shelve", what)
+    watch.promised.add((alarm, "shelved", found["occurrence"]))

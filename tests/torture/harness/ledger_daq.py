@@ -8,6 +8,7 @@ on its standard input and ends with it. Into FILE goes one line for every slot t
 import asyncio
 import dataclasses
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -93,6 +94,14 @@ class LedgerDaq:
             found.samples[unit, epoch] = max(found.samples.get((unit, epoch), 0), first + n)
         return found
 
+    def stop_answering(self) -> None:
+        """Fall silent with the connection open; what is sampled meanwhile comes late or never."""
+        self.process.send_signal(signal.SIGSTOP)
+
+    def answer_again(self) -> None:
+        """Go on."""
+        self.process.send_signal(signal.SIGCONT)
+
     def tell(self, command: str) -> None:
         """Let it do something wrong: ``UNIT FAULT [COUNT]``."""
         assert self.process.stdin is not None
@@ -119,6 +128,7 @@ def ledger_daq(plant: LedgerPlant, folder: Path) -> Iterator[LedgerDaq]:
         found = json.loads(process.stdout.readline())
         yield LedgerDaq(process, log, {unit: int(at["port"]) for unit, at in found.items()})
     finally:
+        process.send_signal(signal.SIGCONT)
         process.terminate()
         process.wait(10)
         for pipe in (process.stdin, process.stdout):

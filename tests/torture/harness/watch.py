@@ -50,6 +50,7 @@ class Watch:
         self._plant, self._t0_ns = plant, offered().t0_ns
         self.shown: dict[tuple[str, str], dict[int, float | None]] = defaultdict(dict)
         self.events: set[tuple[str, int]] = set()
+        self.promised: set[tuple[str, str, int]] = set()
         self.looks: list[Look] = []
         self.n_answers = 0
         self._stopped = threading.Event()

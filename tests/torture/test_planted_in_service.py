@@ -1,0 +1,91 @@
+"""Bugs that are planted in the running service: each must be found out by what is left of it."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.kill_cycles import Cycles, kill_cycles
+from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_plant import LedgerPlant
+from harness.service_rig import ServiceRig
+
+N_CYCLES = 6
+LIFE_S = 3.0
+SILENT_S = 6.0
+N_LOST_SLOTS = 3
+
+
+@pytest.fixture
+def plant(torture_seed: int) -> LedgerPlant:
+    """One unit is enough to find a bug."""
+    return LedgerPlant(seed=torture_seed, n_units=1)
+
+
+@pytest.fixture
+def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
+    """A DAQ that goes on offering samples whatever happens to the service."""
+    with ledger_daq(plant, tmp_path) as running:
+        yield running
+
+
+def _planted(bug: str, kind: str) -> object:
+    return pytest.param(bug, kind, marks=pytest.mark.planted(bug), id=bug)
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ("bug", "kind"),
+    [
+        _planted("alarms_forgotten_at_start", "alarms"),
+        _planted("outage_not_recorded", "gaps"),
+        _planted("gap_not_recorded", "gaps"),
+        _planted("gap_closed_up", "altered"),
+        _planted("stale_shown_as_current", "silent"),
+        _planted("promised_before_commit", "lost"),
+        _planted("finding_dropped", "missing"),
+        _planted("value_altered", "altered"),
+        _planted("letter_queued_twice", "alarms"),
+    ],
+)
+def test_a_bug_in_the_service_is_found_out(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
+    tmp_path: Path,
+    torture_seed: int,
+    is_whole: bool,
+    bug: str,
+    kind: str,
+) -> None:
+    if not is_whole:
+        pytest.skip("takes half a minute: part of make torture")
+    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
+
+    def trouble(number: int) -> None:
+        if number % 2 == 0:
+            daq.tell(f"U1 drop {N_LOST_SLOTS}")
+        elif bug == "stale_shown_as_current":
+            silence(daq)
+
+    with ServiceRig(plant_file, "harness.planted_service", environment={"PLANTED": bug}) as rig:
+        rng = np.random.default_rng(torture_seed)
+        done = kill_cycles(plant, daq, rig, plant_file, N_CYCLES, rng, LIFE_S, trouble)
+    assert kind in found_kinds(done), done
+
+
+def silence(daq: LedgerDaq) -> None:
+    """Let the DAQ not answer for a while; the client goes on looking."""
+    daq.stop_answering()
+    time.sleep(SILENT_S)
+    daq.answer_again()
+
+
+def found_kinds(done: Cycles) -> set[str]:
+    """What was found wrong."""
+    kinds = set(done.findings.wrong)
+    if done.silent_healthy_s:
+        kinds.add("silent")
+    if done.alarms:
+        kinds.add("alarms")
+    return kinds
