@@ -1,7 +1,6 @@
 """The running service from start to end: all roles in one process, and an orderly stop."""
 
 import asyncio
-import signal
 import socket
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from service.origin import Origin
 from service.roles.analysis import Analysis, analysis_on
 from service.roles.ground import Ground, live_view
 from service.roles.serving import Serving, context_of, server_for
+from service.roles.stopping import stop_on_signals
 from service.roles.watched_unit import WatchedUnit
 from service.runner import BUS_CAPACITY, Runner
 from service.settings.plant import PlantFile
@@ -148,12 +148,3 @@ async def _perform(
         for task in (running, *beside, announcing, supervising):
             task.cancel()
         await asyncio.wait([server])
-
-
-def stop_on_signals() -> asyncio.Event:
-    """An event that SIGINT and SIGTERM set."""
-    stopped = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stopped.set)
-    return stopped

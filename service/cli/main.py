@@ -7,6 +7,7 @@ from typing import NoReturn
 import typer
 
 from service.cli import audit, config, delivery, keys, probe, readings, recording, reference, users
+from service.cli.acquire import acquire
 from service.cli.backtest import backtest
 from service.cli.backup import backup, restore
 from service.cli.daq import daq
@@ -24,6 +25,7 @@ EXIT_BUG = 70
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.command()(run)
 app.command()(demo)
+app.command()(acquire)
 app.command()(daq)
 app.command()(record)
 app.command()(replay)

@@ -18,6 +18,7 @@ from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.recording import RecordingSettings
 from service.settings.space import SpaceSettings
 from service.settings.spectra import SpectraSettings
+from service.settings.stream import StreamSettings
 from service.settings.units import UnitSettings
 
 MIN_SEGMENT_TURNS = 8
@@ -209,6 +210,9 @@ class PlantFile(Settings):
 
     space: SpaceSettings = SpaceSettings()
     """How little room on the disk is an alarm."""
+
+    stream: StreamSettings | None = None
+    """Where `padwatch acquire` hands blocks to `padwatch analyse`; `padwatch run` needs none."""
 
     delivery: DeliverySettings = DeliverySettings()
     """Receivers of messages about alarms, besides the dashboard."""

@@ -1,13 +1,18 @@
-"""Blocks that use everything a block can hold."""
+"""Blocks that use everything a block can hold, and a real server."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.nats_server import NatsServer, nats_server, nats_server_command
 
 from core.blocks import Rejection, SampleBlock
 from core.device_clock import DeviceClock, StampFault
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
 from service.stream.identity import UnitIdentity, fingerprint
 
 T0 = 1_767_225_600_123_456_789
@@ -44,3 +49,16 @@ def block() -> SampleBlock:
 @pytest.fixture
 def bad_block(block: SampleBlock) -> SampleBlock:
     return replace(block, channel_quality=(bad(Reason.DEAD), GOOD), slow={}, clock=None)
+
+
+@pytest.fixture
+def plant() -> PlantFile:
+    return load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[NatsServer]:
+    if nats_server_command() is None:
+        pytest.skip("no nats-server is installed")
+    with nats_server(tmp_path / "nats") as server:
+        yield server

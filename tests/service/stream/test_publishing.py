@@ -1,0 +1,234 @@
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import nats
+import numpy as np
+import pytest
+from harness.nats_server import NatsServer
+from nats.js.client import JetStreamContext
+
+from acquisition.clock import SystemClock
+from core.blocks import SampleBlock
+from core.quality import GOOD
+from service.live import LinkState
+from service.roles.link_news import LinkNews
+from service.settings.plant import PlantFile
+from service.settings.stream import StreamSettings
+from service.stream.names import identity_of, stream_name, subject
+from service.stream.publisher import Publisher
+from service.stream.wire import decoded
+
+WAIT_S = 30.0
+
+
+def block(plant: PlantFile, number: int, n_samples: int = 60) -> SampleBlock:
+    unit = plant.unit[0]
+    samples = np.full((len(unit.channel), n_samples), number, np.float32)
+    quality = (GOOD,) * len(unit.channel)
+    first = number * n_samples
+    return SampleBlock(unit.id, 1, first, first, unit.sampling_hz, samples, quality)
+
+
+def publisher(plant: PlantFile, server: NatsServer, **settings: object) -> Publisher:
+    unit = plant.unit[0]
+    return Publisher(
+        plant,
+        StreamSettings(servers=(server.url,), max_gb=0.1, **settings),
+        {unit.id: identity_of(plant, unit)},
+        SystemClock(),
+    )
+
+
+@asynccontextmanager
+async def running(publisher: Publisher) -> AsyncIterator[Publisher]:
+    task = asyncio.create_task(publisher.run())
+    try:
+        yield publisher
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
+async def drained(publisher: Publisher) -> None:
+    await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
+
+
+@asynccontextmanager
+async def looking(server: NatsServer) -> AsyncIterator[JetStreamContext]:
+    client = await nats.connect(server.url)
+    try:
+        yield client.jetstream()
+    finally:
+        await client.close()
+
+
+async def kept(plant: PlantFile, server: NatsServer) -> list[SampleBlock | LinkNews]:
+    unit = plant.unit[0]
+    async with looking(server) as stream:
+        state = (await stream.stream_info(stream_name(plant))).state
+        found = []
+        for sequence in range(state.first_seq, state.last_seq + 1):
+            message = await stream.get_msg(stream_name(plant), sequence)
+            assert message.subject == subject(plant, unit.id)
+            found.append(decoded(message.data or b"", identity_of(plant, unit)))
+        return found
+
+
+def numbers(found: list[SampleBlock | LinkNews]) -> list[int]:
+    return [its.first_index // 60 for its in found if isinstance(its, SampleBlock)]
+
+
+async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    unit = plant.unit[0].id
+    async with running(publisher(plant, server)) as out:
+        out.tell(LinkNews(unit, LinkState.CONNECTED))
+        for number in range(5):
+            await out.publish(block(plant, number))
+        out.tell(LinkNews(unit, LinkState.NOT_CONNECTED, "away"))
+        out.tell(LinkNews(unit, LinkState.NOT_CONNECTED, "away"))
+        await drained(out)
+    found = await kept(plant, server)
+    assert numbers(found) == [0, 1, 2, 3, 4]
+    assert found[0] == LinkNews(unit, LinkState.CONNECTED)
+    assert found[6:] == [LinkNews(unit, LinkState.NOT_CONNECTED, "away")]
+
+
+async def test_a_block_that_is_published_twice_is_kept_once(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    async with running(publisher(plant, server)) as out:
+        for number in (0, 1, 0, 1, 2):
+            await out.publish(block(plant, number))
+        await drained(out)
+        assert out.n_doubles == 2
+    async with running(publisher(plant, server)) as again:
+        await again.publish(block(plant, 2))
+        await drained(again)
+    assert numbers(await kept(plant, server)) == [0, 1, 2]
+
+
+async def test_a_server_that_is_killed_costs_no_block(plant: PlantFile, server: NatsServer) -> None:
+    async with running(publisher(plant, server)) as out:
+        for number in range(30):
+            await out.publish(block(plant, number))
+        await out.waiting.published_at_least(10)
+        server.kill()
+        for number in range(30, 40):
+            await out.publish(block(plant, number))
+        server.start()
+        await drained(out)
+        assert out.trouble is None
+    assert numbers(await kept(plant, server)) == list(range(40))
+
+
+async def test_a_full_memory_makes_the_device_wait_and_loses_nothing(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    out = publisher(plant, server, buffer_mb=1.0)
+    n_samples = 60_000 // len(plant.unit[0].channel)
+    put = asyncio.create_task(_publish_all(out, plant, 12, n_samples))
+    while not put.done() and out.waiting.n_waiting < 4:
+        await asyncio.sleep(0)
+    assert not put.done()
+    assert out.waiting.n_bytes <= out.waiting.capacity
+    async with running(out):
+        await asyncio.wait_for(put, WAIT_S)
+        await drained(out)
+    assert len(await kept(plant, server)) == 12
+
+
+async def _publish_all(out: Publisher, plant: PlantFile, n_blocks: int, n_samples: int) -> None:
+    for number in range(n_blocks):
+        await out.publish(block(plant, number, n_samples))
+
+
+async def test_a_full_stream_refuses_aloud_and_drops_nothing(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    out = publisher(plant, server)
+    async with running(out):
+        await out.publish(block(plant, 0))
+        await drained(out)
+    tight = Publisher(
+        plant,
+        StreamSettings(servers=(server.url,), max_gb=0.001),
+        {plant.unit[0].id: identity_of(plant, plant.unit[0])},
+        SystemClock(),
+    )
+    n_samples = 60_000 // len(plant.unit[0].channel)
+    async with running(tight):
+        await _publish_all(tight, plant, 8, n_samples)
+        await until(lambda: "is full" in (tight.trouble or ""))
+    first = (await kept(plant, server))[0]
+    assert isinstance(first, SampleBlock)
+    assert first.first_index == 0
+
+
+async def until(so: Callable[[], bool]) -> None:
+    async with asyncio.timeout(WAIT_S):
+        while not so():
+            await asyncio.sleep(0.02)
+
+
+async def test_without_a_server_it_waits_and_says_so(plant: PlantFile, tmp_path: Path) -> None:
+    absent = NatsServer(tmp_path / "absent")
+    absent.start()
+    absent.stop()
+    async with running(publisher(plant, absent)) as out:
+        await out.publish(block(plant, 0))
+        await until(lambda: "is not reached" in (out.trouble or ""))
+        absent.start()
+        try:
+            await drained(out)
+        finally:
+            absent.stop()
+
+
+async def test_a_server_without_jetstream_is_named_with_what_to_do(
+    plant: PlantFile, tmp_path: Path
+) -> None:
+    bare = NatsServer(tmp_path / "bare", has_jetstream=False)
+    bare.start()
+    try:
+        async with running(publisher(plant, bare)) as out:
+            await until(lambda: "-js" in (out.trouble or ""))
+    finally:
+        bare.stop()
+
+
+async def test_a_stream_of_another_plant_is_left_alone(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    shared = plant.model_copy(update={"stream": StreamSettings(name="shared")})
+    other = shared.model_copy(
+        update={"plant": plant.plant.model_copy(update={"name": "Another plant"})}
+    )
+    async with running(publisher(shared, server)) as out:
+        await out.publish(block(plant, 0))
+        await drained(out)
+    async with running(publisher(other, server)) as out:
+        await out.publish(block(plant, 1))
+        await until(lambda: "belongs to another plant" in (out.trouble or ""))
+    assert numbers(await kept(shared, server)) == [0]
+
+
+@pytest.mark.parametrize("lines", ['authorization { token: "s3cret" }'])
+async def test_a_server_that_lets_nobody_in_without_a_token_is_named_with_what_to_do(
+    plant: PlantFile, tmp_path: Path, lines: str
+) -> None:
+    closed = NatsServer(tmp_path / "closed", lines)
+    closed.start()
+    token = tmp_path / "token"
+    token.write_text("s3cret\n")
+    try:
+        async with running(publisher(plant, closed)) as out:
+            await until(lambda: "token_file" in (out.trouble or ""))
+        async with running(publisher(plant, closed, token_file=str(token))) as out:
+            await out.publish(block(plant, 0))
+            await drained(out)
+    finally:
+        closed.stop()
