@@ -11,6 +11,7 @@ from pathlib import Path
 from core.units import s_from_ns
 from service.backup.check import BackupError, Content, checked
 from service.backup.durable import create_private, put_in_place, sync_folder
+from service.store.highwater.adopting import adopt_copy
 
 LOGS = ("-wal", "-shm")
 """What SQLite keeps beside a database that is open, or was when its process died."""
@@ -60,6 +61,7 @@ def _replace(copy: Path, database: Path, now_ns: int) -> Path | None:
             checked(aside)
             before = _keep(database, now_ns)
             put_in_place(aside, database)
+            adopt_copy(database)
         except BaseException:
             aside.unlink(missing_ok=True)
             raise

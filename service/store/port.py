@@ -17,6 +17,7 @@ from service.store.audit_port import AuditStore
 from service.store.commands_port import Commands
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
+from service.store.integrity_port import Integrity
 from service.store.outbox_port import Outbox
 from service.store.rollups.port import RollupStore
 from service.store.spectra_port import SpectraStore
@@ -174,6 +175,11 @@ class Store(Protocol):
     @property
     def waveforms(self) -> WaveformStore:
         """Which recordings there are, and in which state."""
+        ...
+
+    @property
+    def integrity(self) -> Integrity:
+        """Whether what is stored is what was stored."""
         ...
 
     @property

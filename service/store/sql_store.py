@@ -21,6 +21,7 @@ from service.store.database import Connection, Database
 from service.store.film_readings import insert_film_news
 from service.store.films import SqlFilms
 from service.store.gap_reference import GapReference
+from service.store.integrity_port import Integrity, Unmarked
 from service.store.newest import select_newest
 from service.store.outbox import SqlOutbox
 from service.store.outbox_port import Address, nobody
@@ -90,6 +91,7 @@ class SqlStore:
         self.films = SqlFilms(self._writing, self._reader, self._chain)
         self.order1_references = SqlVectorReferences(self._writing, self._reader, self._chain)
         self.spectra = SqlSpectra(self._reader)
+        self.integrity: Integrity = Unmarked()
         self.access = SqlAccess(self._writing, self._reader, self._chain)
         self.rollups = SqlRollups(self._writing, self._reader)
         self.unit_states = StoredUnitStates(database.writing, self._reader)

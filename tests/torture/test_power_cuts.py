@@ -90,6 +90,7 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
         path = left_in(tmp_path / "data", files)
         assert not found_after(path, torture_seed, acknowledged, assessment), acknowledged
         assert damage(path) == []
+        assert not mark_findings(path)
         assert verify_trail(path).is_whole
 
 
@@ -113,6 +114,12 @@ def test_a_store_that_promises_too_much_is_found_out(
         if getattr(found_after(path, torture_seed, acknowledged, assessment), what):
             return
     pytest.fail(f"{bug} was not noticed")
+
+
+def mark_findings(path: Path) -> Sequence[object]:
+    """Whether the high-water mark was ahead of the database, or lost."""
+    with closing(SqliteStore(path)) as store:
+        return store.integrity.found
 
 
 def found_after(path: Path, seed: int, acknowledged: int, build: Build) -> Loss:

@@ -9,18 +9,19 @@ from service.store.highwater.comparison import MarkFinding, compared
 from service.store.highwater.file import MarkError, MarkFile, NoMarkError
 from service.store.highwater.host import host_id
 from service.store.highwater.mark import Mark
+from service.store.port import StoreError
 
-HIGHWATER_TABLES = """
-    CREATE TABLE high_water (
+CREATE = """
+    CREATE TABLE IF NOT EXISTS high_water (
         id INTEGER PRIMARY KEY CHECK (id = 1),
         store TEXT NOT NULL,
         host TEXT NOT NULL,
         n_commits INTEGER NOT NULL,
         nonce TEXT NOT NULL,
         time_ns INTEGER NOT NULL
-    ) STRICT;
+    ) STRICT
 """
-"""Statements of the migration that brings it."""
+"""No migration: PostgreSQL, where one row for all writers would hold them up, has no such table."""
 
 COLUMNS = "store, host, n_commits, nonce, time_ns"
 SELECT = """
@@ -60,13 +61,13 @@ class CommitMarks:
         self.found: Sequence[MarkFinding] = ()
         self.error: str | None = None
 
-    def open(self, writer: Writer) -> None:
+    def open(self, writer: Writer, said: Mark | str | None) -> None:
         """Compare the file with the database that has just been opened, within a transaction.
 
         A database without a mark gets one, and so does the folder where there was none before.
         """
-        said = self._said()  # first: it may lag, but not lead
-        mark = _select(writer)
+        writer.execute(CREATE)
+        mark = select_mark(writer)
         if mark is None:
             mark = Mark(_chance(16), self._host, 0, _chance(8), self._now_ns())
             writer.execute(PUT, astuple(mark))
@@ -79,9 +80,9 @@ class CommitMarks:
         """Count the transaction that is about to be committed, in it."""
         if self.found:
             return  # what was found stays to be seen until it is adopted
-        last = _select(writer)
+        last = select_mark(writer)
         if last is None:
-            raise LookupError("the database has lost its high-water mark")
+            raise StoreError("the database has lost its high-water mark")
         self._put(writer, last, last.n_commits + 1)
 
     def settle(self) -> None:
@@ -100,9 +101,9 @@ class CommitMarks:
 
     def adopt(self, writer: Writer) -> None:
         """Take the database as it is for the newest, within a transaction."""
-        last, said = _select(writer), self._said()
+        last, said = select_mark(writer), self.said()
         if last is None:
-            raise LookupError("the database has lost its high-water mark")
+            raise StoreError("the database has lost its high-water mark")
         n_before = said.n_commits if isinstance(said, Mark) else 0
         # beyond both, so that no mark of before fits ever again
         self._put(writer, last, max(last.n_commits, n_before) + 1)
@@ -122,7 +123,11 @@ class CommitMarks:
         self._newest = Mark(last.store, self._host, n_commits, _chance(8), self._now_ns())
         writer.execute(PUT, astuple(self._newest))
 
-    def _said(self) -> Mark | str | None:
+    def said(self) -> Mark | str | None:
+        """What the file says, or why it says nothing; None if it is not there.
+
+        Before the database is opened to be compared with it: the file may lag, but not lead.
+        """
         try:
             return self._file.read()
         except NoMarkError:
@@ -131,7 +136,8 @@ class CommitMarks:
             return str(error)
 
 
-def _select(reader: Writer) -> Mark | None:
+def select_mark(reader: Writer) -> Mark | None:
+    """Read the mark in a database; None if it has none yet."""
     row = reader.execute(SELECT).fetchone()
     if row is None:
         return None

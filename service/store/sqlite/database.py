@@ -6,8 +6,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
+from acquisition.clock import SystemClock
 from service.origin import Origin
 from service.store.database import Connection, Unreadable
+from service.store.highwater.commits import CommitMarks
+from service.store.highwater.file import MarkFile, mark_path
 from service.store.port import StoreError
 from service.store.sqlite.file_length import why_cut
 from service.store.sqlite.holding import FileHold, held
@@ -35,6 +38,8 @@ class SqliteDatabase:
     ----------
     had_trail
         Whether there was an audit trail in it before it was opened.
+    marks
+        Whether it is the database that was here last.
 
     Raises
     ------
@@ -48,6 +53,7 @@ class SqliteDatabase:
         self._path = path
         self.lock = Lock()
         self._readers = Readers(path)
+        self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
             if (cut := why_cut(path)) is not None:
@@ -69,16 +75,12 @@ class SqliteDatabase:
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Open a transaction of the one writer; durable when left."""
+        """Open a transaction of the one writer; durable, and marked as such, when left."""
         with self.lock, self._renamed_errors():
-            self.writer.execute("BEGIN IMMEDIATE")
-            try:
+            with self._transaction():
                 yield self.writer
-                self.writer.execute("COMMIT")
-            finally:
-                # a full disk has rolled back already; a refused commit leaves the transaction open
-                if self.writer.in_transaction:
-                    self.writer.execute("ROLLBACK")
+                self.marks.count(self.writer)
+            self.marks.settle()
 
     @contextmanager
     def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
@@ -99,13 +101,27 @@ class SqliteDatabase:
         """Take a name, by the lock of a file beside the database."""
         return held(self._path, name)
 
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self.writer.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            self.writer.execute("COMMIT")
+        finally:
+            # a full disk has rolled back already; a refused commit leaves the transaction open
+            if self.writer.in_transaction:
+                self.writer.execute("ROLLBACK")
+
     def _prepare(self, origin: Origin) -> bool:
         """Bring the file up to date; whether it had an audit trail before."""
+        said = self.marks.said()
         self.writer.execute(f"PRAGMA page_size = {PAGE_BYTES}")  # of a file yet to be written
         had_trail = self.writer.execute(HAS_TRAIL).fetchone() is not None
         migrate(self.writer, str(self._path), origin)  # first: what is not ours stays as it is
         for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
             self.writer.execute(f"PRAGMA {setting}")
+        with self._transaction():
+            self.marks.open(self.writer, said)
         return had_trail
 
     @contextmanager

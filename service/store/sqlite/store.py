@@ -5,6 +5,7 @@ from pathlib import Path
 from service.audit.head import head_path
 from service.origin import Origin
 from service.store.audit_chain import begin_head
+from service.store.integrity import Marked
 from service.store.outbox_port import Address, nobody
 from service.store.port import StoreError
 from service.store.spectra_port import SpectraLimits
@@ -46,6 +47,7 @@ class SqliteStore(SqlStore):
             if not database.had_trail:
                 begin_head(head_path(path))
             super().__init__(database, head_path(path), address, spectra)
+            self.integrity = Marked(database.marks, self._writing, self._chain)
         except OSError as error:
             database.close()
             raise StoreError(f"{path}: {error}") from error

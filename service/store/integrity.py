@@ -1,0 +1,69 @@
+"""A store in a file, and how it knows that it is the newest."""
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+
+from service.audit.entry import Deed
+from service.store.audit_chain import AuditChain
+from service.store.database import Connection
+from service.store.highwater.commits import CommitMarks
+from service.store.highwater.comparison import MarkFinding
+
+
+class Marked:
+    """A store with a high-water mark beside it.
+
+    Parameters
+    ----------
+    marks
+        Of its database.
+    writing
+        Opens a transaction.
+    chain
+        Is told.
+    """
+
+    def __init__(
+        self,
+        marks: CommitMarks,
+        writing: Callable[[], AbstractContextManager[Connection]],
+        chain: AuditChain,
+    ) -> None:
+        self._marks, self._writing, self._chain = marks, writing, chain
+
+    @property
+    def found(self) -> Sequence[MarkFinding]:
+        """What was wrong with the database when it was opened, until it is adopted."""
+        return self._marks.found
+
+    @property
+    def mark_error(self) -> str | None:
+        """Why the high-water mark could not be written last; None if it could."""
+        return self._marks.error
+
+    def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
+        """Go on with the database as it is, and tell the audit trail; what was wrong with it.
+
+        Raises
+        ------
+        StoreError
+            If the database cannot be written; then it will be found again.
+        """
+        found = self._marks.found
+        if found:
+            with self._writing() as writer:
+                self._marks.adopt(writer)
+                self._chain.add(writer, [_deed(finding, now_ns) for finding in found])
+            self._marks.adopted()
+        return found
+
+
+def _deed(finding: MarkFinding, now_ns: int) -> Deed:
+    return Deed(
+        time_ns=now_ns,
+        actor="padwatch",
+        action=f"store.{finding.kind}",
+        object="store",
+        after={"n_transactions_missing": finding.n_missing},
+        reason=finding.detail,
+    )

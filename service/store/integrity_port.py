@@ -1,0 +1,35 @@
+"""What a store knows of its own soundness: whether it is the newest, and what of it is damaged."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from service.store.highwater.comparison import MarkFinding
+
+
+class Integrity(Protocol):
+    """Whether what is stored is what was stored."""
+
+    @property
+    def found(self) -> Sequence[MarkFinding]:
+        """What was wrong with the database when it was opened, until it is adopted."""
+        ...
+
+    @property
+    def mark_error(self) -> str | None:
+        """Why the high-water mark could not be written last; None if it could."""
+        ...
+
+    def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
+        """Go on with the database as it is, and tell the audit trail; what was wrong with it."""
+        ...
+
+
+class Unmarked:
+    """A store that looks after itself: a server's database, which has no file beside it."""
+
+    found: Sequence[MarkFinding] = ()
+    mark_error: str | None = None
+
+    def adopt(self, now_ns: int) -> Sequence[MarkFinding]:  # noqa: ARG002
+        """Nothing is to be adopted."""
+        return ()

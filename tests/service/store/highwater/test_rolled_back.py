@@ -1,0 +1,298 @@
+"""Databases that are not the one that was here last: cut, replaced, put back, copied."""
+
+import os
+import shutil
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from core.assessment import Assessment
+from service.backup.backing_up import back_up
+from service.backup.restoring import restore
+from service.store.audit_port import AuditQuery
+from service.store.highwater.comparison import Kind, MarkFinding
+from service.store.highwater.file import MarkFile, mark_path
+from service.store.port import StoreError, TrendQuery
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Assessment]
+T0 = 1_767_225_600_000_000_000
+N_KEPT, N_LATER = 40, 25
+EVERYTHING = TrendQuery("U1", "UJB", ("speed_rpm",), 0, 2**62, 5000, 2**62)
+
+
+def fill(store: SqliteStore, build: Build, numbers: range) -> None:
+    """A transaction for each number."""
+    for n in numbers:
+        store.append([build(T0 + n * 1_000_000_000, speed_rpm=float(n))], [])
+
+
+def speeds(store: SqliteStore) -> list[float | None]:
+    return list(store.trend(EVERYTHING).series["speed_rpm"].mean)
+
+
+def opened(path: Path) -> tuple[list[MarkFinding], list[float | None]]:
+    """What a service that starts finds, and what it goes on with."""
+    with closing(SqliteStore(path)) as store:
+        return list(store.integrity.adopt(T0)), speeds(store)
+
+
+def image(path: Path, folder: Path) -> Path:
+    """The data folder as it is now, as after the death of the process."""
+    shutil.copytree(path.parent, folder)
+    return folder / path.name
+
+
+def beside(path: Path, suffix: str) -> Path:
+    return path.with_name(path.name + suffix)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "data" / "padwatch.sqlite3"
+
+
+@pytest.fixture
+def crashed(path: Path, tmp_path: Path, assessment: Build) -> Iterator[Path]:
+    """A folder whose log holds the last transactions, as kill -9 leaves it."""
+    store = SqliteStore(path)
+    fill(store, assessment, range(N_KEPT))
+    store._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    fill(store, assessment, range(N_KEPT, N_KEPT + N_LATER))
+    yield image(path, tmp_path / "crashed")
+    store.close()
+
+
+def test_after_a_crash_nothing_is_missing_and_nothing_is_said(crashed: Path) -> None:
+    assert beside(crashed, "-wal").stat().st_size
+    assert opened(crashed) == ([], [float(n) for n in range(N_KEPT + N_LATER)])
+
+
+def test_a_log_that_is_gone_is_told_with_the_number_of_transactions(crashed: Path) -> None:
+    beside(crashed, "-wal").unlink()
+
+    (finding,), left = opened(crashed)
+
+    assert finding.kind is Kind.ROLLED_BACK
+    assert finding.n_missing == N_LATER
+    assert left == [float(n) for n in range(N_KEPT)]
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.3, 0.6, 0.95])
+def test_a_log_that_was_cut_is_told_with_the_number_of_transactions(
+    crashed: Path, kept: float
+) -> None:
+    log = beside(crashed, "-wal")
+    os.truncate(log, int(kept * log.stat().st_size))
+
+    (finding,), left = opened(crashed)
+
+    assert finding.kind is Kind.ROLLED_BACK
+    assert finding.n_missing == N_KEPT + N_LATER - len(left) > 0
+
+
+@pytest.mark.parametrize("share", [0.01, 0.2, 0.5, 0.8, 0.99])
+def test_a_bit_flipped_in_the_log_is_told_with_the_number_of_transactions(
+    crashed: Path, share: float
+) -> None:
+    log = beside(crashed, "-wal")
+    content = bytearray(log.read_bytes())
+    content[int(share * len(content))] ^= 4
+    log.write_bytes(content)
+
+    (finding,), left = opened(crashed)
+
+    assert finding.kind is Kind.ROLLED_BACK
+    assert finding.n_missing == N_KEPT + N_LATER - len(left) > 0
+
+
+def test_a_stale_index_of_the_log_changes_nothing(crashed: Path) -> None:
+    stale = b"\x18\xe2\x2d\x00" * 8192
+    beside(crashed, "-shm").write_bytes(stale)
+
+    assert opened(crashed) == ([], [float(n) for n in range(N_KEPT + N_LATER)])
+
+
+def test_only_the_database_copied_while_padwatch_ran_is_told(crashed: Path, tmp_path: Path) -> None:
+    (tmp_path / "naive").mkdir()
+    copied = tmp_path / "naive" / crashed.name
+    shutil.copyfile(crashed, copied)
+    shutil.copyfile(mark_path(crashed), mark_path(copied))
+
+    (finding,), _ = opened(copied)
+
+    assert (finding.kind, finding.n_missing) == (Kind.ROLLED_BACK, N_LATER)
+
+
+def test_an_old_copy_put_in_place_by_hand_is_told_once_and_in_the_audit_trail(
+    path: Path, tmp_path: Path, assessment: Build
+) -> None:
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(3))
+    old = image(path, tmp_path / "old")
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(3, 10))
+    shutil.copyfile(old, path)
+
+    with closing(SqliteStore(path)) as store:
+        (finding,) = store.integrity.adopt(T0)
+        (told,) = store.audit.entries(AuditQuery(action="store.rolled_back"))
+
+    assert finding.n_missing == 8  # seven results, and the one with which the store was opened
+    assert told.reason == finding.detail
+    assert told.after == '{"n_transactions_missing":8}'
+    assert opened(path)[0] == []
+
+
+def test_what_a_command_finds_is_left_for_the_service_to_tell(
+    path: Path, tmp_path: Path, assessment: Build
+) -> None:
+    SqliteStore(path).close()
+    old = image(path, tmp_path / "old")
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(2))
+    shutil.copyfile(old, path)
+    for _ in range(5):  # commands write, too: as many transactions as are missing, and more
+        with closing(SqliteStore(path)) as store:
+            fill(store, assessment, range(1))
+
+    (finding,), _ = opened(path)
+
+    assert (finding.kind, finding.n_missing) == (Kind.ROLLED_BACK, 3)
+
+
+def test_a_database_of_another_plant_is_told(path: Path, tmp_path: Path, assessment: Build) -> None:
+    other = tmp_path / "other" / path.name
+    for place in (path, other):
+        with closing(SqliteStore(place)) as store:
+            fill(store, assessment, range(3))
+    shutil.copyfile(other, path)
+
+    (finding,), _ = opened(path)
+
+    assert finding.kind is Kind.REPLACED
+    assert opened(path)[0] == []
+
+
+def test_a_database_that_is_gone_is_told_by_the_empty_one_after_it(
+    path: Path, assessment: Build
+) -> None:
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(3))
+    path.unlink()
+
+    (finding,), left = opened(path)
+
+    assert (finding.kind, left) == (Kind.REPLACED, [])
+
+
+def test_two_databases_that_came_from_one_are_told_apart(
+    path: Path, tmp_path: Path, assessment: Build
+) -> None:
+    SqliteStore(path).close()
+    other = image(path, tmp_path / "other")
+    for place in (path, other):
+        with closing(SqliteStore(place)) as store:
+            fill(store, assessment, range(4))
+    shutil.copyfile(other, path)
+
+    (finding,), _ = opened(path)
+
+    assert finding.kind is Kind.ROLLED_BACK
+    assert "another one" in finding.detail
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\0" * 8192])
+def test_a_mark_that_is_lost_is_told_and_made_anew(
+    path: Path, assessment: Build, content: bytes | None
+) -> None:
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(3))
+    mark_path(path).unlink()
+    if content is not None:
+        mark_path(path).write_bytes(content)
+
+    (finding,), left = opened(path)
+
+    assert (finding.kind, len(left)) == (Kind.MARK_LOST, 3)
+    assert opened(path)[0] == []
+
+
+def test_a_restored_backup_is_what_somebody_wanted(
+    path: Path, tmp_path: Path, assessment: Build
+) -> None:
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(3))
+        made = back_up(path, tmp_path / "copies", T0, 3)
+        fill(store, assessment, range(3, 10))
+    restore(made.path, path, T0)
+
+    assert opened(path) == ([], [0.0, 1.0, 2.0])
+
+
+def test_a_restored_backup_from_before_there_were_marks_gets_one(
+    path: Path, tmp_path: Path, assessment: Build
+) -> None:
+    with closing(SqliteStore(path)) as store:
+        fill(store, assessment, range(3))
+        made = back_up(path, tmp_path / "copies", T0, 3)
+    with closing(sqlite3.connect(made.path)) as old:
+        old.execute("DROP TABLE high_water")
+        old.commit()
+    restore(made.path, path, T0)
+
+    assert opened(path) == ([], [0.0, 1.0, 2.0])
+    assert mark_path(path).exists()
+
+
+def test_a_mark_that_cannot_be_written_does_not_undo_what_is_on_the_disk(
+    path: Path, assessment: Build
+) -> None:
+    with closing(SqliteStore(path)) as store:
+        mark_path(path).unlink()
+        mark_path(path).mkdir()
+        fill(store, assessment, range(3))
+        said = store.integrity.mark_error
+        assert len(speeds(store)) == 3
+        mark_path(path).rmdir()
+    assert said is not None
+    assert "Is a directory" in said
+
+
+def test_the_mark_is_written_before_a_transaction_is_acknowledged(
+    path: Path, assessment: Build
+) -> None:
+    file = MarkFile(mark_path(path))
+    with closing(SqliteStore(path)) as store:
+        before = file.read().n_commits
+        for n in range(5):
+            fill(store, assessment, range(n, n + 1))
+            assert file.read().n_commits == before + n + 1
+
+
+def test_a_transaction_that_was_refused_is_not_counted(path: Path, assessment: Build) -> None:
+    file = MarkFile(mark_path(path))
+    with closing(SqliteStore(path)) as store:
+        before = file.read()
+        store._writer.execute(
+            "CREATE TRIGGER refuse BEFORE INSERT ON assessment BEGIN SELECT RAISE(ABORT, 'no'); END"
+        )
+        with pytest.raises(StoreError, match="no"):
+            fill(store, assessment, range(1))
+        assert file.read() == before
+
+
+def test_a_store_whose_newest_mark_is_never_compared_is_found_out(
+    crashed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The planted bug: what the tests above would miss if nobody looked at the mark."""
+    monkeypatch.setattr("service.store.highwater.commits.compared", lambda *_: [])
+    beside(crashed, "-wal").unlink()
+
+    found, left = opened(crashed)
+
+    assert found == []
+    assert len(left) == N_KEPT  # a loss without a word
