@@ -63,6 +63,9 @@ class AlarmKind(StrEnum):
     BLOCKS_WAITING = "blocks_waiting"
     ANALYSIS_LATE = "analysis_late"
     CAPTURES_NOT_KEPT = "captures_not_kept"
+    SAMPLES_NOT_RECORDED = "samples_not_recorded"
+    RECORDINGS_DAMAGED = "recordings_damaged"
+    QUESTIONS_REFUSED = "questions_refused"
     DISK_NEARLY_FULL = "disk_nearly_full"
 
 

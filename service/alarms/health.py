@@ -7,9 +7,12 @@ from core.account import SampleAccount
 from core.alarms.alarm import WITHIN, AlarmLevel, Condition
 from service.bus import Bus
 from service.capture.captures import Captures
+from service.continuous.tape import Tape
 from service.live import LiveView
+from service.load.watch import LoadWatch
 from service.recorder import Recorder
 from service.space.watch import SpaceWatch
+from service.waveforms.keeper import WaveformKeeper
 
 DiskJudge = Callable[[AlarmLevel | None], Condition]
 """What is to be said of the fullest disk, by the level that it had before."""
@@ -39,6 +42,12 @@ class ServiceHealth:
         For how long the oldest block in it has waited.
     captures_error
         Why samples around alarms are not kept; None if they are.
+    recording_error
+        Why not all samples are recorded that should be; None if they are.
+    n_recordings_damaged
+        Recordings that were found damaged or missing since the start.
+    refused
+        Which questions are refused because the service is behind; None if none are.
     accounts
         Where samples went, by unit.
     disk
@@ -51,6 +60,9 @@ class ServiceHealth:
     waiting_share: float = 0.0
     analysis_delay_s: float = 0.0
     captures_error: str | None = None
+    recording_error: str | None = None
+    n_recordings_damaged: int = 0
+    refused: str | None = None
     accounts: Mapping[str, SampleAccount] = field(default_factory=dict)
     disk: DiskJudge = enough_room
 
@@ -65,6 +77,9 @@ def health_of(
     captures: Captures,
     bus: Bus,
     space: SpaceWatch | None = None,
+    load: LoadWatch | None = None,
+    tape: Tape | None = None,
+    recordings: WaveformKeeper | None = None,
 ) -> LookAtHealth:
     """A look at the parts of the running service."""
     names = list(units)
@@ -77,6 +92,9 @@ def health_of(
             waiting_share=bus.depth / bus.capacity,
             analysis_delay_s=bus.oldest_wait_s,
             captures_error=captures.trouble,
+            recording_error=tape.trouble if tape else None,
+            n_recordings_damaged=recordings.n_lost if recordings else 0,
+            refused=load.words if load else None,
             accounts={unit: live.status(unit).account for unit in names},
             disk=enough_room if space is None else space.condition,
         )

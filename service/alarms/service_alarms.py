@@ -65,6 +65,7 @@ class ServiceAlarms:
         self._board = AlarmBoard(self._watches.values())
         self._losses = {unit: SampleLoss() for unit in names}
         self._n_unstored = 0
+        self._n_damaged = 0
 
     @property
     def alarms(self) -> Sequence[Alarm]:
@@ -109,6 +110,9 @@ class ServiceAlarms:
         ):
             self._find(kind, self._compared(kind, value), now_ns)
         self._find(AlarmKind.CAPTURES_NOT_KEPT, _captures(health), now_ns)
+        self._find(AlarmKind.SAMPLES_NOT_RECORDED, _recording(health), now_ns)
+        self._find(AlarmKind.RECORDINGS_DAMAGED, self._damaged(health), now_ns)
+        self._find(AlarmKind.QUESTIONS_REFUSED, _refused(health), now_ns)
         self._find(AlarmKind.DISK_NEARLY_FULL, self._disk(health), now_ns)
         for unit, account in health.accounts.items():
             share = self._losses[unit].share(account, now_ns)
@@ -131,6 +135,14 @@ class ServiceAlarms:
             return WITHIN
         return Condition(AlarmLevel.DANGER, value=float(health.n_unstored), reason="given_up")
 
+    def _damaged(self, health: ServiceHealth) -> Condition:
+        n_more = health.n_recordings_damaged - self._n_damaged
+        self._n_damaged = health.n_recordings_damaged
+        if n_more <= 0:
+            return WITHIN
+        n_all = float(health.n_recordings_damaged)
+        return Condition(AlarmLevel.ALERT, value=n_all, reason="damaged_or_missing")
+
     def _compared(self, key: str, value: float) -> Condition:
         watch = self._watches[key]
         if not isinstance(watch, LimitWatch):
@@ -140,6 +152,18 @@ class ServiceAlarms:
 
     def _find(self, key: str, condition: Condition, now_ns: int) -> None:
         self._board.find(self._watches[key], condition, now_ns)
+
+
+def _refused(health: ServiceHealth) -> Condition:
+    if health.refused is None:
+        return WITHIN
+    return Condition(AlarmLevel.ALERT, reason=health.refused)
+
+
+def _recording(health: ServiceHealth) -> Condition:
+    if health.recording_error is None:
+        return WITHIN
+    return Condition(AlarmLevel.ALERT, reason=health.recording_error)
 
 
 def _captures(health: ServiceHealth) -> Condition:

@@ -13,6 +13,8 @@ from service.settings.alarms import AlarmSettings
 STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
 """Subjects of alarms about the service; lost samples have their unit's name."""
 
+RECORDINGS = "recordings"
+
 FULL_SHARE = 0.9
 """Of the queue: about to make acquisition wait."""
 
@@ -63,6 +65,9 @@ def service_watches(units: Iterable[str], rules: ServiceRules) -> dict[str, Watc
         _limit(SERVICE, AlarmKind.BLOCKS_WAITING, steady, rules.waiting),
         _limit(SERVICE, AlarmKind.ANALYSIS_LATE, steady, rules.delay),
         Watch(_identity(CAPTURES, AlarmKind.CAPTURES_NOT_KEPT), soon, CAPTURES),
+        Watch(_identity(RECORDINGS, AlarmKind.SAMPLES_NOT_RECORDED), soon, RECORDINGS),
+        Watch(_identity(RECORDINGS, AlarmKind.RECORDINGS_DAMAGED), lasting, RECORDINGS),
+        Watch(_identity(SERVICE, AlarmKind.QUESTIONS_REFUSED), steady, SERVICE),
         Watch(_identity(DISK, AlarmKind.DISK_NEARLY_FULL), steady, DISK),
     ]
     found = {watch.identity.kind.value: watch for watch in watches}

@@ -49,6 +49,9 @@ AlarmKindName = Literal[
     "blocks_waiting",
     "analysis_late",
     "captures_not_kept",
+    "samples_not_recorded",
+    "recordings_damaged",
+    "questions_refused",
     "disk_nearly_full",
 ]
 

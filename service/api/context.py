@@ -19,6 +19,7 @@ from service.api.ports import (
 from service.api.problems import ProblemError
 from service.audit.refusals import Refusals
 from service.evidence.desk import EvidenceDesk
+from service.load.watch import LoadWatch
 from service.metrics.polls import TimedSource
 from service.metrics.watched import Watched
 from service.origin import Origin
@@ -53,6 +54,8 @@ class Context:
         Tells who asks; None for one that asks nobody on this computer.
     space
         Knows how full the disks are; None where nobody looks.
+    load
+        Knows which questions are refused now; None where none ever are.
     refusals
         Takes refused requests; None for a taker of the application's own.
     sources
@@ -80,6 +83,7 @@ class Context:
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     access: AccessDesk | None = None
     space: SpaceWatch | None = None
+    load: LoadWatch | None = None
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

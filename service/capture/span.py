@@ -18,7 +18,10 @@ WITHOUT_SAMPLES = (
     AlarmKind.BLOCKS_WAITING,
     AlarmKind.ANALYSIS_LATE,
     AlarmKind.CAPTURES_NOT_KEPT,
+    AlarmKind.SAMPLES_NOT_RECORDED,
+    AlarmKind.RECORDINGS_DAMAGED,
     AlarmKind.DISK_NEARLY_FULL,
+    AlarmKind.QUESTIONS_REFUSED,
 )
 """Kinds of alarms that no sample can explain."""
 
@@ -36,8 +39,6 @@ class CaptureSettings:
         Before the alarm and after it.
     max_s
         Longest capture.
-    max_bytes
-        Space of all of them together.
     window_s
         Length of an averaging window: as much is kept before an alarm of a film.
     """
@@ -45,7 +46,6 @@ class CaptureSettings:
     pre_s: float = 60.0
     post_s: float = 120.0
     max_s: float = 600.0
-    max_bytes: int = 10_000_000_000
     window_s: float = 0.0
 
     @property

@@ -11,6 +11,7 @@ from service.delivery.deliveries import Deliveries
 from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
+from service.load.watch import LoadWatch
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.recorder import Recorder
@@ -29,6 +30,8 @@ class Watched:
         Where samples come from, by unit; of those that are timed.
     space
         Knows how full the disks are; None where nobody looks.
+    load
+        Knows which questions are refused now; None where none ever are.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -44,3 +47,4 @@ class Watched:
     clock: Clock
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     space: SpaceWatch | None = None
+    load: LoadWatch | None = None

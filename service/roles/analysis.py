@@ -17,6 +17,8 @@ from service.delivery.facts import Around
 from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
+from service.load.strain import LoadLimits
+from service.load.watch import LoadWatch
 from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
@@ -24,12 +26,14 @@ from service.roles.analysing import Analyser
 from service.roles.ground import Ground
 from service.rolling import Rolling
 from service.space.watch import SpaceWatch
+from service.waveforms.keeper import WaveformKeeper
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of
 from service.wiring.evidence import evidence_of, watch
 from service.wiring.sources import vector_rows
 from service.wiring.space import space_watch
 from service.wiring.tapes import tape_of
+from service.wiring.waveforms import waveform_keeper
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,14 @@ class Analysis:
     deliveries: Deliveries
     captures: Captures
     tape: Tape
+    recordings: WaveformKeeper
     alarms: AlarmEngine
     films: FilmKeeper
     evidence: EvidenceKeeper
     references: ReferencesInForce
     rolling: Rolling
     space: SpaceWatch
+    load: LoadWatch
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Begin the loops beside the blocks; they run until they are cancelled."""
@@ -60,9 +66,11 @@ class Analysis:
             "evidence": self.evidence.run,
             "gather": self.rolling.run,
             "space": self.space.run,
+            "load": self.load.run,
         }
         if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
             loops["learn"] = self.films.run
+            loops["recordings"] = self.recordings.run
         begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
         return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
 
@@ -72,6 +80,7 @@ class Analysis:
         await self.recorder.flush()
         await self.evidence.close()
         await self.tape.close()
+        self.recordings.close()
 
 
 async def analysis_on(
@@ -100,9 +109,13 @@ async def analysis_on(
     commits = ground.timings.commits
     recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)
     captures = captures_of(plant, origin, clock)
-    tape = tape_of(plant, origin, clock, Pressure(bus).look)
+    recordings = waveform_keeper(plant, store, clock)
+    tape = tape_of(plant, origin, clock, Pressure(bus, recordings.is_full).look)
     space = space_watch(plant, clock)
-    look = health_of(monitors, live, recorder, captures, bus, space)
+    load = LoadWatch(bus, LoadLimits(), clock)
+    look = health_of(
+        monitors, live, recorder, captures, bus, space, load, tape=tape, recordings=recordings
+    )
     alarms = await alarm_engine(
         plant, origin, store, recorder.put, clock, captures, vector_rows(plant), look, tape.take
     )
@@ -120,10 +133,12 @@ async def analysis_on(
         deliveries=deliveries,
         captures=captures,
         tape=tape,
+        recordings=recordings,
         alarms=alarms,
         films=films,
         evidence=evidence,
         references=references,
         rolling=Rolling(store.rollups, clock),
         space=space,
+        load=load,
     )

@@ -15,6 +15,7 @@ from service.audit.refusals import Refusals
 from service.bus import Bus
 from service.http.listening import url_of
 from service.http.server import GuardedServer
+from service.load.shedding import Shedding
 from service.metrics.polls import TimedSource
 from service.metrics.watched import Watched
 from service.roles.analysis import Analysis
@@ -70,7 +71,8 @@ def server_for(context: Context, ground: Ground) -> GuardedServer:
     """What serves a context."""
     app = create_app(context)
     app.openapi()  # kept from now on: no client waits for it, nor samples for a client
-    return server_of(app, ground.plant, ground.clock)
+    asked = app if context.load is None else Shedding(app, context.load)
+    return server_of(asked, ground.plant, ground.clock)
 
 
 def context_of(
@@ -105,6 +107,7 @@ def context_of(
         refusals=refusals,
         access=desk,
         space=analysis.space,
+        load=analysis.load,
     )
 
 
@@ -125,4 +128,5 @@ def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource])
         clock=ground.clock,
         sources=sources,
         space=analysis.space,
+        load=analysis.load,
     )

@@ -39,6 +39,9 @@ const KINDS = {
   blocks_waiting: "Queue to the analysis fills",
   analysis_late: "Analysis falls behind",
   captures_not_kept: "Samples around alarms not kept",
+  samples_not_recorded: "Samples not recorded",
+  recordings_damaged: "Recordings damaged or missing",
+  questions_refused: "Too busy to answer",
   disk_nearly_full: "Disk nearly full",
 };
 
