@@ -23,7 +23,8 @@ from service.api.trend_views import trend_columns, trend_model
 from service.store.codec import Layout, columns_of, remember_layout
 from service.store.port import TrendQuery
 from service.store.rollups.cells import Cells, Conditions
-from service.store.rollups.rolling import SET_MARK, insert_cells
+from service.store.rollups.making import insert_cells
+from service.store.rollups.rolling import SET_MARK
 from service.store.rollups.widths import HOUR_NS, NS_PER_S, WIDTHS_NS
 from service.store.sqlite import SqliteStore
 from service.store.summaries import Summaries

@@ -38,12 +38,18 @@ MAX_DAYS = (2**63 - 1) // DAY_NS
 """Wider than that does not fit the nanoseconds; two of them hold all time since 1970."""
 
 
-def bucket_width_ns(start_ns: int, end_ns: int, max_points: int) -> int:
-    """Narrowest width, round to people, at which a range takes at most ``max_points`` buckets."""
+def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int = 1) -> int:
+    """Narrowest width, round to people, at which a range takes at most ``max_points`` buckets.
+
+    Parameters
+    ----------
+    finest_ns
+        What there is of the range is in buckets of this width; it divides a day.
+    """
     # aligned buckets may cut one more piece off the range than its length holds
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
     for width in NICE_WIDTHS_NS:
-        if width >= needed:
+        if width >= needed and width % finest_ns == 0:
             return width
     return min(-(-needed // DAY_NS), MAX_DAYS) * DAY_NS
 

@@ -19,6 +19,7 @@ from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity
 from service.store.outbox_port import Outbox
+from service.store.retention.port import RetentionStore
 from service.store.rollups.port import RollupStore
 from service.store.spectra_port import SpectraStore
 from service.store.unit_states_port import UnitStates
@@ -92,12 +93,16 @@ class Trend:
         Width of the buckets, whose time is their start; None if every reading stands alone.
     next_ns
         Time of the first reading of the next page; None if there is none.
+    coarse_until_ns
+        Up to when single readings are gone, where the range begins before; only buckets tell of
+        that time.
     """
 
     bucket_ns: int | None
     time_ns: Sequence[int]
     series: Mapping[str, TrendSeries]
     next_ns: int | None = None
+    coarse_until_ns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +170,11 @@ class Store(Protocol):
     @property
     def rollups(self) -> RollupStore:
         """Trends gathered beforehand."""
+        ...
+
+    @property
+    def retention(self) -> RetentionStore:
+        """Deletes what is old."""
         ...
 
     @property

@@ -12,6 +12,7 @@ from service.store.audit_schema import AUDIT_TABLES
 from service.store.commands import COMMAND_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
+from service.store.retention.schema import RETENTION_TABLES
 from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.unit_states import UNIT_STATUS_TABLES
@@ -147,5 +148,6 @@ MIGRATIONS = (
         CHECK (is_estimated IN (0, 1));
     """,
     WAVEFORM_TABLES,
+    RETENTION_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1."""

@@ -36,6 +36,7 @@ from service.store.port import (
 )
 from service.store.reach import gap_of, select_reach
 from service.store.references import insert_reference, select_history, select_in_force
+from service.store.retention.sql import SqlRetention
 from service.store.rollups.gathering import SqlRollups
 from service.store.rollups.reading import read_trend
 from service.store.series import series_of
@@ -94,6 +95,7 @@ class SqlStore:
         self.integrity: Integrity = Unmarked()
         self.access = SqlAccess(self._writing, self._reader, self._chain)
         self.rollups = SqlRollups(self._writing, self._reader)
+        self.retention = SqlRetention(self._writing, self._reader)
         self.unit_states = StoredUnitStates(database.writing, self._reader)
         self.waveforms = StoredWaveforms(database.writing, self._reader)
         self.commands = StoredCommands(database.writing, self._reader)

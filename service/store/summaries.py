@@ -56,6 +56,18 @@ class Summaries:
             np.concatenate([part.level for part in parts])[order],
         )
 
+    def followed_by(self, other: "Summaries") -> "Summaries":
+        """All rows of this one, then those of another with the same columns."""
+        return Summaries(
+            self.names,
+            np.concatenate([self.time_ns, other.time_ns]),
+            np.concatenate([self.count, other.count]),
+            np.concatenate([self.mean, other.mean]),
+            np.concatenate([self.minimum, other.minimum]),
+            np.concatenate([self.maximum, other.maximum]),
+            np.concatenate([self.level, other.level]),
+        )
+
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
         """Some rows, in the order given."""
         return Summaries(

@@ -1,6 +1,6 @@
 """Cells: readings of one short span under one condition, summed up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -85,6 +85,17 @@ class Cells:
         first = np.flatnonzero(np.concatenate([[True], np.diff(time_ns) != 0]))
         lengths = np.diff(np.append(first, time_ns.size))
         return np.arange(time_ns.size) - np.repeat(first, lengths)
+
+
+def together(one: Cells, other: Cells) -> Cells:
+    """Cells of both, the one's first: to be gathered, which puts them in order."""
+    conditions = Conditions(
+        *(
+            np.concatenate([getattr(one.conditions, name), getattr(other.conditions, name)])
+            for name in (field.name for field in fields(Conditions))
+        )
+    )
+    return Cells(conditions, one.summaries.followed_by(other.summaries))
 
 
 def bins(value: FloatArray, width: float) -> IntArray:

@@ -8,10 +8,11 @@ import numpy.typing as npt
 
 from service.store.database import Connection
 from service.store.port import TrendQuery
+from service.store.retention.marks import Gone
 from service.store.rollups.cells import Cells, Conditions
-from service.store.rollups.rolling import select_mark
+from service.store.rollups.making import select_mark
 from service.store.rollups.rows import ANYTHING, select_cells
-from service.store.rollups.widths import HOUR_NS
+from service.store.rollups.widths import HOUR_NS, WIDTHS_NS
 from service.store.summaries import IntArray, Summaries
 from service.store.trends import Span, arguments, too_large
 
@@ -41,39 +42,57 @@ class Cover:
         From when to when the roll-ups go.
     n_rolled
         Readings in them, usable or not.
+    is_coarse
+        Whether some of the readings in them are gone.
     """
 
     summaries: list[Summaries] = field(default_factory=list)
     spans: list[Span] = field(default_factory=list)
     rolled_spans: list[Span] = field(default_factory=list)
     n_rolled: int = 0
+    is_coarse: bool = False
+
+
+def select_series(reader: Connection, query: TrendQuery) -> int | None:
+    """Number of the bearing that is asked for; None if there never was one."""
+    found = reader.execute(
+        "SELECT id FROM series WHERE unit = ? AND bearing = ?", (query.unit, query.bearing)
+    ).fetchone()
+    return None if found is None else int(found[0])
 
 
 def covered(
     reader: Connection,
     query: TrendQuery,
+    gone: Gone,
     whole: Span,
-    widths_ns: Sequence[int],
     bucket_ns: int,
 ) -> Cover:
     """Cover a range of time.
+
+    Where single readings are gone, roll-ups that reach beyond the range count as a whole, and those
+    that bounds of conditions cut through not at all.
 
     Raises `QueryTooLargeError` if bounds of conditions cut through too much of it.
 
     Parameters
     ----------
-    widths_ns
-        Of the roll-ups that fit the buckets asked for, finest first.
+    gone
+        What there is no more of the bearing.
     bucket_ns
-        Width of those buckets.
+        Width of the buckets asked for.
     """
-    found = reader.execute(
-        "SELECT id FROM series WHERE unit = ? AND bearing = ?", (query.unit, query.bearing)
-    ).fetchone()
-    if found is None:
+    series = select_series(reader, query)
+    if series is None:
         return Cover()
-    covering = _Covering(reader, query, int(found[0]), bucket_ns)
-    covering.take(whole, widths_ns)
+    covering = _Covering(reader, query, series, bucket_ns)
+    for stretch in gone.stretches(whole):
+        if stretch[0] < gone.readings_ns:
+            covering.take_coarse(
+                stretch, [w for w in gone.kept_ns(stretch[0]) if bucket_ns % w == 0]
+            )
+        else:
+            covering.take(stretch, [w for w in WIDTHS_NS if bucket_ns % w == 0])
     covering.cover.spans.sort()
     return covering.cover
 
@@ -106,13 +125,56 @@ class _Covering:
             self._take_inner(some, width_ns, finer_ns)
         self.take((inner[1], span[1]), finer_ns)
 
+    def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
+        """Cover a span of which only roll-ups are there, and readings that have come too late."""
+        self._take_cells(span, widths_ns)
+        late = self._redone(span)
+        self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
+
+    def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
+        """Cover a span with the widest roll-ups that fit; the narrowest ones may reach beyond."""
+        width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
+        inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
+        if finer_ns and inner[0] >= inner[1]:
+            self._take_cells(span, finer_ns)
+            return
+        for edge in ((span[0], inner[0]), (inner[1], span[1])):
+            if edge[0] < edge[1]:
+                self._take_cells(edge, finer_ns)
+        for start_ns in range(inner[0], inner[1], MAX_SPANS * width_ns):
+            some = _within(inner, (start_ns, start_ns + MAX_SPANS * width_ns))
+            self._take_some_cells(some, width_ns, finer_ns)
+
+    def _take_some_cells(self, inner: Span, width_ns: int, finer_ns: Sequence[int]) -> None:
+        cells = self._cells(inner, width_ns)
+        if cells is None:
+            return
+        self.cover.is_coarse = True
+        time_ns = cells.summaries.time_ns
+        cut_ns = time_ns[self._cut(cells.conditions)]
+        if not finer_ns:
+            self._use(cells, ~self._cut(cells.conditions), width_ns)
+            return
+        self._use(cells, ~np.isin(time_ns, cut_ns), width_ns)
+        for cut in _runs(np.unique(cut_ns), width_ns):
+            self._note_cut((cut[1] - cut[0]) // finer_ns[-1])
+            self._take_cells(cut, finer_ns)
+
+    def _note_cut(self, n_finer: int) -> None:
+        self._n_cut += n_finer
+        if self._n_cut > MAX_CUT_SPANS:
+            raise too_large()
+
+    def _cells(self, span: Span, width_ns: int) -> Cells | None:
+        return select_cells(self._reader, self._series, width_ns, span, self._names, self._asked)
+
     def _gathered_until(self, end_ns: int, width_ns: int) -> int:
         return min(end_ns, self._mark_ns) // width_ns * width_ns
 
     def _take_inner(self, inner: Span, width_ns: int, finer_ns: Sequence[int]) -> None:
         redone = self._redone(inner)
         self.cover.spans += [_within(inner, (hour, hour + HOUR_NS)) for hour in redone]
-        cells = select_cells(self._reader, self._series, width_ns, inner, self._names, self._asked)
+        cells = self._cells(inner, width_ns)
         if cells is None:
             return
         time_ns = cells.summaries.time_ns
@@ -120,9 +182,7 @@ class _Covering:
         is_cut = np.isin(time_ns, time_ns[self._cut(cells.conditions)])
         self._use(cells, ~is_redone & ~is_cut, width_ns)
         for cut in _runs(np.unique(time_ns[is_cut & ~is_redone]), width_ns):
-            self._n_cut += (cut[1] - cut[0]) // finer_ns[-1] if finer_ns else 0
-            if self._n_cut > MAX_CUT_SPANS:
-                raise too_large()
+            self._note_cut((cut[1] - cut[0]) // finer_ns[-1] if finer_ns else 0)
             self.take(cut, finer_ns)
 
     def _redone(self, inner: Span) -> list[int]:
@@ -154,6 +214,14 @@ class _Covering:
 
 def _within(span: Span, other: Span) -> Span:
     return max(span[0], other[0]), min(span[1], other[1])
+
+
+def _inside(span: Span, width_ns: int) -> Span:
+    return -(-span[0] // width_ns) * width_ns, span[1] // width_ns * width_ns
+
+
+def _around(span: Span, width_ns: int) -> Span:
+    return span[0] // width_ns * width_ns, -(-span[1] // width_ns) * width_ns
 
 
 def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:

@@ -1,7 +1,8 @@
 """Roll-ups behind the store's interface."""
 
 from service.store.database import Connect
-from service.store.rollups.rolling import MINUTE_NS, gather_anew, gather_next
+from service.store.rollups.making import MINUTE_NS
+from service.store.rollups.rolling import gather_anew, gather_next
 
 DUE = """
     SELECT id FROM (
