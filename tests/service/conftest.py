@@ -1,13 +1,23 @@
 """What the service's tests share: plant files as text, and a way to change one line of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 
 import pytest
+from harness.places import Place, PostgresPlace, SqlitePlace
+from harness.postgres_server import PostgresServer, why_not
 
+from service.origin import Origin
 from service.settings.loading import PlantFileError, load_plant_file
+from service.store.postgres.address import PostgresAddress
+from service.store.postgres.database import PostgresDatabase
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
+
+TEMPLATE = "padwatch_template"
+NUMBERS = count()
+PLACES = ("sqlite", "postgres")
 
 
 @pytest.fixture
@@ -48,3 +58,45 @@ def mistakes(tmp_path: Path) -> Callable[[str | bytes], list[str]]:
         return [line.removeprefix(f"{path}:") for line in lines]
 
     return refused
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> Iterator[PostgresServer]:
+    """A server that all tests of a process share, with a database that is up to date."""
+    why = why_not()
+    if why is not None:
+        pytest.skip(why)
+    with PostgresServer() as server:
+        server.create(TEMPLATE)
+        address = PostgresAddress(server.conninfo(TEMPLATE))
+        PostgresDatabase(address, Origin.LIVE).close()
+        yield server
+
+
+@pytest.fixture
+def postgres_place(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[PostgresPlace]:
+    """A fresh database."""
+    name = f"padwatch_{next(NUMBERS)}"
+    postgres_server.create(name, TEMPLATE)
+    yield PostgresPlace(postgres_server, name, tmp_path / "data")
+    postgres_server.drop(name)
+
+
+@pytest.fixture
+def sqlite_place(tmp_path: Path) -> SqlitePlace:
+    """A file that is not there yet."""
+    return SqlitePlace(tmp_path / "data" / "padwatch.sqlite3")
+
+
+@pytest.fixture
+def place(request: pytest.FixtureRequest) -> Place:
+    """Where the store is: tests that ask for it, or for a store in it, go over both databases."""
+    found: Place = request.getfixturevalue(f"{request.param}_place")
+    return found
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Both databases, except for tests that ask for the ``path`` of a file."""
+    if "place" in metafunc.fixturenames:
+        is_of_a_file = "path" in metafunc.fixturenames
+        metafunc.parametrize("place", PLACES[:1] if is_of_a_file else PLACES, indirect=True)

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from harness.places import Place
 
 from core.account import Gap
 from service.store.port import TrendQuery, UnitGap
-from service.store.sqlite import SqliteStore
+from service.store.sql_store import SqlStore
 
 T0 = 1_767_225_600_000_000_000
 HOP_NS = 11_946_666_667
@@ -36,9 +37,9 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def store(path: Path) -> Iterator[SqliteStore]:
+def store(place: Place) -> Iterator[SqlStore]:
     """An open, empty store."""
-    opened = SqliteStore(path)
+    opened = place.open()
     yield opened
     opened.close()
 

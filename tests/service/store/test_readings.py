@@ -1,6 +1,7 @@
 """What was appended is read back, to the last bit."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -227,8 +228,9 @@ def test_a_closed_store_says_so(store: SqliteStore, assessment: Build) -> None:
 
 
 def test_a_result_of_all_quantities_takes_no_page_of_its_own(
-    store: SqliteStore, assessment: Build, at: At
+    path: Path, assessment: Build, at: At
 ) -> None:
+    store = SqliteStore(path)
     everything = {
         q.name: Reading(1.0, u_random=0.1, u_systematic=0.1) if q.has_uncertainty else 1.0
         for q in CATALOGUE

