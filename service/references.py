@@ -3,12 +3,12 @@
 import asyncio
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Protocol
 
 import structlog
 
 from acquisition.clock import Clock
 from core.machine import Bearing, Unit
-from core.monitor_port import Monitor
 from service.heartbeats import UNHEARD, Pulse
 from service.store.gap_reference import GapReference
 from service.store.port import Store, StoreError
@@ -41,6 +41,16 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
     )
 
 
+class Adopter(Protocol):
+    """Whatever takes a new description of its unit: a monitor, as a rule."""
+
+    unit: Unit
+
+    def adopt(self, unit: Unit) -> None:
+        """Take a new description of the same unit."""
+        ...
+
+
 class ReferencesInForce:
     """Hands the newest stored references to the monitors, at the start and ever after.
 
@@ -50,7 +60,7 @@ class ReferencesInForce:
         By unit; as built from the plant file, whose references hold where none is stored.
     """
 
-    def __init__(self, monitors: Mapping[str, Monitor], store: Store, clock: Clock) -> None:
+    def __init__(self, monitors: Mapping[str, Adopter], store: Store, clock: Clock) -> None:
         self._monitors, self._store, self._clock = monitors, store, clock
         self._bearings: dict[Key, Bearing] = {
             (unit, bearing.id): bearing

@@ -1,10 +1,11 @@
 """What the API's routes work with."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Path
+from prometheus_client.registry import Collector
 
 from acquisition.clock import Clock
 from service.api.access.desk import AccessDesk
@@ -21,7 +22,6 @@ from service.audit.refusals import Refusals
 from service.evidence.desk import EvidenceDesk
 from service.load.watch import LoadWatch
 from service.metrics.polls import TimedSource
-from service.metrics.watched import Watched
 from service.origin import Origin
 from service.references import ReferencesInForce
 from service.settings.bearings import BearingSettings
@@ -50,6 +50,8 @@ class Context:
         What is told to Prometheus; None where nobody asks.
     loops
         What is wrong with each loop of the program; None where nothing is.
+    checks
+        What readiness is told besides, by name; none of it makes the service unready.
     access
         Tells who asks; None for one that asks nobody on this computer.
     space
@@ -77,8 +79,9 @@ class Context:
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
     evidence: EvidenceDesk | None = None
-    metrics: Watched | None = None
+    metrics: Callable[[], Awaitable[Collector]] | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
+    checks: Callable[[], Mapping[str, str]] = dict
     refusals: Refusals | None = None
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     access: AccessDesk | None = None

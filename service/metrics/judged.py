@@ -9,7 +9,7 @@ from core.alarms.alarm import PLANT, Alarm, AlarmLevel, AlarmState
 from core.decision.verdict import Verdict
 from core.films.film_judge import FilmNews
 from core.quality import Level
-from service.alarms.engine import AlarmEngine
+from service.api.ports import AlarmBoard
 from service.metrics.families import Rows, gauge, histogram
 from service.metrics.watched import Watched
 
@@ -48,7 +48,7 @@ def result_metrics(watched: Watched) -> Iterator[Metric]:
     )
 
 
-def alarm_metrics(alarms: AlarmEngine, units: Iterable[str]) -> Iterator[Metric]:
+def alarm_metrics(alarms: AlarmBoard, units: Iterable[str]) -> Iterator[Metric]:
     """Alarms on the list, as the dashboard counts them."""
     count = alarms.count()
     yield gauge(

@@ -1,12 +1,13 @@
 """`GET /metrics`, for Prometheus."""
 
+from collections.abc import Awaitable, Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
+from prometheus_client.registry import Collector
 
 from service.api.access.declared import needs
-from service.metrics.scrape import OPEN_METRICS, rendered, scrape
-from service.metrics.watched import Watched
+from service.metrics.scrape import OPEN_METRICS, rendered
 from service.security.roles import Permission
 
 EXAMPLE = """\
@@ -24,8 +25,14 @@ ANSWER = {
 }
 
 
-def metrics_router(watched: Watched) -> APIRouter:
-    """The route that Prometheus asks."""
+def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
+    """The route that Prometheus asks.
+
+    Parameters
+    ----------
+    look
+        All metrics as they are now.
+    """
     router = APIRouter(tags=["health"], dependencies=[needs(Permission.READ)])
 
     @router.get(
@@ -40,7 +47,7 @@ def metrics_router(watched: Watched) -> APIRouter:
         ] = "text/plain",
     ) -> Response:
         """Samples, links, results, alarms, store and deliveries as counters and gauges."""
-        body, kind = rendered(await scrape(watched), accept)
+        body, kind = rendered(await look(), accept)
         return Response(body, headers={"content-type": kind, "cache-control": "no-store"})
 
     return router

@@ -9,6 +9,7 @@ from prometheus_client import exposition
 from prometheus_client.metrics_core import Metric
 from prometheus_client.openmetrics import exposition as open_exposition
 from prometheus_client.process_collector import ProcessCollector
+from prometheus_client.registry import Collector
 
 from service.delivery.deliveries import ReceiverView
 from service.metrics.acquired import link_metrics, sample_metrics
@@ -65,7 +66,7 @@ async def scrape(watched: Watched) -> Scrape:
         return Scrape(watched, None)
 
 
-def rendered(metrics: Scrape, accept: str) -> tuple[bytes, str]:
+def rendered(metrics: Collector, accept: str) -> tuple[bytes, str]:
     """Metrics as text with its media type.
 
     Parameters

@@ -17,6 +17,7 @@ from service.http.listening import url_of
 from service.http.server import GuardedServer
 from service.load.shedding import Shedding
 from service.metrics.polls import TimedSource
+from service.metrics.scrape import scrape
 from service.metrics.watched import Watched
 from service.roles.analysis import Analysis
 from service.roles.ground import Ground
@@ -99,7 +100,7 @@ def context_of(
         captures=analysis.captures,
         deliveries=analysis.deliveries,
         evidence=evidence_desk(plant, ground.store, analysis.evidence, ground.clock),
-        metrics=metrics_of(analysis, bus, sources),
+        metrics=partial(scrape, metrics_of(analysis, bus, sources)),
         origin=ground.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         sources=sources,

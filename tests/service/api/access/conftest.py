@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import httpx2
@@ -11,6 +12,7 @@ from argon2 import PasswordHasher
 from service.api.access.desk import AccessDesk
 from service.api.app import create_app
 from service.bus import Bus
+from service.metrics.scrape import scrape
 from service.metrics.timings import Timings
 from service.metrics.watched import Watched
 from service.security.passwords import Hashing
@@ -92,7 +94,7 @@ def access(service: Any, documents_with_metrics: dict[str, Any]) -> Access:
     desk = AccessDesk(
         service.store.access, service.clock, asks_everybody=True, hashing=cheap_hashing()
     )
-    app = create_app(replace(context, access=desk, metrics=watched))
+    app = create_app(replace(context, access=desk, metrics=partial(scrape, watched)))
     app.openapi_schema = documents_with_metrics.get("access")
     documents_with_metrics["access"] = app.openapi()
     return Access(desk, app, service)
