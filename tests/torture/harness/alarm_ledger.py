@@ -27,6 +27,7 @@ def alarm_faults(
     store: Store,
     offered: Offered,
     watch: Watch,
+    units: Sequence[str],
 ) -> None:
     """Add what is wrong with the alarms of a store to what was found."""
     events = list(_events(store))
@@ -44,7 +45,8 @@ def alarm_faults(
     kept = {(event.identity.id, str(event.change), event.occurrence) for event in events}
     found.lost += [f"promised: {one}" for one in watch.promised - kept]
     found.n_promised = len(watch.promised)
-    for number, unit in enumerate(plant.units, start=1):
+    for unit in units:
+        number = plant.units.index(unit) + 1
         _check_unit(
             found, plant, store, offered, unit, Truth(plant.seed, number, plant.rate_hz), chains
         )

@@ -84,6 +84,7 @@ def check(
     offered: Offered,
     lives: Mapping[str, Sequence[int]],
     watch: Watch,
+    units: Sequence[str] = (),
 ) -> Findings:
     """Compare the store of a service that does not run with the truth.
 
@@ -93,15 +94,17 @@ def check(
         For each unit, the number of the newest sample offered as each process was started.
     watch
         What a client was shown.
+    units
+        Those that are looked at; all of them unless given.
     """
     found = Findings()
     file = load_plant_file(plant_file)
     store = open_store(file)
     try:
-        for unit in plant.units:
+        for unit in units or plant.units:
             replay = Replay(plant, file, unit, offered.t0_ns)
             _check_unit(found, plant, store, unit, offered, lives[unit], replay, watch.shown)
-        alarm_faults(found, plant, store, offered, watch)
+        alarm_faults(found, plant, store, offered, watch, units or plant.units)
     finally:
         store.close()
     return found

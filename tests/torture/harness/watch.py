@@ -46,7 +46,10 @@ class Look:
 class Watch:
     """Asks one service after the other, again and again, in a thread."""
 
-    def __init__(self, plant: LedgerPlant, offered: Callable[[], Offered]) -> None:
+    def __init__(
+        self, plant: LedgerPlant, offered: Callable[[], Offered], period_s: float = PERIOD_S
+    ) -> None:
+        self._period_s = period_s
         self._plant, self._t0_ns = plant, offered().t0_ns
         self.shown: dict[tuple[str, str], dict[int, float | None]] = defaultdict(dict)
         self.events: set[tuple[str, int]] = set()
@@ -81,7 +84,7 @@ class Watch:
     def _run(self, api: Api, stopped: threading.Event) -> None:
         number = 0
         with api:
-            while not stopped.wait(PERIOD_S):
+            while not stopped.wait(self._period_s):
                 try:
                     self._ask(api, number)
                     self.n_answers += 1

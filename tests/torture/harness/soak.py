@@ -1,0 +1,138 @@
+"""A long time under load: what it takes of the machine, and whether every account closes."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from harness.checker import Findings, check
+from harness.ledger_daq import LedgerDaq
+from harness.ledger_plant import LedgerPlant
+from harness.service_rig import ServiceRig
+from harness.usage import Slope, Usage, look, slope
+from harness.watch import Watch, silent_healthy_s
+from service.wiring.stores import DATABASE
+
+LOOK_S = 2.0
+WARM_UP = 0.4
+"""Share of the time after which memory must not grow any more: windows are full by then."""
+
+
+@dataclass(frozen=True)
+class Soaked:
+    """What was measured.
+
+    Parameters
+    ----------
+    open_accounts
+        Units whose service counts other samples than it was offered, in words.
+    """
+
+    seconds: float
+    ready_s: float
+    usages: Sequence[Usage]
+    daq_cores: float
+    findings: Findings
+    open_accounts: Sequence[str]
+    n_offered: int
+    n_gap: int
+    silent_healthy_s: float
+
+    @property
+    def settled(self) -> Sequence[Usage]:
+        """The looks after the warm-up."""
+        return self.usages[int(WARM_UP * len(self.usages)) :]
+
+    @property
+    def cores(self) -> float:
+        """Share of a core that the service took."""
+        first, last = self.settled[0], self.settled[-1]
+        return (last.cpu_s - first.cpu_s) / max(last.at_s - first.at_s, 1e-9)
+
+    def growth(self, name: str) -> Slope:
+        """How something grew after the warm-up."""
+        at_s = np.array([usage.at_s for usage in self.settled])
+        return slope(at_s, np.array([float(getattr(usage, name)) for usage in self.settled]))
+
+    def most(self, name: str) -> float:
+        """The most of something after the warm-up."""
+        return max(float(getattr(usage, name)) for usage in self.settled)
+
+    def table(self, plant: LedgerPlant) -> str:
+        """One line for each figure."""
+        per_sample_us = 1e6 * self.cores / (plant.n_units * 12 * plant.rate_hz)
+        figures = {
+            "minutes": round(self.seconds / 60.0, 1),
+            "units, times nominal": f"{plant.n_units}, {plant.load:g}",
+            "service, cores": f"{self.cores:.2f} ({per_sample_us:.2f} µs a sample)",
+            "ledger DAQ, cores": f"{self.daq_cores:.2f}",
+            "memory, MiB": f"{self.most('rss_mib'):.0f}, {self.growth('rss_mib')} an hour",
+            "open files": f"{self.most('n_files'):.0f}, {self.growth('n_files')} an hour",
+            "threads": f"{self.most('n_threads'):.0f}, {self.growth('n_threads')} an hour",
+            "write-ahead log, MiB": f"{self.most('log_mib'):.1f} at most",
+            "samples offered, per channel": self.n_offered,
+            "of these in gaps": self.n_gap,
+            "accounts that do not close": len(self.open_accounts),
+            "silent-healthy seconds": round(self.silent_healthy_s, 3),
+            **{f"checked units: {name}": n for name, n in self.findings.counts.items()},
+        }
+        return "\n".join(f"  {name:<32}{value}" for name, value in figures.items())
+
+
+def soak(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
+    rig: ServiceRig,
+    plant_file: Path,
+    seconds: float,
+    checked: Sequence[str],
+) -> Soaked:
+    """Run a service for so long, and compare some of its units bit for bit.
+
+    Parameters
+    ----------
+    checked
+        Units whose every stored number is computed again; the accounts of all are looked at.
+    """
+    watch = Watch(plant, daq.offered, period_s=1.0)
+    lives = {unit: [n] for (unit, _), n in daq.offered().samples.items()}
+    rig.start()
+    ready_s = rig.wait_ready()
+    watch.begin(rig.url)
+    watch.wait_for_result()
+    log = plant_file.parent / "data" / f"{DATABASE}-wal"
+    service, device = psutil.Process(rig.pid), psutil.Process(daq.process.pid)
+    begun_s, device_s = time.monotonic(), sum(device.cpu_times()[:2])
+    usages = [look(service, log)]
+    while usages[-1].at_s - begun_s < seconds:
+        time.sleep(min(LOOK_S, seconds / 10.0))
+        usages.append(look(service, log))
+    passed_s = time.monotonic() - begun_s
+    device_s = sum(device.cpu_times()[:2]) - device_s
+    with rig.api() as api:
+        sources = {unit["id"]: unit["source"] for unit in api.get("/api/v1/overview")["units"]}
+    watch.end()
+    rig.stop()
+    offered = daq.offered()
+    return Soaked(
+        seconds=passed_s,
+        ready_s=ready_s,
+        usages=usages,
+        daq_cores=device_s / passed_s,
+        findings=check(plant, plant_file, offered, lives, watch, checked),
+        open_accounts=[unit for unit in plant.units if not _closes(sources[unit])],
+        n_offered=sum(int(source["n_offered"]) for source in sources.values()),
+        n_gap=sum(int(source["n_gap"]) for source in sources.values()),
+        silent_healthy_s=silent_healthy_s(plant, offered, watch.looks),
+    )
+
+
+def _closes(source: dict[str, int | dict[str, int]]) -> bool:
+    """Whether offered = stored + flagged + gap + rejected."""
+    taken = sum(int(source[name]) for name in ("n_stored", "n_flagged", "n_gap"))  # type: ignore[call-overload]
+    rejected = source["rejected"]
+    assert isinstance(rejected, dict)
+    return taken + sum(rejected.values()) == source["n_offered"]
