@@ -1,5 +1,6 @@
 """`UnitMonitor`: sample blocks of one unit in, assessments of its bearings out."""
 
+from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -8,6 +9,7 @@ from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.bearing_results import BearingResults
 from core.blocks import SampleBlock
 from core.machine import Bearing, Unit
+from core.monitor_state import MonitorState
 from core.monitored_unit import MonitoredUnit
 from core.position_results import measured_growth
 from core.quality import worst
@@ -44,6 +46,34 @@ class UnitMonitor(MonitoredUnit):
         self._next_start: int | None = None
         self._first_start = 0
         self._n_voided = 0
+        self._starts: deque[int] = deque()
+        self._rewound_to = 0
+
+    @property
+    def state(self) -> MonitorState:
+        """What must be known beside its newest samples to go on from here elsewhere.
+
+        The samples begin with the segments by which those were read that are averaged now: where a
+        vortex is looked for depends on the segments before.
+        """
+        start = self._starts[0] if self._starts else self._next_start or 0
+        return MonitorState(
+            self._ring.epoch,
+            start,
+            self._first_start,
+            self._n_voided,
+            dict(self._growth),
+            self._ring.account,
+        )
+
+    def rewind(self, state: MonitorState) -> None:
+        """Expect the samples since `state.start` once more, in a monitor that has seen none."""
+        self._rewound_to = state.start
+
+    def settle(self, state: MonitorState) -> None:
+        """Be as the one was that `state` is of, after these samples."""
+        super().settle(state)
+        self._first_start, self._n_voided = state.first_start, state.n_voided
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take a block in and hand over what is learnt by it, one bearing at a time."""
@@ -58,9 +88,10 @@ class UnitMonitor(MonitoredUnit):
         restarted = self._ring.epoch != epoch
         if restarted:
             self._transform.clear()
+            self._starts.clear()
             self._first_start = self._ring.contiguous_from
         if self._next_start is None:
-            self._next_start = self._ring.contiguous_from
+            self._next_start = max(self._ring.contiguous_from, self._rewound_to)
         elif restarted or self._next_start < self._ring.contiguous_from:
             self._n_voided += 1
             self._next_start = self._ring.contiguous_from
@@ -70,9 +101,16 @@ class UnitMonitor(MonitoredUnit):
         while self._ring.holds(start, start + self._settings.segment_samples):
             window = self._ring.read(start, start + self._settings.segment_samples)
             segment = self._transform.add(window)
+            self._note_start(start)
             self._next_start = start = start + self._settings.hop_samples
             for bearing in self.unit.bearings:
                 yield self._assess(bearing, segment)
+
+    def _note_start(self, start: int) -> None:
+        self._starts.append(start)
+        n_samples = 2 * self._settings.n_segments * self._settings.hop_samples
+        while self._starts[0] <= start - n_samples:
+            self._starts.popleft()
 
     def _assess(self, bearing: Bearing, newest: Segment) -> Assessment:
         settings = self._settings

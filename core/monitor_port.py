@@ -7,6 +7,7 @@ from core.account import Gap, SampleAccount
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
+from core.monitor_state import MonitorState
 from core.outage import Reach
 
 
@@ -36,6 +37,19 @@ class Monitor(Protocol):
 
     def go_on(self, reach: Reach | None) -> None:
         """Go on after a stop, before the first block: what is missing since then is a gap."""
+        ...
+
+    @property
+    def state(self) -> MonitorState:
+        """What must be known beside its newest samples to go on from here elsewhere."""
+        ...
+
+    def rewind(self, state: MonitorState) -> None:
+        """Expect the samples since `state.start` once more, in a monitor that has seen none."""
+        ...
+
+    def settle(self, state: MonitorState) -> None:
+        """Be as the one was that `state` is of, after these samples."""
         ...
 
     def drain_gaps(self) -> list[Gap]:

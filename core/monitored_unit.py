@@ -8,6 +8,7 @@ from core.adoption import bearings_with_new_references, require_same_machine
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
+from core.monitor_state import MonitorState
 from core.outage import Reach, outage, restart
 from core.probe_axes import Growth
 from core.ring import Ring
@@ -56,6 +57,21 @@ class MonitoredUnit(ABC):
     def go_on(self, reach: Reach | None) -> None:
         """Go on after a stop, before the first block: what is missing since then is a gap."""
         self._reach = reach
+
+    @property
+    @abstractmethod
+    def state(self) -> MonitorState:
+        """What must be known beside its newest samples to go on from here elsewhere."""
+
+    @abstractmethod
+    def rewind(self, state: MonitorState) -> None:
+        """Expect the samples since `state.start` once more, in a monitor that has seen none."""
+
+    def settle(self, state: MonitorState) -> None:
+        """Be as the one was that `state` is of, after these samples."""
+        self._growth = dict(state.growth)
+        self._ring.account = state.account
+        self._gaps.clear()
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
         """Take a block in and return all that has been learnt by it; as `steps`."""

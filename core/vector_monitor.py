@@ -10,6 +10,7 @@ from core.blocks import SampleBlock
 from core.cross_spectrum import CrossSpectrum
 from core.machine import Bearing, Unit
 from core.monitor import JUDGED
+from core.monitor_state import MonitorState
 from core.monitored_unit import MonitoredUnit
 from core.position_results import measured_growth
 from core.quality import worst
@@ -59,6 +60,22 @@ class VectorMonitor(MonitoredUnit):
         self._polls: deque[Poll] = deque()
         self._first_index: int | None = None
         self._n_hops = -1
+
+    @property
+    def state(self) -> MonitorState:
+        """What must be known beside its newest polls to go on from here elsewhere."""
+        start = self._polls[0].index if self._polls else self._ring.stop_index
+        first_index = self._first_index or 0
+        account = self._ring.account
+        return MonitorState(self._ring.epoch, start, first_index, 0, dict(self._growth), account)
+
+    def rewind(self, state: MonitorState) -> None:
+        """Expect the polls since `state.start` once more: any may be the first of them."""
+
+    def settle(self, state: MonitorState) -> None:
+        """Be as the one was that `state` is of, after these polls."""
+        super().settle(state)
+        self._first_index = state.first_start
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take rows in, a sample for each poll, and hand over what is learnt, one bearing each."""

@@ -94,6 +94,13 @@ class AlarmBoard:
                 self._rules[id_] = AlarmRule()
                 self.advance(id_, Condition(reason=NO_LONGER_WATCHED), host_ns)
 
+    def resume(self, alarms: Iterable[Alarm]) -> None:
+        """Be as when these were kept, delays included; what has had events since stays."""
+        for kept in alarms:
+            id_ = kept.identity.id
+            if id_ in self._alarms and self._alarms[id_].n_events == kept.n_events:
+                self._alarms[id_] = kept
+
     def told(self) -> list[AlarmNews]:
         """Hand over the news since the last call."""
         news, self._news = self._news, []

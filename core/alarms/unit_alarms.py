@@ -14,6 +14,7 @@ from core.alarms.conditions import (
     stamp_condition,
 )
 from core.alarms.event import AlarmNews
+from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
 from core.alarms.rules import UnitRules
 from core.alarms.state_limits import outside
@@ -168,6 +169,25 @@ class UnitAlarms:
         """
         self._board.restore(alarms, host_ns)
         return self._board.told()
+
+    @property
+    def memory(self) -> AlarmMemory:
+        """What must be known, beside the events of alarms, to go on from here elsewhere."""
+        return AlarmMemory(
+            tuple(self._board.alarms),
+            dict(self._segment_faults),
+            *self._state,
+            self._stop,
+            *self._link,
+        )
+
+    def resume(self, memory: AlarmMemory) -> None:
+        """Go on from where another one was; after `restore`."""
+        self._board.resume(memory.alarms)
+        self._segment_faults = dict(memory.segment_faults)
+        self._state = (memory.state, memory.state_ns)
+        self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
+        self._resting_with = None
 
     def _is_repeated(self, block: SampleBlock) -> bool:
         """Whether the block brings nothing new; where samples are missing, delays stand still."""

@@ -8,6 +8,7 @@ from core.baseline.response import Place, ShaftResponse
 from core.decision.decision import UNDECIDED, Decision, advance
 from core.decision.reading import WatchedReading
 from core.films.film_finding import FilmFinding, film_finding
+from core.films.film_memory import PlaceDecision
 from core.films.film_reading import FilmReading
 from core.films.film_rules import FilmRules
 from core.films.recent_readings import RecentReadings
@@ -61,6 +62,24 @@ class FilmJudge:
             # of another clock, or of readings that were taken in before
             timeless = replace(decision, last_ns=None, last_counted_ns=None)
             self._decisions[bearing, direction] = timeless
+
+    @property
+    def decided(self) -> tuple[PlaceDecision, ...]:
+        """All decisions so far, with what they were taken by."""
+        return tuple(
+            PlaceDecision(bearing, direction, self._version(bearing), decision)
+            for (bearing, direction), decision in self._decisions.items()
+        )
+
+    def resume(self, decided: Sequence[PlaceDecision]) -> None:
+        """Take decisions over that were taken by the same baselines."""
+        for found in decided:
+            if found.version == self._version(found.bearing):
+                self._decisions[found.bearing, found.direction] = found.decision
+
+    def _version(self, bearing: str) -> int | None:
+        baseline = self._baselines.get(bearing)
+        return baseline.origin.version if baseline else None
 
     def answer_by(self, response: ShaftResponse | None) -> None:
         """Put changes down to film or transducer by this response of the shaft."""

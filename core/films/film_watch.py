@@ -9,6 +9,7 @@ from core.condition.bearing_condition import BearingCondition
 from core.condition.film_conditions import FilmConditions
 from core.condition.operating_state import NEVER_SEEN, OperatingReading, Operation, advance
 from core.films.film_judge import FilmJudge, FilmNews
+from core.films.film_memory import FilmMemory
 from core.films.film_reading import FilmReading, film_reading, shown, sure
 from core.films.film_rules import FilmRules
 
@@ -36,6 +37,16 @@ class FilmWatch:
     def go_on(self, operation: Operation) -> None:
         """Go on from what the unit did when it was seen last."""
         self._operation = operation
+
+    @property
+    def memory(self) -> FilmMemory:
+        """What must be known, beside stored readings, to go on from here elsewhere."""
+        return FilmMemory(self._operation, self._slot, self.judge.decided)
+
+    def resume(self, memory: FilmMemory) -> None:
+        """Go on from where another one was; after `go_on` and `FilmJudge.put_in_force`."""
+        self._operation, self._slot = memory.operation, memory.slot
+        self.judge.resume(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
         """Take in what has been found of the bearings.

@@ -8,6 +8,7 @@ from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
 from core.monitor_port import Monitor
+from core.monitor_state import MonitorState
 from core.outage import Reach
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
@@ -34,6 +35,19 @@ class TimedMonitor:
     def go_on(self, reach: Reach | None) -> None:
         """Go on after a stop, before the first block."""
         self._monitor.go_on(reach)
+
+    @property
+    def state(self) -> MonitorState:
+        """What must be known beside its newest samples."""
+        return self._monitor.state
+
+    def rewind(self, state: MonitorState) -> None:
+        """Expect samples once more."""
+        self._monitor.rewind(state)
+
+    def settle(self, state: MonitorState) -> None:
+        """Be as another one was."""
+        self._monitor.settle(state)
 
     def drain_gaps(self) -> list[Gap]:
         """Hand over the gaps found since the last call, to be recorded."""

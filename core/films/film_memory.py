@@ -1,0 +1,31 @@
+"""`FilmMemory`: what the watch of a unit's films remembers beside stored readings."""
+
+from dataclasses import dataclass
+
+from core.condition.operating_state import Operation
+from core.decision.decision import Decision
+
+
+@dataclass(frozen=True)
+class PlaceDecision:
+    """What has been decided of a bearing in a direction, by the baseline of a version."""
+
+    bearing: str
+    direction: str
+    version: int | None
+    decision: Decision
+
+
+@dataclass(frozen=True)
+class FilmMemory:
+    """The films of a unit at one moment.
+
+    Parameters
+    ----------
+    slot
+        Number of the interval that had its reading last.
+    """
+
+    operation: Operation
+    slot: int | None
+    decided: tuple[PlaceDecision, ...]
