@@ -62,8 +62,7 @@ class Connection:
         context.trace_connect = self._connection_changed
         context.framer = self._framer
         context.max_buffer_size = _RECEIVE_LIMIT_BYTES
-        self._create_connection = context.call_create
-        context.call_create = self._create
+        self._keep_reasons()
 
     @property
     def where(self) -> str:
@@ -83,10 +82,7 @@ class Connection:
         """
         self._framer.forget()
         with foreign_errors_renamed(self._where):
-            try:
-                connected = await self._client.connect()
-            except ValueError as exc:  # a host name that no resolver can even be asked for
-                raise ConfigError(f"{self._where}: {exc}") from exc
+            connected = await self._connect()
             _let_stop_through()
             if not connected:
                 limit = f"no connection within {self._settings.timeout_s} s"
@@ -167,6 +163,28 @@ class Connection:
         except (LinkError, asyncio.CancelledError):
             self.close()
             raise
+
+    async def _connect(self) -> bool:
+        """Connect to the first address of the device that answers."""
+        transport = self._settings.transport
+        if isinstance(transport, SerialTransport):
+            return bool(await self._client.connect())
+        try:
+            transport.host.encode("idna")
+        except ValueError as exc:  # a host name that no resolver can even be asked for
+            raise ConfigError(f"{self._where}: {exc}") from exc
+        for address in await transport.addresses.within(self._settings.timeout_s):
+            if address != transport.host:
+                self._client.ctx.init_setup_connect_listen(address, transport.port)
+                self._keep_reasons()
+            if await self._client.connect():
+                return True
+        return False
+
+    def _keep_reasons(self) -> None:
+        context = self._client.ctx
+        self._create_connection = context.call_create
+        context.call_create = self._create
 
     async def _create(self) -> object:
         """Connect as pymodbus would, but keep the reason of a refusal, which it only logs."""

@@ -1,10 +1,11 @@
 """Where a Modbus device is: at a TCP address, or on a serial line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 from acquisition.errors import ConfigError
 from acquisition.modbus.identity import Identity
+from acquisition.names import KnownAddresses
 
 Parity: TypeAlias = Literal["none", "even", "odd"]
 
@@ -28,13 +29,20 @@ class TcpTransport:
         Name or address.
     port
         1 to 65535.
+
+    Attributes
+    ----------
+    addresses
+        Of the host, remembered from one connection to the next.
     """
 
     host: str
     port: int = 502
+    addresses: KnownAddresses = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         _require("port", self.port, 1, 65535)
+        object.__setattr__(self, "addresses", KnownAddresses(self.host, self.port))
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"

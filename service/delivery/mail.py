@@ -10,9 +10,9 @@ from email.policy import SMTP as SMTP_POLICY
 
 import aiosmtplib
 
+from acquisition.names import NameLookUp
 from service.delivery.mail_text import subject, text
 from service.delivery.message import Message
-from service.delivery.names import NameLookUp
 from service.delivery.network import PATIENT, Timeouts, Trust, connected_socket, printable, words
 from service.delivery.outcome import Delivered, Failed, Outcome, Refused
 from service.delivery.secret import Secret, SecretError

@@ -6,7 +6,7 @@ import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.delivery.names import NameLookUp
+from acquisition.names import NameLookUp
 
 
 @dataclass(frozen=True)

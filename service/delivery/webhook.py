@@ -13,10 +13,10 @@ from urllib.parse import urlsplit
 import httpcore2
 
 from acquisition.clock import Clock
+from acquisition.names import NameLookUp
 from core.units import NS_PER_S
 from service.delivery.bounded import BoundedNetwork
 from service.delivery.message import Message
-from service.delivery.names import NameLookUp
 from service.delivery.network import PATIENT, Timeouts, Trust, printable, words
 from service.delivery.outcome import Delivered, Failed, Outcome, Refused
 from service.delivery.secret import Secret, SecretError

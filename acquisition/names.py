@@ -1,4 +1,4 @@
-"""Addresses of a receiver, looked up where a name server that does not answer holds up nobody.
+"""Addresses of others, looked up where a name server that does not answer holds up nobody.
 
 The event loop's own look-up takes a thread that the store needs, too, and keeps it for as long as
 the name servers take to fail, whoever has stopped waiting meanwhile.
@@ -40,6 +40,33 @@ class NameLookUp:
                 daemon=True,  # it must not hold up the end of the program either
             ).start()
         return await asyncio.shield(self._asking)
+
+
+class KnownAddresses:
+    """Addresses of a name as they were found last, for as long as no newer ones are found."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._look_up = NameLookUp(host, port)
+        self._found: list[str] = []
+
+    async def within(self, limit_s: float) -> list[str]:
+        """Addresses in the order in which to try them, after this time at the latest.
+
+        Raises
+        ------
+        OSError
+            If there have never been any.
+        """
+        try:
+            async with asyncio.timeout(limit_s):
+                self._found = await self._look_up.addresses()
+        except TimeoutError:
+            if not self._found:
+                raise OSError(f"no name server answers within {limit_s} s") from None
+        except OSError:
+            if not self._found:
+                raise
+        return self._found
 
 
 def _look_up(
