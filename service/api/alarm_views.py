@@ -59,6 +59,7 @@ VALUE_UNITS = {
     AlarmKind.BLOCKS_WAITING: "1",
     AlarmKind.ANALYSIS_LATE: "s",
     AlarmKind.DISK_NEARLY_FULL: "1",
+    AlarmKind.RECORDINGS_DAMAGED: "recordings",
 }
 
 LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {

@@ -1,6 +1,7 @@
 """What the API's routes work with."""
 
-from collections.abc import Awaitable, Callable, Mapping
+import pathlib
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from service.api.ports import (
 )
 from service.api.problems import ProblemError
 from service.audit.refusals import Refusals
+from service.continuous.tape import Tape
 from service.evidence.desk import EvidenceDesk
 from service.load.watch import LoadWatch
 from service.metrics.polls import TimedSource
@@ -58,6 +60,12 @@ class Context:
         Knows how full the disks are; None where nobody looks.
     load
         Knows which questions are refused now; None where none ever are.
+    tape
+        Continuous recording; None where this process records nothing.
+    recordings
+        Folders of recordings besides that of captures.
+    faults
+        Why each recording that is known to be damaged is, by name.
     refusals
         Takes refused requests; None for a taker of the application's own.
     sources
@@ -87,6 +95,9 @@ class Context:
     access: AccessDesk | None = None
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
+    tape: Tape | None = None
+    recordings: Sequence[pathlib.Path] = ()
+    faults: Callable[[], Mapping[str, str]] = dict
 
     def unit(self, unit: str) -> UnitSettings:
         """Look a unit up, or answer 404."""

@@ -43,7 +43,7 @@ RECORDING_PROBLEMS = described_problems(
         404: "Unknown recording or bearing",
         409: "It has no samples of that bearing, or none at that time",
         422: "A wrong parameter",
-        500: "Damaged on the disk",
+        410: "Damaged on the disk, and not handed out",
     }
 )
 

@@ -1,4 +1,4 @@
-"""What the API answers about recordings of samples around alarms."""
+"""What the API answers about recordings of samples."""
 
 from typing import Annotated, Literal
 
@@ -43,14 +43,17 @@ class RecordingModel(ApiModel):
     id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Its name."""
 
+    kind: Literal["capture", "continuous"]
+    """Samples around an alarm, or a stretch of all samples."""
+
     state: Literal["complete", "damaged"]
-    """Whether its manifest can be read."""
+    """Whether it is whole, as far as its manifest and the newest check tell."""
 
     reason: str | None
     """Why not."""
 
     unit: str | None
-    """Unit; null if it is damaged, like all that follows but the size and the alarms."""
+    """Unit; null if its manifest cannot be read, like all that follows but size and alarms."""
 
     start: Time | None
     """Time of the first sample."""
@@ -68,11 +71,11 @@ class RecordingModel(ApiModel):
     """Of all its files."""
 
     alarms: list[RecordingAlarmModel]
-    """What it was made for; the first has begun it."""
+    """What it was made for; the first has begun it. None for a continuous recording."""
 
 
 class RecordingsModel(ApiModel):
-    """Recordings of samples around alarms."""
+    """Recordings of samples around alarms, and of all samples where they are kept."""
 
     recordings: list[RecordingModel]
     """Finished ones, newest first."""
@@ -81,7 +84,13 @@ class RecordingsModel(ApiModel):
     """What is still being written."""
 
     error: str | None
-    """Why samples are not kept just now; null if they are."""
+    """Why samples around alarms are not kept just now; null if they are."""
+
+    continuous: list[str]
+    """Units of which all samples are recorded."""
+
+    continuous_error: str | None
+    """Why not all of them are just now; null if they are."""
 
 
 class RecordedChannelModel(ApiModel):

@@ -1,4 +1,4 @@
-"""Recordings of samples around alarms: listed, described, and to take away."""
+"""Recordings of samples: listed, described, and to take away."""
 
 from collections.abc import Callable, Generator
 from typing import Annotated, Any
@@ -21,6 +21,7 @@ from service.api.rendering import rendered, worked
 from service.evidence.desk import EvidenceDesk, TooManyDownloadsError
 from service.recordings.shelf import Shelf
 from service.security.roles import Permission
+from service.store.waveform_port import WaveformKind
 
 RecordingId = Annotated[
     str,
@@ -37,7 +38,7 @@ PROBLEMS = described_problems(
     {
         404: "Unknown recording",
         422: "A wrong parameter",
-        500: "Damaged on the disk",
+        410: "Damaged on the disk, and not handed out",
         503: "Too many downloads are on their way",
     }
 )
@@ -58,17 +59,22 @@ def recording_router(context: Context) -> APIRouter:
         unit: Annotated[
             str | None, Query(description="Only of this unit.", examples=["U1"])
         ] = None,
+        kind: Annotated[
+            WaveformKind | None, Query(description="Only of this kind.", examples=["capture"])
+        ] = None,
         limit: Annotated[int, Query(ge=1, le=500, description="Most recordings given.")] = 100,
     ) -> RecordingsModel:
-        """The newest recordings of samples around alarms, and what is still being written."""
+        """The newest recordings, and which samples around alarms are still being written."""
         if unit is not None:
             context.unit(unit)
-        found = await worked(lambda: shelf_of(context).newest(limit, unit))
+        found = await worked(lambda: shelf_of(context).newest(limit, unit, kind))
         running = sorted(context.captures.being_made)
         return RecordingsModel(
             recordings=[recording_model(kept) for kept in found],
             being_made=[RunningRecordingModel(alarm=a, occurrence=n) for a, n in running],
             error=context.captures.trouble,
+            continuous=sorted(context.tape.units) if context.tape else [],
+            continuous_error=context.tape.trouble if context.tape else None,
         )
 
     @router.get(
@@ -127,7 +133,7 @@ async def _download(
     if await worked(lambda: shelf.one(recording)) is None:
         raise unknown_recording(recording)
     try:
-        pieces = await desk.download(make(recording))
+        pieces = await desk.download(await worked(lambda: make(recording)))
     except TooManyDownloadsError as error:
         raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
@@ -147,7 +153,8 @@ def _desk(context: Context) -> EvidenceDesk:
 
 def shelf_of(context: Context) -> Shelf:
     """Where finished recordings are, or answer 404."""
-    return Shelf(_desk(context).archive.folders.captures)
+    captures = _desk(context).archive.folders.captures
+    return Shelf((captures, *context.recordings), context.faults())
 
 
 def unknown_recording(recording: str) -> ProblemError:
@@ -158,7 +165,8 @@ def unknown_recording(recording: str) -> ProblemError:
 def damaged_recording(recording: str, error: Exception) -> ProblemError:
     """It is damaged on the disk, which is logged."""
     log.error("a recording cannot be read", recording=recording, reason=str(error))
-    return ProblemError(500, "Damaged", f"recording {recording} cannot be read from the disk")
+    words = f"recording {recording} is damaged on the disk, and nothing of it is handed out"
+    return ProblemError(410, "Damaged", words)
 
 
 def _content(media_type: str, words: str) -> dict[str, Any]:

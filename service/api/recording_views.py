@@ -19,7 +19,8 @@ def recording_model(kept: Kept) -> RecordingModel:
     manifest = kept.manifest
     return RecordingModel(
         id=kept.name,
-        state="damaged" if manifest is None else "complete",
+        kind=kept.kind.value,
+        state="complete" if kept.fault is None else "damaged",
         reason=kept.fault,
         unit=None if manifest is None else manifest.unit,
         start=None if manifest is None else manifest.start,
@@ -40,7 +41,7 @@ def recording_info(shelf: Shelf, kept: Kept) -> RecordingInfoModel:
         If it is damaged.
     """
     manifest = kept.manifest
-    if manifest is None:
+    if manifest is None or kept.fault is not None:
         raise ConfigError(kept.fault or "its manifest cannot be read")
     summary = shelf.summary(kept.name)
     return RecordingInfoModel(

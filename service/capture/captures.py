@@ -13,7 +13,7 @@ from acquisition.clock import Clock
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.blocks import SampleBlock
 from service.capture.file import CaptureError, CaptureFile, MakeWriter
-from service.capture.folders import clear_leftovers, make_room
+from service.capture.folders import clear_leftovers
 from service.capture.history import BlockHistory
 from service.capture.outcome import Outcome, unheeded
 from service.capture.span import CaptureSettings, Span, is_captured
@@ -250,7 +250,6 @@ class Captures:
                 capture.file.finish(capture.alarms)
                 self.n_written += 1
                 self._tell(None)
-                make_room(self._root, self._settings.max_bytes)
         except (CaptureError, OSError) as error:
             self.n_failed += 1
             self._tell(str(error))

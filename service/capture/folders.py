@@ -1,4 +1,4 @@
-"""The folder of captures: names, how much it may hold, and what a crash has left in it."""
+"""The folder of captures: names, and what a crash has left in it."""
 
 import os
 from collections.abc import Iterator
@@ -39,27 +39,6 @@ def clear_leftovers(root: Path) -> list[Path]:
     for path in left:
         _remove(path)
     return left
-
-
-def make_room(root: Path, max_bytes: int) -> list[Path]:
-    """Remove the oldest captures until all together fit, the newest apart.
-
-    Raises
-    ------
-    OSError
-        If the disk refuses.
-    """
-    finished = [path for path in _folders(root) if not path.name.endswith(INCOMPLETE)]
-    by_age = sorted((path.stat().st_mtime_ns, path.name, path) for path in finished)
-    sizes = {path: sum(file.stat().st_size for file in path.iterdir()) for path in finished}
-    n_bytes, removed = sum(sizes.values()), []
-    for _, _, path in by_age[:-1]:
-        if n_bytes <= max_bytes:
-            break
-        _remove(path)
-        n_bytes -= sizes[path]
-        removed.append(path)
-    return removed
 
 
 def _folders(root: Path) -> Iterator[Path]:

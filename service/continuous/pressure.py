@@ -22,19 +22,27 @@ class Pressure:
     ----------
     is_full
         Whether the disk is nearly full.
+    has_shed
+        Whether questions are refused already: these go before waveforms do.
     """
 
-    def __init__(self, bus: Bus, is_full: Callable[[], bool] = lambda: False) -> None:
-        self._bus, self._is_full = bus, is_full
+    def __init__(
+        self,
+        bus: Bus,
+        is_full: Callable[[], bool] = lambda: False,
+        has_shed: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
         self._is_behind = False
 
     def look(self) -> Shed | None:
         """Why nothing is to be recorded now; None if nothing is in the way."""
         share = CAUGHT_UP if self._is_behind else 1.0
-        self._is_behind = (
+        is_behind = (
             self._bus.oldest_wait_s > share * BEHIND_S
             or self._bus.depth > share * BEHIND_SHARE * self._bus.capacity
         )
+        self._is_behind = is_behind and (self._is_behind or self._has_shed())
         if self._is_behind:
             return Shed.ANALYSIS_BEHIND
         return Shed.DISK_FULL if self._is_full() else None

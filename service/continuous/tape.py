@@ -128,11 +128,11 @@ class Tape:
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write what is to be written, for ever; afterwards `close`."""
+        pulse.beat(10 * MAX_BUSY_S)
+        await self._in_thread(self._recover)
         if not self._units:
             pulse.rest()
             await asyncio.Event().wait()
-        pulse.beat(10 * MAX_BUSY_S)
-        await self._in_thread(self._recover)
         while True:
             pulse.beat(MAX_BUSY_S + WRITE_EVERY_S)
             await self._write()

@@ -65,6 +65,12 @@ def linked(folder: Path) -> CapturePart | None:
         return None
 
 
+def captures_in_use(root: Path) -> frozenset[str]:
+    """Names of the recordings that bundles refer to."""
+    parts = (linked(each.folder) for each in places(root))
+    return frozenset(Path(part.folder).name for part in parts if part and part.folder)
+
+
 def link_all(root: Path, captures: Path) -> int:
     """Link what a crash has left unlinked; return how many links were made.
 

@@ -16,6 +16,7 @@ from service.metrics.acquired import link_metrics, sample_metrics
 from service.metrics.families import gauge
 from service.metrics.judged import alarm_metrics, film_metrics, result_metrics
 from service.metrics.kept import evidence_metrics, queue_metrics, space_metrics, store_metrics
+from service.metrics.recorded import recording_metrics
 from service.metrics.refused import load_metrics
 from service.metrics.told import delivery_metrics
 from service.metrics.watched import Watched
@@ -50,6 +51,7 @@ class Scrape:
         for metrics in (
             *(sample_metrics, link_metrics, queue_metrics, result_metrics),
             *(store_metrics, space_metrics, evidence_metrics, load_metrics),
+            recording_metrics,
         ):
             yield from metrics(watched)
         yield from alarm_metrics(watched.alarms, watched.bearings)

@@ -7,6 +7,7 @@ from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.bus import Bus
 from service.capture.captures import Captures
+from service.continuous.tape import Tape
 from service.delivery.deliveries import Deliveries
 from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
@@ -16,6 +17,7 @@ from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.recorder import Recorder
 from service.space.watch import SpaceWatch
+from service.waveforms.keeper import WaveformKeeper
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class Watched:
         Knows how full the disks are; None where nobody looks.
     load
         Knows which questions are refused now; None where none ever are.
+    tape, recordings
+        Continuous recording, and what looks after recordings; None where nothing does.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -48,3 +52,5 @@ class Watched:
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
+    tape: Tape | None = None
+    recordings: WaveformKeeper | None = None

@@ -1,8 +1,8 @@
-"""`Shelf`: the finished recordings in a folder, listed, described and opened to be taken away."""
+"""`Shelf`: the finished recordings in some folders, listed, described, opened to be taken away."""
 
 import json
 import re
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,16 @@ from acquisition.recording.export.rows import export_rows
 from acquisition.recording.manifest import Manifest, read_manifest
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.summary import RecordingSummary, summary_of
-from acquisition.recording.writer import INCOMPLETE
 from service.capture.folders import ALARM, FILES
+from service.continuous.names import KIND
 from service.evidence.bundle import Sink, zipped
+from service.store.waveform_port import WaveformKind
+from service.waveforms.folders import finished, n_bytes_of
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")
+
+MOMENT = re.compile(r"\d{8}T\d{6}\.\d{3}Z")
+CONTINUOUS = re.compile(rf"{MOMENT.pattern}-{KIND}")
 
 MAX_ALARM_BYTES = 1_000_000
 
@@ -39,6 +44,7 @@ class Kept:
     """
 
     name: str
+    kind: WaveformKind
     manifest: Manifest | None
     fault: str | None
     alarms: Sequence[Mapping[str, Any]]
@@ -46,27 +52,35 @@ class Kept:
 
 
 class Shelf:
-    """Recordings below one folder; all methods read the disk, so call them in a thread.
+    """Recordings below some folders; all methods read the disk, so call them in a thread.
 
     Parameters
     ----------
-    root
+    roots
         Need not be there yet.
+    faults
+        Recordings that are known to be damaged, by name, and why: nothing of them is handed out.
     """
 
-    def __init__(self, root: Path) -> None:
-        self._root = root
+    def __init__(self, roots: Sequence[Path], faults: Mapping[str, str] | None = None) -> None:
+        self._roots, self._faults = roots, faults or {}
 
-    def newest(self, most: int, unit: str | None = None) -> list[Kept]:
+    def newest(
+        self, most: int, unit: str | None = None, kind: WaveformKind | None = None
+    ) -> list[Kept]:
         """The newest recordings, newest first; of one unit, or of all."""
-        folders = [folder for folder in self._folders() if unit is None or _is_of(folder, unit)]
+        folders = [
+            folder
+            for folder in self._folders()
+            if (unit is None or _is_of(folder, unit)) and kind in (None, kind_of(folder.name))
+        ]
         by_age = sorted(folders, key=_age, reverse=True)
-        return [_kept(folder) for folder in by_age[:most]]
+        return [self._kept(folder) for folder in by_age[:most]]
 
     def one(self, name: str) -> Kept | None:
         """A recording by its name; None if there is none."""
         folder = self._folder(name)
-        return None if folder is None else _kept(folder)
+        return None if folder is None else self._kept(folder)
 
     def opened(self, name: str) -> Recording:
         """A recording that has been checked from end to end.
@@ -79,6 +93,8 @@ class Shelf:
         folder = self._folder(name)
         if folder is None:
             raise ConfigError(f"{name}: no such recording")
+        if name in self._faults:
+            raise ConfigError(f"{name}: {self._faults[name]}")
         return open_recording(folder)
 
     def summary(self, name: str) -> RecordingSummary:
@@ -92,14 +108,16 @@ class Shelf:
         return summary_of(self.opened(name))
 
     def zip_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Its files as one ZIP file, piece by piece.
+        """Its files as one ZIP file, piece by piece, after it has been checked from end to end.
 
         Raises
         ------
+        ConfigError
+            If it is damaged, or not there.
         OSError
-            If one cannot be read.
+            If a file cannot be read.
         """
-        folder = self._root / name
+        folder = self.opened(name).folder
         there = [file for file in FILES if (folder / file).is_file()]
         return zipped({f"{name}/{file}": folder / file for file in there})
 
@@ -125,33 +143,33 @@ class Shelf:
             return None
         return next((folder for folder in self._folders() if folder.name == name), None)
 
-    def _folders(self) -> list[Path]:
-        if not self._root.is_dir():
-            return []
-        return [
-            path
-            for path in self._root.iterdir()
-            if not path.name.endswith(INCOMPLETE) and path.is_dir() and not path.is_symlink()
-        ]
+    def _folders(self) -> Iterator[Path]:
+        for root in self._roots:
+            yield from (root / name for name in finished(root))
+
+    def _kept(self, folder: Path) -> Kept:
+        try:
+            manifest, fault = read_manifest(folder), self._faults.get(folder.name)
+        except ConfigError as error:
+            manifest, fault = None, str(error).replace(str(folder), folder.name)
+        kind = kind_of(folder.name)
+        alarms = _alarms(folder / ALARM)
+        return Kept(folder.name, kind, manifest, fault, alarms, n_bytes_of(folder))
+
+
+def kind_of(name: str) -> WaveformKind:
+    """What a recording was made for, by its name."""
+    return WaveformKind.CONTINUOUS if CONTINUOUS.search(name) else WaveformKind.CAPTURE
 
 
 def _is_of(folder: Path, unit: str) -> bool:
     return folder.name.startswith(f"{unit}-")
 
 
-def _age(folder: Path) -> tuple[int, str]:
-    try:
-        return folder.stat().st_mtime_ns, folder.name
-    except FileNotFoundError:  # made room for a newer one meanwhile
-        return 0, folder.name
-
-
-def _kept(folder: Path) -> Kept:
-    try:
-        manifest, fault = read_manifest(folder), None
-    except ConfigError as error:
-        manifest, fault = None, str(error).replace(str(folder), folder.name)
-    return Kept(folder.name, manifest, fault, _alarms(folder / ALARM), _n_bytes(folder))
+def _age(folder: Path) -> tuple[str, str]:
+    """By what the name says, which costs nothing where there are many thousands."""
+    found = MOMENT.search(folder.name)
+    return found[0] if found else "", folder.name
 
 
 def _alarms(path: Path) -> list[Mapping[str, Any]]:
@@ -165,13 +183,3 @@ def _alarms(path: Path) -> list[Mapping[str, Any]]:
         ]
     except (OSError, ValueError, KeyError, TypeError):
         return []
-
-
-def _n_bytes(folder: Path) -> int:
-    n_bytes = 0
-    for name in FILES:
-        try:
-            n_bytes += (folder / name).stat().st_size
-        except OSError:
-            continue
-    return n_bytes

@@ -110,9 +110,10 @@ async def analysis_on(
     recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)
     captures = captures_of(plant, origin, clock)
     recordings = waveform_keeper(plant, store, clock)
-    tape = tape_of(plant, origin, clock, Pressure(bus, recordings.is_full).look)
-    space = space_watch(plant, clock)
     load = LoadWatch(bus, LoadLimits(), clock)
+    pressure = Pressure(bus, recordings.is_full, lambda: bool(load.refused))
+    tape = tape_of(plant, origin, clock, pressure.look)
+    space = space_watch(plant, clock)
     look = health_of(
         monitors, live, recorder, captures, bus, space, load, tape=tape, recordings=recordings
     )

@@ -24,6 +24,7 @@ from service.roles.ground import Ground
 from service.supervision import Supervision
 from service.wiring.evidence import evidence_desk
 from service.wiring.http import server_of
+from service.wiring.tapes import recordings_folder
 
 GC_THRESHOLDS = (20_000, 20, 20)
 """Seldom enough to cost nothing; what a request or a block leaves is mostly no cycle."""
@@ -109,6 +110,9 @@ def context_of(
         access=desk,
         space=analysis.space,
         load=analysis.load,
+        tape=analysis.tape,
+        recordings=(recordings_folder(ground.plant),),
+        faults=lambda: analysis.recordings.faults,
     )
 
 
@@ -130,4 +134,6 @@ def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource])
         sources=sources,
         space=analysis.space,
         load=analysis.load,
+        tape=analysis.tape,
+        recordings=analysis.recordings,
     )

@@ -32,7 +32,6 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
         pre_s=found.pre_s,
         post_s=found.post_s,
         max_s=found.max_s,
-        max_bytes=round(found.max_gb * BYTES_PER_GB),
         window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
     )
     return Captures(

@@ -24,7 +24,8 @@ export function alarmIdWords(id) {
 }
 
 /** What a recording was made for: the alarm that began it, and how many joined. */
-export function occasionWords({ alarms }) {
+export function occasionWords({ alarms, kind }) {
+  if (kind === "continuous") return "All samples";
   if (alarms.length === 0) return "Made for no alarm";
   const [{ alarm, change }, ...others] = alarms;
   const how = change === "raised" ? "" : ` (${changeWords(change)})`;

@@ -161,7 +161,7 @@ async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(
     assert states[cut.name]["state"] == "damaged"
     assert str(tmp_path) not in states[cut.name]["reason"]
     for path in (f"{cut.name}", f"{whole.name}", f"{whole.name}/samples.csv"):
-        problem = await service.problem(f"{RECORDINGS}/{path}", 500)
+        problem = await service.problem(f"{RECORDINGS}/{path}", 410)
         assert str(tmp_path) not in problem["detail"]
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -31,7 +30,7 @@ BLOCK = 10
 
 T0 = 1_767_225_600_000_000_000
 SECOND = 1_000_000_000
-SETTINGS = CaptureSettings(pre_s=3.0, post_s=5.0, max_s=12.0, max_bytes=10**9)
+SETTINGS = CaptureSettings(pre_s=3.0, post_s=5.0, max_s=12.0)
 ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
 
 
@@ -366,28 +365,6 @@ async def test_a_disk_that_is_too_slow_costs_the_capture_and_no_memory(
     assert rig.captures.error is not None
     assert "too slow" in rig.captures.error
     assert list(root.iterdir()) == []
-
-
-async def test_the_oldest_captures_make_room_and_what_is_not_a_capture_stays(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 100, {49: raised(10.0)})
-        [recording] = await rig.written(1)
-    size = sum(file.stat().st_size for file in recording.folder.iterdir())
-    os.utime(recording.folder, (1, 1))
-    other = root / "notes"
-    other.mkdir()
-    (other / "why.txt").write_text("to be kept")
-
-    tight = CaptureSettings(3.0, 5.0, 12.0, max_bytes=round(2.2 * size))
-    async with running(root, tight) as rig:
-        rig.send(100, 400, {149: raised(30.0), 249: raised(50.0), 349: raised(70.0)})
-        await rig.until(lambda: rig.captures.n_written == 3 and rig.captures.n_running == 0)
-
-    assert sorted(path.name for path in root.iterdir()) == [
-        "U1-20260101T000050.000Z-order1_shaft_x",
-        "U1-20260101T000110.000Z-order1_shaft_x",
-        "notes",
-    ]
 
 
 async def test_what_a_crash_has_left_unfinished_is_removed_at_the_start(root: Path) -> None:

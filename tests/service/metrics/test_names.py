@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 LABELS = {
-    *("volume", "about"),
+    *("volume", "about", "kind"),
     *("unit", "bearing", "quality", "priority", "verdict", "reason", "receiver"),
     *("version", "python", "le"),
 }

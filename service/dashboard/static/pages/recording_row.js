@@ -79,7 +79,7 @@ async function checkedRecording(id) {
     const found = await ask(["recordings", id]);
     return { state: ["good", "Checked, whole"], words: contentsWords(found) };
   } catch (failure) {
-    return failure.status === 500 ? { state: ["bad", "Damaged"], words: failure.message } : { state: null, words: `Not checked. ${failure.message}` };
+    return failure.status === 410 ? { state: ["bad", "Damaged"], words: failure.message } : { state: null, words: `Not checked. ${failure.message}` };
   }
 }
 

@@ -17,7 +17,7 @@ export function recordingsBrief(unit) {
   const head = element("div", { class: "panel-head" }, element("h2", {}, "Newest recordings"), link);
   const questions = poll(async (signal) => {
     try {
-      const found = await ask(["recordings"], [["unit", unit], ["limit", MOST]], signal);
+      const found = await ask(["recordings"], [["unit", unit], ["kind", "capture"], ["limit", MOST]], signal);
       const running = found.being_made.filter(({ alarm }) => alarm.startsWith(`${unit}:`));
       const lines = [...running.map((one) => element("li", {}, beingMadeWords(one))), ...found.recordings.map(recordingLine)];
       list.replaceChildren(...lines);

@@ -1,0 +1,1 @@
+"""The waveform store: which recordings there are, whether they are whole, how long they stay."""

@@ -1,0 +1,50 @@
+"""What looks after recordings: captures in the data folder, continuous ones wherever they are."""
+
+from functools import partial
+from pathlib import Path
+
+from acquisition.clock import Clock
+from service.evidence.capture_link import captures_in_use
+from service.settings.plant import PlantFile
+from service.space.disk import measure_disk
+from service.store.port import Store
+from service.store.waveform_port import WaveformKind
+from service.waveforms.caretaker import Caretaker, Custody
+from service.waveforms.index import Index
+from service.waveforms.keeper import WaveformKeeper
+from service.waveforms.place import place_of
+from service.waveforms.room import RoomLimits
+from service.wiring.captures import BYTES_PER_GB, CAPTURES
+from service.wiring.evidence import EVIDENCE
+from service.wiring.space import space_limits
+from service.wiring.tapes import recordings_folder
+
+
+def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKeeper:
+    """Looks after the recordings of a live plant."""
+
+    def hire() -> Caretaker:
+        index = Index(store.waveforms, place_of(Path(plant.service.data_folder)))
+        return Caretaker(custody_of(plant), index, clock)
+
+    return WaveformKeeper(hire, clock)
+
+
+def custody_of(plant: PlantFile) -> Custody:
+    """Which recordings there are, and by which rules they stay."""
+    data = Path(plant.service.data_folder)
+    room = RoomLimits(
+        continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
+        capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
+        continuous_days=plant.recording.max_days,
+    )
+    return Custody(
+        roots={
+            WaveformKind.CAPTURE: data / CAPTURES,
+            WaveformKind.CONTINUOUS: recordings_folder(plant),
+        },
+        room=room,
+        space=space_limits(plant.space),
+        bound=partial(captures_in_use, data / EVIDENCE),
+        measure=measure_disk,
+    )

@@ -1,0 +1,111 @@
+"""Recordings in folders, and a caretaker over a real store who looks when a test says so."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.raw import RawBlock
+from acquisition.recording.manifest import RecordedChannel, RecordedUnit
+from acquisition.recording.writer import RecordingWriter
+from core.machine import Measurand
+from service.space.disk import DiskSpace
+from service.space.limits import SpaceLimits
+from service.store.sqlite import SqliteStore
+from service.store.waveform_port import WaveformFile, WaveformKind
+from service.waveforms.caretaker import Caretaker, Custody
+from service.waveforms.index import Index
+from service.waveforms.room import RoomLimits
+
+T0 = 1_767_225_600_000_000_000
+HOUR_NS = 3600 * 10**9
+N_SAMPLES, RATE_HZ = 500, 50.0
+CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
+
+
+class Clock:
+    """Time passes when a test says so."""
+
+    def __init__(self) -> None:
+        self.s = 0.0
+
+    def now_ns(self) -> int:
+        return T0 + round(self.s * 1e9)
+
+    def monotonic_s(self) -> float:
+        return self.s
+
+    async def sleep(self, duration_s: float) -> None:
+        self.s += duration_s
+
+
+def recording(folder: Path, start_ns: int, unit: str = "U1", **files: str) -> Path:
+    """A recording of ten seconds; channel a is the number of the sample."""
+    limits = {"full_scale_v": 10.0, "unit_per_v": 1.0, "ok_min_v": -10.0, "ok_max_v": 10.0}
+    channels = tuple(
+        RecordedChannel(id=id_, measurand=Measurand.DISPLACEMENT_UM, **limits) for id_ in "ab"
+    )
+    recorded = RecordedUnit(unit=unit, rate_hz=RATE_HZ, channels=channels, slow_channels=())
+    index = np.arange(N_SAMPLES, dtype=np.int16)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingWriter(folder, recorded, "a test") as writer:
+        for first in range(0, N_SAMPLES, 50):
+            counts = np.array([index, -index])[:, first : first + 50]
+            stamp = start_ns + first * 20_000_000
+            writer.write(RawBlock(1, first, stamp, RATE_HZ, counts, (True, True), ()))
+    for name, text in files.items():
+        (folder / name).with_suffix(".json").write_text(text)
+    return folder
+
+
+class Rig:
+    """Two folders of recordings, and who looks after them."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.roots = {CONTINUOUS: root / "recordings", CAPTURE: root / "captures"}
+        for folder in self.roots.values():
+            folder.mkdir()
+        self.clock, self.store = Clock(), SqliteStore(root / "padwatch.sqlite3")
+        self.room, self.bound = RoomLimits(), frozenset[str]()
+        self.space = DiskSpace(1, 10**12, 10**12)
+        self.hire()
+
+    def hire(self) -> None:
+        """As after a restart."""
+        custody = Custody(
+            roots=self.roots,
+            room=self.room,
+            space=SpaceLimits(0.1, 0.05, 0, 0),
+            bound=lambda: self.bound,
+            measure=lambda _: self.space,
+        )
+        self.caretaker = Caretaker(custody, Index(self.store.waveforms, "here"), self.clock)
+
+    def make(self, hours: int, kind: WaveformKind = CONTINUOUS, unit: str = "U1") -> Path:
+        name = f"{unit}-{hours:03d}-{kind.value}"
+        return recording(self.roots[kind] / name, T0 + hours * HOUR_NS, unit)
+
+    def files(self) -> list[WaveformFile]:
+        return self.store.waveforms.files("here")
+
+    def names(self, kind: WaveformKind = CONTINUOUS) -> list[str]:
+        return sorted(path.name for path in self.roots[kind].iterdir())
+
+    def limit(self, **limits: float) -> None:
+        self.room = replace(self.room, **limits)  # type: ignore[arg-type]
+        self.hire()
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    built = Rig(tmp_path)
+    yield built
+    built.store.close()
+
+
+@pytest.fixture
+def make_recording() -> Callable[..., Path]:
+    return recording

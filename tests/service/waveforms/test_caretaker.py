@@ -1,0 +1,164 @@
+"""Index and folders are brought together, whatever has happened to either."""
+
+import shutil
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.store.port import StoreError
+from service.store.waveform_port import WaveformKind, WaveformState
+from service.waveforms.folders import put_out_of_sight
+from service.waveforms.inspection import again
+
+CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
+T0 = 1_767_225_600_000_000_000
+DAY_S = 86_400.0
+
+
+def flip(path: Path, at: int = 100) -> None:
+    content = bytearray(path.read_bytes())
+    content[at] ^= 0x10
+    path.write_bytes(content)
+
+
+def test_what_is_finished_is_found_and_entered_with_all_that_is_known_of_it(rig: Any) -> None:
+    folder = rig.make(0)
+    rig.make(1, CAPTURE, "U2")
+    rig.caretaker.look()
+
+    one, two = rig.files()
+    assert (one.kind, one.name, one.unit) == (CONTINUOUS, folder.name, "U1")
+    assert (one.start_ns, one.stop_ns, one.n_samples) == (T0, T0 + 10 * 10**9, 500)
+    assert one.n_bytes == sum(path.stat().st_size for path in folder.iterdir())
+    assert (two.kind, two.unit, two.state) == (CAPTURE, "U2", WaveformState.PRESENT)
+    assert rig.caretaker.found.n_adopted == 2
+
+
+def test_what_is_being_written_and_what_is_not_ours_is_let_alone(rig: Any) -> None:
+    root = rig.roots[CONTINUOUS]
+    for name in ("U1-x-continuous.parts", "U1-x-continuous.incomplete", "lost+found", "notes"):
+        (root / name).mkdir()
+    (root / "notes" / "why.txt").write_text("to be kept")
+    (root / "U1-y-continuous").symlink_to(rig.make(0, CAPTURE))
+    before = rig.names()
+    rig.caretaker.look()
+
+    assert [file.kind for file in rig.files()] == [CAPTURE]
+    assert rig.names() == before
+
+
+def test_an_orphan_that_is_not_whole_is_set_aside_and_told_once(rig: Any) -> None:
+    folder = rig.make(0)
+    flip(folder / "samples.parquet")
+    rig.caretaker.look()
+    rig.hire()
+    rig.caretaker.look()
+
+    [file] = rig.files()
+    assert file.name == f"{folder.name}.damaged"
+    assert file.state is WaveformState.DAMAGED
+    assert "checksum" in file.reason
+    assert rig.names() == [file.name]
+    assert rig.caretaker.found.n_damaged == 0  # told before the restart
+
+
+def test_a_recording_that_is_gone_is_missing_and_found_again_when_it_is_back(
+    rig: Any, tmp_path: Path
+) -> None:
+    folder = rig.make(0)
+    rig.caretaker.look()
+    shutil.move(folder, tmp_path / "elsewhere")
+    rig.caretaker.look()
+    assert [file.state for file in rig.files()] == [WaveformState.MISSING]
+    assert rig.caretaker.found.n_missing == 1
+
+    shutil.move(tmp_path / "elsewhere", folder)
+    rig.caretaker.look()
+    assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
+
+
+def test_a_folder_that_is_not_there_is_told_and_its_recordings_are_not_given_up(
+    rig: Any, tmp_path: Path
+) -> None:
+    rig.make(0)
+    rig.caretaker.look()
+    rig.roots[CONTINUOUS].rename(tmp_path / "unmounted")
+    with pytest.raises(OSError, match="folder of 1 recordings is not there"):
+        rig.caretaker.look()
+
+    assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
+
+
+@pytest.mark.parametrize("name", ["samples.parquet", "blocks.parquet", "manifest.json"])
+def test_a_bit_that_flips_later_is_found_when_all_is_read_once_more(rig: Any, name: str) -> None:
+    folder = rig.make(0)
+    rig.make(1)
+    rig.caretaker.look()
+    flip(folder / name)
+    rig.clock.s = DAY_S - 1.0
+    rig.caretaker.look()
+    assert not rig.caretaker.faults
+    rig.clock.s = DAY_S + 1.0
+    rig.caretaker.look()
+    rig.caretaker.look()
+
+    assert list(rig.caretaker.faults) == [folder.name]
+    assert rig.caretaker.found.n_damaged == 1
+    assert rig.names() == [folder.name, "U1-001-continuous"]
+
+
+def test_another_recording_in_the_place_of_one_is_not_taken_for_it(
+    rig: Any, make_recording: Any
+) -> None:
+    folder = rig.make(0)
+    rig.caretaker.look()
+    shutil.rmtree(folder)
+    make_recording(folder, T0 + 77)
+    rig.clock.s = DAY_S + 1.0
+    rig.caretaker.look()
+
+    assert "not the one" in rig.caretaker.faults[folder.name]
+
+
+def test_what_is_read_once_more_takes_a_small_share_of_the_time(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow(*how: Any) -> Any:
+        rig.clock.s += 4.0
+        return again(*how)
+
+    for hour in range(3):
+        rig.make(hour)
+    rig.caretaker.look()
+    monkeypatch.setattr("service.waveforms.caretaker.again", slow)
+    rig.clock.s = DAY_S + 1.0
+    for _ in range(100):
+        rig.caretaker.look()
+        rig.clock.s += 5.0
+
+    assert rig.caretaker.found.n_checked == 3  # 4 s in every 200 s
+
+
+def test_a_removal_that_a_kill_has_interrupted_is_finished(rig: Any) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    put_out_of_sight(folder)
+    rig.hire()
+    rig.caretaker.look()
+
+    assert rig.names() == [other.name]
+    assert [file.name for file in rig.files()] == [other.name]
+    assert rig.caretaker.found.n_missing == 0
+    assert rig.caretaker.found.n_removed == {"continuous": 1}
+
+
+def test_an_index_that_cannot_be_written_loses_nothing(rig: Any) -> None:
+    folder = rig.make(0)
+    with sqlite3.connect(rig.root / "padwatch.sqlite3", isolation_level=None) as other:
+        other.execute("DROP TABLE waveform")
+        with pytest.raises(StoreError):
+            rig.caretaker.look()
+
+    assert folder.is_dir()
