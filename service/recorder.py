@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 import structlog
@@ -17,6 +18,7 @@ from core.films.film_judge import FilmNews
 from service.heartbeats import UNHEARD, Pulse
 from service.live import LiveView
 from service.store.port import Store, StoreError, UnitGap
+from service.store.positions_port import StreamPosition
 
 log = structlog.get_logger()
 
@@ -36,6 +38,7 @@ class Findings:
     gaps: Sequence[UnitGap] = ()
     alarms: Sequence[AlarmNews] = ()
     films: Sequence[FilmNews] = ()
+    position: StreamPosition | None = None
 
 
 class Recorder:
@@ -88,7 +91,7 @@ class Recorder:
         """Queue findings."""
         if not (self._waiting or self._alarms):
             self._waits_since_s = self._clock.monotonic_s()
-        if findings.assessments or findings.gaps:
+        if findings.assessments or findings.gaps or findings.position:
             self._waiting.append(replace(findings, alarms=()))
         if len(self._waiting) > self._capacity:
             self._waiting.popleft()
@@ -104,6 +107,13 @@ class Recorder:
         mine = self._alarms[-1] if self._alarms else None
         async with self._progress:
             await self._progress.wait_for(lambda: all(news is not mine for news in self._alarms))
+
+    async def reached(self, position: StreamPosition) -> None:
+        """Wait until a position that was put is on the disk, however long it takes."""
+        async with self._progress:
+            await self._progress.wait_for(
+                lambda: all(findings.position is not position for findings in self._waiting)
+            )
 
     async def settled(self) -> None:
         """Wait until everything is on the disk, or the store has refused to take it."""
@@ -135,9 +145,10 @@ class Recorder:
         assessments = [a for findings in batch for a in findings.assessments]
         gaps = [gap for findings in batch for gap in findings.gaps]
         films = [told for findings in batch for told in findings.films]
+        positions = [findings.position for findings in batch if findings.position]
+        append = partial(self._append, assessments, gaps, alarms, films, positions)
         try:
-            loop = asyncio.get_running_loop()
-            await loop.run_in_executor(self._thread, self._append, assessments, gaps, alarms, films)
+            await asyncio.get_running_loop().run_in_executor(self._thread, append)
         except StoreError as error:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
@@ -161,9 +172,10 @@ class Recorder:
         gaps: Sequence[UnitGap],
         alarms: Sequence[AlarmNews],
         films: Sequence[FilmNews],
+        positions: Sequence[StreamPosition],
     ) -> None:
         with self._timed():
-            self._store.append(assessments, gaps, alarms, films)
+            self._store.append(assessments, gaps, alarms, films, positions)
 
     async def _tell_progress(self) -> None:
         async with self._progress:

@@ -19,6 +19,7 @@ from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity
 from service.store.outbox_port import Outbox
+from service.store.positions_port import StreamPosition
 from service.store.retention.port import RetentionStore
 from service.store.rollups.port import RollupStore
 from service.store.spectra_port import SpectraStore
@@ -213,8 +214,15 @@ class Store(Protocol):
         gaps: Sequence[UnitGap],
         alarms: Sequence[AlarmNews] = (),
         films: Sequence[FilmNews] = (),
+        positions: Sequence[StreamPosition] = (),
     ) -> None:
-        """Write all or nothing; what is written twice counts once."""
+        """Write all or nothing; what is written twice counts once.
+
+        Parameters
+        ----------
+        positions
+            How far the results of units reach on a stream, with these.
+        """
         ...
 
     def trend(self, query: TrendQuery) -> Trend:
@@ -249,6 +257,10 @@ class Store(Protocol):
 
     def reference_history(self, unit: str, bearing: str) -> Sequence[GapReference]:
         """Read what was ever set for a bearing, newest first; at most the newest thousand."""
+        ...
+
+    def position(self, unit: str) -> StreamPosition | None:
+        """How far the results of a unit reach on a stream; None if they never came from one."""
         ...
 
     def alarms(self) -> Sequence[Alarm]:

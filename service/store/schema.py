@@ -12,6 +12,7 @@ from service.store.audit_schema import AUDIT_TABLES
 from service.store.commands import COMMAND_TABLES
 from service.store.film_schema import FILM_TABLES
 from service.store.outbox_schema import OUTBOX_TABLES
+from service.store.positions import POSITION_TABLES
 from service.store.retention.schema import RETENTION_TABLES
 from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.spectra_schema import SPECTRA_TABLES
@@ -149,5 +150,6 @@ MIGRATIONS = (
     """,
     WAVEFORM_TABLES,
     RETENTION_TABLES,
+    POSITION_TABLES,
 )
 """Statement lists; the n-th leads from schema n to schema n + 1."""

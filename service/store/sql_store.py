@@ -34,6 +34,8 @@ from service.store.port import (
     TrendQuery,
     UnitGap,
 )
+from service.store.positions import select_position, write_positions
+from service.store.positions_port import StreamPosition
 from service.store.reach import gap_of, select_reach
 from service.store.references import insert_reference, select_history, select_in_force
 from service.store.retention.sql import SqlRetention
@@ -113,6 +115,7 @@ class SqlStore:
         gaps: Sequence[UnitGap],
         alarms: Sequence[AlarmNews] = (),
         films: Sequence[FilmNews] = (),
+        positions: Sequence[StreamPosition] = (),
     ) -> None:
         """Write what was found in one transaction; durable when this returns.
 
@@ -128,6 +131,7 @@ class SqlStore:
             writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
             insert_alarms(writer, alarms, self._chain.add, self._address)
             insert_film_news(writer, films)
+            write_positions(writer, positions)
 
     def trend(self, query: TrendQuery) -> Trend:
         """Read trends of one bearing, gathered into buckets if they are many."""
@@ -179,6 +183,11 @@ class SqlStore:
         """Read what was ever set for a bearing, newest first."""
         with self._reader() as reader:
             return select_history(reader, unit, bearing)
+
+    def position(self, unit: str) -> StreamPosition | None:
+        """How far the results of a unit reach on a stream; None if they never came from one."""
+        with self._reader() as reader:
+            return select_position(reader, unit)
 
     def alarms(self) -> list[Alarm]:
         """Read every alarm that ever had an event, as it was after its newest."""
