@@ -18,8 +18,8 @@ from harness.tape import Acknowledged, Step, python, record
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.trail import verify_trail
 
-N_DEEDS = 240
-N_CUTS = 5000
+N_DEEDS = 150
+N_CUTS, N_FEW = 5000, 100
 ROOT = Path(__file__).parents[2]
 DATABASE = "padwatch.sqlite3"
 
@@ -83,15 +83,18 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
     recorded: Record,
     tmp_path: Path,
     torture_seed: int,
-    times: Callable[[int], int],
+    is_whole: bool,
     assessment: Build,
+    figure: Callable[[str], None],
 ) -> None:
-    for acknowledged, files in cuts(recorded(""), times(N_CUTS), torture_seed):
+    n_cuts = N_CUTS if is_whole else N_FEW
+    for acknowledged, files in cuts(recorded(""), n_cuts, torture_seed):
         path = left_in(tmp_path / "data", files)
         assert not found_after(path, torture_seed, acknowledged, assessment), acknowledged
         assert damage(path) == []
         assert not mark_findings(path)
         assert verify_trail(path).is_whole
+    figure(f"power cuts: {n_cuts}, 0 acknowledged lost, 0 torn, 0 altered, 0 corrupt")
 
 
 def _planted(bug: str, what: str) -> object:

@@ -1,19 +1,37 @@
 """Transactions whose every value follows from seed and number, so that none needs to be kept."""
 
 import hashlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
+
+import numpy as np
 
 from core.account import Gap
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
-from core.alarms.event import AlarmNews
+from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
+from core.alarms.operation import Acknowledge, operate
 from core.assessment import Assessment
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
+from core.cross_spectrum import average
+from core.decision.decision import UNDECIDED
+from core.decision.verdict import Verdict
+from core.estimators import Estimator
+from core.films.film_finding import FilmFinding
+from core.films.film_judge import FilmNews
+from core.films.film_reading import FilmReading, FilmValue
 from core.quality import Reason, missing
 from core.quantities import CATALOGUE
+from core.stiffness_history import Evidence
+from service.store.audit_port import AuditQuery
+from service.store.film_port import FilmQuery
+from service.store.outbox_port import Letter
 from service.store.port import AlarmQuery, Store, TrendQuery, UnitGap
+from service.store.spectra_port import SpectraLimits, SpectraQuery
 
+RECEIVER = "R"
 T0_NS = 1_767_225_600_000_000_000
 HOP_NS = 11_946_666_667
 Build = Callable[..., Assessment]
@@ -22,15 +40,16 @@ NAMES = tuple(quantity.name for quantity in CATALOGUE)
 
 @dataclass(frozen=True)
 class Deed:
-    """One transaction: a result, a gap and an alarm."""
+    """One transaction: a result with its spectrum, a gap, an alarm, a letter, a film's reading."""
 
     assessment: Assessment
     gap: UnitGap
     alarm: AlarmNews
+    film: FilmNews
 
     def append_to(self, store: Store) -> None:
         """Write it."""
-        store.append([self.assessment], [self.gap], [self.alarm])
+        store.append([self.assessment], [self.gap], [self.alarm], [self.film])
 
 
 @cache
@@ -39,13 +58,56 @@ def deed(seed: int, number: int, build: Build) -> Deed:
     readings = {name: value(seed, number, name) for name in NAMES}
     some = {n: v if v > 0.1 else missing(Reason.NOT_MEASURED) for n, v in readings.items()}
     time_ns = T0_NS + number * HOP_NS
-    raised, events = advance(
+    phasors = np.full((1, 4, 2), 1.0 + value(seed, number, "spectrum"), dtype=complex)
+    spectrum = average(np.arange(1.0, 3.0), phasors, np.ones((1, 4), dtype=bool))
+    result = replace(build(time_ns, **some), spectrum=spectrum)
+    return Deed(result, _gap(seed, number), _alarm(readings, number), _film(seed, number))
+
+
+def _alarm(readings: Mapping[str, float], number: int) -> AlarmNews:
+    """An alarm that is raised; every third one is acknowledged at once."""
+    time_ns = T0_NS + number * HOP_NS
+    alarm, events = advance(
         Alarm(AlarmIdentity("U1", f"B{number}", AlarmKind.SHAFT_X)),
         Condition(AlarmLevel.ALERT, value=150.0 + readings["speed_rpm"], limit=150.0),
         time_ns,
         AlarmRule(),
     )
-    return Deed(build(time_ns, **some), _gap(seed, number), AlarmNews(raised, events))
+    if _is_acknowledged(number):
+        alarm, more = operate(alarm, Acknowledge("A. Name", 1), time_ns + 1)
+        return AlarmNews(alarm, (*events, *more))
+    return AlarmNews(alarm, events)
+
+
+def _is_acknowledged(number: int) -> bool:
+    return number % 3 == 0
+
+
+def _film(seed: int, number: int) -> FilmNews:
+    numbers = [value(seed, number, f"film {n}") for n in range(10)]
+    values = tuple(
+        FilmValue(*numbers[4 * row : 4 * row + 4], Evidence.MEASURED, Reason.OK) for row in (0, 1)
+    )
+    reading = FilmReading(
+        *("U1", "UJB", Estimator.DYNAMIC, T0_NS + number * HOP_NS),
+        BearingCondition(OperatingState.FULL_LOAD, True, None),
+        *(92.3, 300.0, numbers[8], 0.001, 30.0, numbers[9]),
+        (values[0], values[1]),
+    )
+    said = FilmFinding(Verdict.NO_BASELINE)
+    return FilmNews(reading, (said, said), (UNDECIDED, UNDECIDED))
+
+
+def letters(alarm: Alarm, event: AlarmEvent) -> Iterator[Letter]:
+    """Tell somebody of every alarm that is raised."""
+    if event.change is AlarmChange.RAISED:
+        body = f"{event.value!r}"
+        yield Letter(
+            *(RECEIVER, alarm.identity.subject, body, event.time_ns),
+            is_urgent=False,
+            is_active=True,
+            closes=False,
+        )
 
 
 def value(seed: int, number: int, name: str) -> float:
@@ -94,26 +156,51 @@ def loss(store: Store, seed: int, acknowledged: int, offered: int, build: Build)
     offered
         Number of the newest that was begun.
     """
-    parts = (_results(store), _gaps(store), _alarms(store))
-    there = [set(part) for part in parts]
-    whole, any_ = set.intersection(*there), set.union(*there)
-    wanted = {n: deed(seed, n, build) for n in any_ if 0 <= n <= offered}
+    parts = {name: read(store) for name, read in PARTS.items()}
+    any_ = set[int]().union(*parts.values())
+    wanted = {n: _parts_of(deed(seed, n, build), n) for n in range(offered + 1) if n in any_}
+    torn = [n for n, due in wanted.items() if any(n not in parts[name] for name in due)]
     return Loss(
-        lost=tuple(n for n in range(acknowledged + 1) if n not in whole),
-        torn=tuple(sorted(any_ - whole)),
-        unexpected=tuple(sorted(n for n in any_ if not 0 <= n <= offered)),
-        altered=tuple(n for n in sorted(wanted) if not _is_same(wanted[n], parts, n)),
+        lost=tuple(n for n in range(acknowledged + 1) if n not in wanted or n in torn),
+        torn=tuple(torn),
+        unexpected=tuple(
+            sorted(
+                n
+                for name, part in parts.items()
+                for n in part
+                if n not in wanted or name not in wanted[n]
+            )
+        ),
+        altered=tuple(
+            n
+            for n, due in wanted.items()
+            if any(n in parts[name] and parts[name][n] != one for name, one in due.items())
+        ),
     )
 
 
-Parts = tuple[Mapping[int, object], Mapping[int, object], Mapping[int, object]]
+def _parts_of(done: Deed, number: int) -> dict[str, object]:
+    """What a transaction leaves in every part of the store; not in all of them something."""
+    values = [v for one in done.film.reading.values for v in (one.ln_k, one.shaft_um_pk)]
+    due: dict[str, object] = {
+        "results": {name: r.value for name, r in done.assessment.readings.items()},
+        "gaps": done.gap.gap,
+        "alarms": tuple(done.alarm.events),
+        "letters": f"{done.alarm.events[0].value!r}",
+        "films": tuple(values),
+    }
+    if _is_acknowledged(number):
+        due["audit"] = "A. Name"
+    if _has_spectrum(number):
+        due["spectra"] = 1
+    return due
 
 
-def _is_same(wanted: Deed, parts: Parts, number: int) -> bool:
-    results = {name: r.value for name, r in wanted.assessment.readings.items()}
-    expected = (results, wanted.gap.gap, tuple(wanted.alarm.events))
-    return all(
-        part[number] == one for part, one in zip(parts, expected, strict=True) if number in part
+def _has_spectrum(number: int) -> bool:
+    """Whether it is the first of a stretch of time of which one is kept."""
+    return number == 0 or any(
+        limits.slot(T0_NS + number * HOP_NS) != limits.slot(T0_NS + (number - 1) * HOP_NS)
+        for _, limits in SpectraLimits().tiers
     )
 
 
@@ -138,6 +225,50 @@ def _alarms(store: Store) -> dict[int, object]:
         number = int(stored.event.identity.subject.removeprefix("B"))
         events[number] = (*events.get(number, ()), stored.event)
     return dict(events)
+
+
+def _letters(store: Store) -> dict[int, object]:
+    waiting = store.outbox.waiting(RECEIVER, 100_000)
+    found: dict[int, object] = {}
+    for letter in waiting:
+        number = int(letter.event_id.removeprefix("B"))
+        found[number] = "twice" if number in found else letter.body
+    return found
+
+
+def _films(store: Store) -> dict[int, object]:
+    history = store.films.history(FilmQuery("U1", "UJB", Estimator.DYNAMIC)).history
+    return {
+        _number(int(time_ns)): tuple(
+            float(values[row, i])
+            for row in (0, 1)
+            for values in (history.ln_k, history.shaft_um_pk)
+        )
+        for i, time_ns in enumerate(history.time_ns)
+    }
+
+
+def _audit(store: Store) -> dict[int, object]:
+    entries = store.audit.entries(AuditQuery(limit=100_000, action="alarm.acknowledged"))
+    return {int(entry.object.split(":")[1].removeprefix("B")): entry.actor for entry in entries}
+
+
+def _spectra(store: Store) -> dict[int, object]:
+    found = store.spectra.read(SpectraQuery("U1", "UJB", 0, 2**62, 100_000))
+    assert not found.damaged_ns
+    return {_number(one.time_ns): one.n_segments for one in found.spectra}
+
+
+PARTS: Mapping[str, Callable[[Store], dict[int, object]]] = {
+    "results": _results,
+    "gaps": _gaps,
+    "alarms": _alarms,
+    "letters": _letters,
+    "films": _films,
+    "audit": _audit,
+    "spectra": _spectra,
+}
+"""What a transaction may leave, and how it is read back: by its number."""
 
 
 def _number(time_ns: int) -> int:

@@ -9,6 +9,7 @@ import pickle
 import sys
 from pathlib import Path
 
+from harness.deeds import letters
 from service.store.sqlite import SqliteStore
 
 
@@ -17,7 +18,7 @@ def main() -> None:
     with Path(sys.argv[2]).open("rb") as file:
         deeds = pickle.load(file)  # noqa: S301  our own
     bug = sys.argv[3] if len(sys.argv) > 3 else ""
-    store = SqliteStore(Path(sys.argv[1]))
+    store = SqliteStore(Path(sys.argv[1]), address=letters)
     if bug == "synchronous_normal":
         store._writer.execute("PRAGMA synchronous = NORMAL")
     for number, done in enumerate(deeds):
