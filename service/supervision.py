@@ -1,17 +1,26 @@
 """`Supervision`: what the service manager hears while the program runs."""
 
 from collections.abc import Iterable
+from typing import Protocol
 
 import structlog
 
 from acquisition.clock import Clock
 from service.heartbeats import Heartbeats
-from service.live import LinkState, LiveView
+from service.live import LinkState, UnitStatus
 from service.notify import ServiceManager
 
 log = structlog.get_logger()
 
 LOOK_EVERY_S = 10.0
+
+
+class Links(Protocol):
+    """Whoever knows how samples of a unit arrive."""
+
+    def status(self, unit: str) -> UnitStatus:
+        """How samples of a unit arrive."""
+        ...
 
 
 class Supervision:
@@ -24,7 +33,7 @@ class Supervision:
         self,
         manager: ServiceManager,
         beats: Heartbeats,
-        live: LiveView,
+        live: Links,
         units: Iterable[str],
         clock: Clock,
     ) -> None:

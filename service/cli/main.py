@@ -18,6 +18,7 @@ from service.cli.reanalyse import reanalyse
 from service.cli.record import record
 from service.cli.replay import replay
 from service.cli.run import run
+from service.cli.serve import serve
 from service.cli.validate import validate
 
 EXIT_BUG = 70
@@ -26,6 +27,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 app.command()(run)
 app.command()(demo)
 app.command()(acquire)
+app.command()(serve)
 app.command()(daq)
 app.command()(record)
 app.command()(replay)

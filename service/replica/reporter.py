@@ -1,0 +1,128 @@
+"""`Reporter`: writes down, about every second, what this process knows of its units."""
+
+import asyncio
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import structlog
+
+from acquisition.clock import Clock
+from service.alarms.engine import AlarmEngine
+from service.films.keeper import FilmKeeper
+from service.heartbeats import UNHEARD, Pulse
+from service.live import LiveView
+from service.replica.describing import alarm_state, plant_signs, unit_signs, unit_state
+from service.replica.unit_state import UnitSigns, UnitState, packed_state, written_signs
+from service.settings.units import UnitSettings
+from service.store.port import StoreError
+from service.store.unit_states_port import UnitReport, UnitStates
+
+log = structlog.get_logger()
+
+EVERY_S = 1.0
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A unit at one moment.
+
+    Parameters
+    ----------
+    state
+        None where it is as it was when it was last written.
+    """
+
+    unit: str
+    signs: UnitSigns
+    revision: int
+    state: UnitState | None
+
+
+class Reporter:
+    """Looks at the units on the event loop, and writes in a thread.
+
+    Parameters
+    ----------
+    held
+        Which units are this process's just now; with `PLANT` where it also tells of alarms that
+        are of no unit.
+    """
+
+    def __init__(
+        self,
+        process: str,
+        units: Iterable[UnitSettings],
+        held: Callable[[], Iterable[str]],
+        live: LiveView,
+        alarms: AlarmEngine,
+        films: FilmKeeper,
+        store: UnitStates,
+        clock: Clock,
+    ) -> None:
+        self._process, self._held, self._store, self._clock = process, held, store, clock
+        self._units = {unit.id: unit for unit in units}
+        self._live, self._alarms, self._films = live, alarms, films
+        self._written: dict[str, tuple[int, UnitState]] = {}
+        self._n_beats = 0
+        self._trouble: str | None = None
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Report for ever."""
+        while True:
+            pulse.beat(EVERY_S)
+            await self.report()
+            await self._clock.sleep(EVERY_S)
+
+    async def report(self) -> None:
+        """Report once; where that fails, whoever reads will say that nothing is heard."""
+        seen = [self._look(unit) for unit in self._held()]
+        if not seen:
+            return
+        self._n_beats += 1
+        try:
+            await asyncio.to_thread(self._write, seen)
+        except StoreError as error:
+            self._note(str(error))
+            return
+        self._note(None)
+        self._written |= {s.unit: (s.revision, s.state) for s in seen if s.state is not None}
+
+    def _look(self, unit: str) -> Seen:
+        state, signs = self._state_of(unit)
+        revision, written = self._written.get(unit, (0, None))
+        if state == written:
+            return Seen(unit, signs, revision, None)
+        return Seen(unit, signs, revision + 1, state)
+
+    def _state_of(self, unit: str) -> tuple[UnitState, UnitSigns]:
+        settings = self._units.get(unit)
+        if settings is not None:
+            state = unit_state(settings, self._live, self._alarms, self._films)
+            return state, unit_signs(settings, self._live)
+        others = [a for a in self._alarms.alarms if a.identity.unit not in self._units]
+        return alarm_state(others, self._alarms), plant_signs(self._live)
+
+    def _write(self, seen: Sequence[Seen]) -> None:
+        self._store.report(self._process, [self._report(each) for each in seen])
+
+    def _report(self, seen: Seen) -> UnitReport:
+        status = seen.signs.status
+        return UnitReport(
+            unit=seen.unit,
+            n_beats=self._n_beats,
+            beat_ns=self._clock.now_ns(),
+            link=status.state.value,
+            reason=status.reason,
+            last_sample_ns=status.last_sample_ns,
+            signs=written_signs(seen.signs),
+            revision=seen.revision,
+            state=None if seen.state is None else packed_state(seen.state),
+        )
+
+    def _note(self, trouble: str | None) -> None:
+        """Log when it begins or ceases to fail."""
+        if trouble is not None and self._trouble is None:
+            log.error("units are not reported on", reason=trouble)
+        if trouble is None and self._trouble is not None:
+            log.info("units are reported on again")
+        self._trouble = trouble

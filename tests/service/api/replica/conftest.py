@@ -1,0 +1,77 @@
+"""A replica beside a service that analyses, over the same database."""
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import httpx2
+import pytest
+
+from core.alarms.alarm import PLANT
+from service.api.app import create_app
+from service.heartbeats import Heartbeats
+from service.replica.carrying_out import CarryingOut
+from service.replica.reporter import Reporter
+from service.roles.replica import Replica, replica_context, replica_on
+from service.settings.plant import PlantFile
+
+
+@dataclass
+class Pair:
+    """The service, and who shows what it writes down."""
+
+    service: Any
+    replica: Replica
+    client: httpx2.AsyncClient
+    reporter: Reporter
+    carrying_out: CarryingOut
+
+    async def told(self) -> None:
+        """Let the service report, and the replica read it."""
+        await self.reporter.report()
+        await self.replica.feed.look()
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for both, whose clocks agree."""
+        self.service.clock.s += seconds
+        self.service.clock.ns += round(seconds * 1e9)
+
+    async def json(self, path: str) -> Any:
+        answer = await self.client.get(path)
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+
+def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, CarryingOut]:
+    """What a process that analyses adds to the service."""
+    units = [unit.id for unit in plant.unit]
+    parts = (service.alarms, service.films)
+    reporter = Reporter(
+        name,
+        plant.unit,
+        lambda: [*units, PLANT],
+        service.live,
+        *parts,
+        service.store.unit_states,
+        service.clock,
+    )
+    held = lambda: [*units, PLANT]  # noqa: E731
+    carrying_out = CarryingOut(name, held, *parts, service.recorder, service.store, service.clock)
+    return reporter, carrying_out
+
+
+@pytest.fixture
+async def pair(
+    running: Any, plant: PlantFile, documents: list[dict[str, Any]]
+) -> AsyncIterator[Pair]:
+    """Both, and the replica has seen two reports: it knows that somebody is alive."""
+    reporter, carrying_out = process_of(running, plant, "one")
+    replica = await replica_on(plant, running.store, running.clock)
+    app = create_app(replica_context(replica, None, None, Heartbeats(running.clock)))
+    app.openapi_schema = documents[0]
+    transport = httpx2.ASGITransport(app)
+    async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
+        both = Pair(running, replica, client, reporter, carrying_out)
+        await both.told()
+        await both.told()
+        yield both

@@ -1,0 +1,155 @@
+"""A replica answers as the process that analyses, and never shows the dead as alive."""
+
+from typing import Any
+
+import pytest
+
+from service.live import LinkState
+from service.replica.live import NOBODY, SILENT_AFTER_S
+from service.roles.replica import replica_on
+
+SAME = [
+    "/api/v1/overview",
+    "/api/v1/units",
+    "/api/v1/units/U1/bearings",
+    "/api/v1/units/U1/bearings/UJB/latest",
+    "/api/v1/units/U2/bearings/UJB/latest",
+    "/api/v1/units/U1/bearings/UJB/budgets/dynamic_k_xx_n_per_m",
+    "/api/v1/units/U1/bearings/UJB/film",
+    "/api/v1/alarms",
+    "/api/v1/alarms/U1:link:link_lost",
+    "/api/v1/alarms/plant:store:results_not_stored",
+    "/api/v1/delivery",
+]
+ELSEWHERE = {"captures", "evidence", "refresh_s"}
+"""Of the overview: what lies with the process that analyses, and what the test rounds."""
+
+
+async def test_a_replica_answers_as_the_process_that_analyses(pair: Any) -> None:
+    for path in SAME:
+        mine, theirs = await pair.client.get(path), await pair.service.client.get(path)
+
+        assert mine.status_code == theirs.status_code, path
+        assert _shared(mine.json()) == _shared(theirs.json()), path
+
+
+def _shared(answer: Any) -> Any:
+    if isinstance(answer, dict) and "captures" in answer:
+        return {key: value for key, value in answer.items() if key not in ELSEWHERE}
+    if isinstance(answer, dict) and "status" in answer:
+        return answer["status"]
+    return answer
+
+
+async def test_numbers_are_there_and_current(pair: Any) -> None:
+    latest = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+
+    assert latest["quality"]["level"] == "good"
+    assert latest["readings"]["dynamic_k_xx_n_per_m"]["value"] > 0.0
+    assert latest["readings"]["dynamic_k_xx_n_per_m"]["uncertainty"] is not None
+
+
+async def test_ages_go_on_between_reports(pair: Any) -> None:
+    before = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+    pair.service.clock.s += 3.0
+    after = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+
+    assert after["age_s"] == pytest.approx(before["age_s"] + 3.0)
+
+
+async def test_a_process_that_has_died_is_not_shown_as_healthy(pair: Any) -> None:
+    pair.service.clock.s += SILENT_AFTER_S + 0.1
+    await pair.replica.feed.look()
+
+    latest = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+    unit = await pair.json("/api/v1/units/U1")
+    alarms = await pair.json("/api/v1/alarms")
+    assert latest["quality"] == {"level": "bad", "reason": "not_connected"}
+    assert {reading["value"] for reading in latest["readings"].values()} == {None}
+    assert (unit["source"]["state"], unit["source"]["reason"]) == ("not_connected", NOBODY)
+    known = {a["id"] for a in alarms["alarms"] if a["condition"] != "unknown"}
+    assert known == set()
+    assert {a["id"] for a in alarms["unjudged"]} >= {"U1:link:link_lost"}
+
+
+async def test_alarms_are_looked_at_anew_as_soon_as_a_process_is_silent(pair: Any) -> None:
+    before = pair.replica.alarms.revision
+    pair.service.clock.s += SILENT_AFTER_S + 0.1
+
+    assert pair.replica.alarms.revision != before
+
+
+async def test_a_report_that_was_there_before_the_replica_is_no_sign_of_life(
+    running: Any, pair: Any
+) -> None:
+    await pair.reporter.report()
+    late = await replica_on(pair.replica.plant, running.store, running.clock)
+    await late.feed.look()
+    assert not late.live.is_alive("U1")
+    assert not late.live.current("U1", "UJB").is_current
+
+    await pair.reporter.report()
+    await late.feed.look()
+    assert late.live.is_alive("U1")
+    assert late.live.current("U1", "UJB").is_current
+
+
+async def test_the_clock_of_another_host_makes_nothing_old_or_new(pair: Any) -> None:
+    pair.service.clock.ns -= 3600 * 10**9
+    await pair.told()
+
+    assert pair.replica.live.is_alive("U1")
+    assert pair.replica.live.current("U1", "UJB").is_current
+
+
+async def test_what_stands_still_while_the_process_lives_grows_old(pair: Any) -> None:
+    for _ in range(20):
+        pair.service.clock.s += 4.0
+        await pair.told()
+
+    latest = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+    assert latest["quality"]["reason"] == "stale"
+    assert latest["age_s"] == pytest.approx(80.0)
+
+
+async def test_a_lost_link_is_told(pair: Any) -> None:
+    pair.service.live.set_link("U1", LinkState.NOT_CONNECTED, "cut")
+    await pair.told()
+
+    unit = await pair.json("/api/v1/units/U1")
+    assert (unit["source"]["state"], unit["source"]["reason"]) == ("not_connected", "cut")
+
+
+async def test_live_samples_stay_where_they_are(pair: Any) -> None:
+    for path in ("bearings/UJB/spectrum", "bearings/UJB/orbit", "bearings/UJB/motion", "waveform"):
+        answer = await pair.client.get(f"/api/v1/units/U1/{path}")
+
+        assert answer.status_code == 409, path
+        assert "not available from this replica" in answer.json()["detail"]
+
+
+async def test_readiness_says_who_analyses(pair: Any) -> None:
+    alive = (await pair.client.get("/readyz")).json()["checks"]
+    pair.service.clock.s += 60.0
+    answer = await pair.client.get("/readyz")
+
+    assert alive["analysis of U1"] == "last sign of life 0.0 s ago"
+    assert answer.status_code == 200  # others may go on; the replica does what it can
+    assert answer.json()["checks"]["analysis of U1"] == "silent: last sign of life 60.0 s ago"
+
+
+async def test_metrics_say_who_analyses(pair: Any) -> None:
+    text = (await pair.client.get("/metrics")).text
+
+    assert 'padwatch_unit_analysed{unit="U1"} 1.0' in text
+    assert 'padwatch_bearings{quality="good",unit="U1"}' in text
+
+
+async def test_a_report_of_another_version_is_no_sign_of_life(
+    pair: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pair.service.clock.s += SILENT_AFTER_S + 0.1
+    monkeypatch.setattr("service.replica.reporter.written_signs", lambda _: '[{"version": 9}]')
+    await pair.told()
+
+    assert not pair.replica.live.is_alive("U1")

@@ -1,0 +1,215 @@
+"""What people do at a replica is done once by the process that analyses, or not at all."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Any
+
+import httpx2
+import pytest
+
+from core.alarms.operation import Comment
+from service.replica.asking import WAIT_S, Asking
+from service.replica.commands import OnAlarm, read, written
+from service.store.commands_port import Answer, Command, CommandState
+from service.store.port import AlarmQuery
+
+LINK = "U1:link:link_lost"
+ANNA = {"actor": "A. Name"}
+
+
+@pytest.fixture
+async def answered(pair: Any, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
+    """The process that analyses looks for commands; there is time enough by the set clock."""
+    monkeypatch.setattr("service.replica.asking.WAIT_S", 1e12)
+    monkeypatch.setattr("service.replica.asking.EXPIRES_S", 1e9)
+    looking = asyncio.create_task(pair.carrying_out.run())
+    yield pair
+    looking.cancel()
+    await asyncio.wait([looking])
+
+
+async def raise_alarm(pair: Any) -> None:
+    pair.service.alarms.link("U1", False, "cut")
+    pair.pass_time(3600.0)
+    pair.service.alarms.tick()
+    await pair.service.recorder.stored()
+    await pair.told()
+
+
+async def post(pair: Any, action: str, **body: object) -> httpx2.Response:
+    answer: httpx2.Response = await pair.client.post(
+        f"/api/v1/alarms/{LINK}/{action}", json={**ANNA, **body}
+    )
+    return answer
+
+
+def changes(pair: Any) -> list[str]:
+    events = pair.service.store.alarm_events(AlarmQuery(alarm=LINK))
+    return [stored.event.change.value for stored in reversed(events)]
+
+
+async def test_an_acknowledgement_reaches_the_engine_and_the_disk(answered: Any) -> None:
+    await raise_alarm(answered)
+    answer = await post(answered, "acknowledge", occurrence=1)
+
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["state"] == "acknowledged"
+    assert answered.service.alarms.alarm(LINK).is_acknowledged
+    (event,) = answered.service.store.alarm_events(AlarmQuery(alarm=LINK, limit=1))
+    assert (event.event.change.value, event.event.actor) == ("acknowledged", "A. Name")
+
+
+async def test_an_acknowledgement_of_an_older_occurrence_swallows_no_newer_one(
+    answered: Any,
+) -> None:
+    await raise_alarm(answered)
+    answer = await post(answered, "acknowledge", occurrence=7)
+
+    assert answer.status_code == 409
+    assert "look at it" in answer.json()["detail"]
+    assert not answered.service.alarms.alarm(LINK).is_acknowledged
+
+
+async def test_an_unknown_alarm_is_unknown_to_a_replica_too(answered: Any) -> None:
+    path = "/api/v1/alarms/U1:nothing:link_lost/acknowledge"
+    answer = await answered.client.post(path, json={**ANNA, "occurrence": 1})
+
+    assert answer.status_code == 404
+
+
+async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair: Any) -> None:
+    await raise_alarm(pair)
+    answer = await post(pair, "acknowledge", occurrence=1)
+
+    assert answer.status_code == 503
+    assert f"has not answered within {WAIT_S:g} s" in answer.json()["detail"]
+    await pair.carrying_out.look()
+    assert not pair.service.alarms.alarm(LINK).is_acknowledged
+
+
+async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(
+    pair: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await raise_alarm(pair)
+    monkeypatch.setattr(Asking, "_answer", _killed)
+    with pytest.raises(KeyboardInterrupt):
+        await post(pair, "acknowledge", occurrence=1)
+    pair.pass_time(60.0)
+    await pair.carrying_out.look()
+
+    assert not pair.service.alarms.alarm(LINK).is_acknowledged
+    assert pair.service.store.commands.open(["U1"]) == []
+
+
+async def _killed(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+async def test_a_process_killed_before_its_commit_leaves_the_command_to_the_next(
+    pair: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await raise_alarm(pair)
+    command = Asking(pair.service.store, pair.replica.alarms, pair.service.clock)._command(
+        "U1", OnAlarm(LINK, Comment("anna", "seen")), "anna"
+    )
+    pair.service.store.commands.ask(command)
+    with monkeypatch.context() as killed:
+        killed.setattr(pair.service.alarms, "operate", _killed_in)
+        with pytest.raises(KeyboardInterrupt):
+            await pair.carrying_out.look()
+    assert pair.service.store.commands.look(command.id).state is CommandState.TAKEN
+
+    await pair.carrying_out.look()
+    assert changes(pair)[-1] == "commented"
+    assert pair.service.store.commands.look(command.id).state is CommandState.DONE
+
+
+def _killed_in(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+async def test_a_process_killed_after_its_commit_is_not_followed_by_a_second_time(
+    pair: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await raise_alarm(pair)
+    store = pair.service.store
+    command = Asking(store, pair.replica.alarms, pair.service.clock)._command(
+        "U1", OnAlarm(LINK, Comment("anna", "seen")), "anna"
+    )
+    store.commands.ask(command)
+    with monkeypatch.context() as killed:
+        killed.setattr(store.commands, "answer", _killed_in)
+        with pytest.raises(KeyboardInterrupt):
+            await pair.carrying_out.look()
+
+    await pair.carrying_out.look()
+    await pair.carrying_out.look()
+    assert changes(pair).count("commented") == 1
+    assert store.commands.look(command.id).state is CommandState.DONE
+
+
+async def test_an_answer_apart_from_the_event_would_be_noticed(
+    pair: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same with a planted bug: a command that is answered on its own comes twice."""
+    await raise_alarm(pair)
+    store = pair.service.store
+    command = Asking(store, pair.replica.alarms, pair.service.clock)._command(
+        "U1", OnAlarm(LINK, Comment("anna", "seen")), "anna"
+    )
+    store.commands.ask(command)
+    monkeypatch.setattr("service.store.alarms.answer_command", lambda *_: None)
+    with monkeypatch.context() as killed:
+        killed.setattr(store.commands, "answer", _killed_in)
+        with pytest.raises(KeyboardInterrupt):
+            await pair.carrying_out.look()
+
+    await pair.carrying_out.look()
+    assert changes(pair).count("commented") == 2
+
+
+async def test_a_replica_shows_what_it_was_answered_before_the_next_report(answered: Any) -> None:
+    await raise_alarm(answered)
+    await post(answered, "shelve", duration_s=60.0, reason="maintenance")
+    await answered.replica.feed.look()
+
+    shown = await answered.json(f"/api/v1/alarms/{LINK}")
+    assert shown["state"] == "shelved"
+
+
+async def test_a_store_that_comes_back_late_is_told_of(
+    pair: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await raise_alarm(pair)
+    monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)
+    monkeypatch.setattr(pair.service.recorder, "stored", _never)
+    monkeypatch.setattr(Asking, "_give_up", _after(pair))
+    looking = asyncio.create_task(pair.carrying_out.run())
+    answer = await post(pair, "acknowledge", occurrence=1)
+    looking.cancel()
+    await asyncio.wait([looking])
+
+    assert answer.status_code == 503
+    assert "not on the disk yet" in answer.json()["detail"]
+
+
+def _after(pair: Any) -> Any:
+    """Give up, but not before the command was taken."""
+    give_up = Asking._give_up
+
+    def late(self: Asking, command: Command, found: Answer) -> Answer:
+        while not pair.service.store.commands.open(["U1"])[0].taken_by:
+            pass
+        return give_up(self, command, found)
+
+    return late
+
+
+async def _never() -> None:
+    await asyncio.Event().wait()
+
+
+def test_every_command_is_read_as_it_was_written() -> None:
+    task = OnAlarm(LINK, Comment("anna", "é\n\"'"))
+
+    assert read(*written(task)) == task
