@@ -1,0 +1,116 @@
+"""The service is killed while it records all samples: what it called recorded is there."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_plant import LedgerPlant
+from harness.recordings_ledger import Recorded, promised, recorded
+from harness.service_rig import ServiceRig, until
+
+from service.continuous.joining import clear_unfinished, join, unjoined
+
+N_CYCLES, N_FEW, N_PLANTED = 50, 2, 4
+SYNC_S = 1.0
+RECORDING = f"""
+[recording]
+samples = "kept"
+length_min = 1
+sync_s = {SYNC_S}
+"""
+
+
+@pytest.fixture
+def plant(torture_seed: int) -> LedgerPlant:
+    """One unit with twelve channels at 600 Hz."""
+    return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
+
+
+@pytest.fixture
+def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
+    """A DAQ that goes on offering samples whatever happens to the service."""
+    with ledger_daq(plant, tmp_path) as running:
+        yield running
+
+
+def killed(
+    plant: LedgerPlant, daq: LedgerDaq, rig: ServiceRig, root: Path, n: int, seed: int
+) -> Recorded:
+    """Let the service live shortly, n times; every tenth time it ends in good order."""
+    rng, n_promised = np.random.default_rng(seed), 0
+    for number in range(n):
+        rig.start()
+        rig.wait_ready()
+        n_promised += until(lambda: promised(rig.url))
+        time.sleep(rng.uniform(0.0, 2.0 * SYNC_S))
+        if number % 10 == 9:
+            assert rig.stop() == 0
+        else:
+            rig.kill()
+    for folder in unjoined(root):  # what there was no time for at the end
+        join(folder)
+    clear_unfinished(root)
+    found = recorded(root, plant, 1, daq.offered())
+    if found.n_samples < n_promised:
+        found.wrong.append(f"lost: {n_promised} were promised, {found.n_samples} are there")
+    return found
+
+
+def write_plant(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Path:
+    return plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, extra=RECORDING)
+
+
+@pytest.mark.timeout(3600)
+def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
+    tmp_path: Path,
+    torture_seed: int,
+    is_whole: bool,
+    figure: Callable[[str], None],
+) -> None:
+    n_cycles = N_CYCLES if is_whole else N_FEW
+    with ServiceRig(write_plant(plant, daq, tmp_path)) as rig:
+        root = tmp_path / "data" / "recordings"
+        found = killed(plant, daq, rig, root, n_cycles, torture_seed)
+    figure(f"kill -9 during continuous recording, {n_cycles} cycles\n{found.table()}")
+
+    assert found.wrong == []
+    assert found.n_samples > 0
+    assert found.told["not_running"] > 0
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ("bug", "kind"),
+    [
+        pytest.param(bug, kind, marks=pytest.mark.planted(bug), id=bug)
+        for bug, kind in (
+            ("promised_before_it_is_synced", "lost"),
+            ("parts_thrown_away_at_start", "lost"),
+            ("hole_of_the_outage_not_told", "not accounted for"),
+            ("part_joined_twice", "duplicated"),
+            ("sample_altered", "altered"),
+        )
+    ],
+)
+def test_a_bug_in_recording_is_found_out(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
+    tmp_path: Path,
+    torture_seed: int,
+    is_whole: bool,
+    bug: str,
+    kind: str,
+) -> None:
+    if not is_whole:
+        pytest.skip("takes half a minute: part of make torture")
+    plant_file = write_plant(plant, daq, tmp_path)
+    with ServiceRig(plant_file, "harness.planted_recording", environment={"PLANTED": bug}) as rig:
+        root = tmp_path / "data" / "recordings"
+        found = killed(plant, daq, rig, root, N_PLANTED, torture_seed)
+
+    assert any(words.startswith(kind) for words in found.wrong), found.wrong
