@@ -11,17 +11,19 @@ from acquisition.source import SampleSource
 from core.blocks import SampleBlock
 from core.units import NS_PER_S
 from service.settings.plant import PlantFile
+from service.settings.store import StoreSettings
 
 REPLAYS = "replays"
 """Folder below the plant's data folder, apart from its live database."""
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """The part of a plant that is replayed: in a data folder of its own, for this computer."""
+    """The part of a plant that is replayed: in a file in a folder of its own, for this computer."""
     closed = {"host": "127.0.0.1", "socket": None, "tls": None}
     service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
-    return plant.model_copy(update={"unit": chosen, "service": service})
+    alone = {"unit": chosen, "service": service, "store": StoreSettings()}
+    return plant.model_copy(update=alone)
 
 
 def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:

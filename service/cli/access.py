@@ -15,7 +15,7 @@ from service.security.passwords import PasswordRefusedError
 from service.settings.plant import PlantFile
 from service.store.access_port import AccessRefusedError, AccessStore
 from service.store.port import StoreError
-from service.wiring.stores import database_path, open_store
+from service.wiring.stores import has_store, open_store, store_name
 
 NS_PER_S = 1_000_000_000
 
@@ -29,11 +29,11 @@ def access_of(plant: PlantFile, command: str, creates: bool = False) -> Iterator
     creates
         Whether the database is created if there is none.
     """
-    path = database_path(plant)
-    if not path.exists():  # its folder may be relative to another one than this
+    name = store_name(plant)
+    if not has_store(plant):  # its folder may be relative to another one than this
         if not creates:
-            fail(f"{command}: {path.absolute()}: there is no such database")
-        typer.echo(f"{path.absolute()}: a new database; is that where the service runs?", err=True)
+            fail(f"{command}: {name}: there is no such database")
+        typer.echo(f"{name}: a new database; is that where the service runs?", err=True)
     who = Acting(Source.COMMAND_LINE, made_by())
     try:
         with acting_as(who), closing(open_store(plant)) as store:

@@ -11,7 +11,8 @@ from service.backup.backing_up import back_up
 from service.backup.check import BackupError
 from service.backup.restoring import restore as put_back
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.wiring.stores import database_path
+from service.settings.plant import PlantFile
+from service.wiring.stores import database_path, store_name
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
@@ -26,7 +27,7 @@ def backup(
 
     Samples, evidence and the plant file are plain files that any tool can copy.
     """
-    database = database_path(read_plant_file(plant_file))
+    database = _file("backup", read_plant_file(plant_file))
     try:
         made = back_up(database, folder, SystemClock().now_ns(), keep)
     except BackupError as error:
@@ -51,7 +52,7 @@ def restore(
     json_output: Json = False,
 ) -> None:
     """Put a copy in the database's place, while padwatch is stopped; the old one is kept beside."""
-    database = database_path(read_plant_file(plant_file))
+    database = _file("restore", read_plant_file(plant_file))
     try:
         done = put_back(copy, database, SystemClock().now_ns())
     except BackupError as error:
@@ -60,3 +61,13 @@ def restore(
     found = {"database": str(done.database), "before": before, "schema": done.content.schema}
     said = f"{done.database}: restored" + (f"; what was there is {before}" if before else "")
     typer.echo(json.dumps(found) if json_output else said)
+
+
+def _file(command: str, plant: PlantFile) -> Path:
+    """The plant's database file; a database of a server is copied by the server's own tools."""
+    if plant.store.postgresql is not None:
+        fail(
+            f"padwatch {command}: {store_name(plant)} is copied with pg_dump or pg_basebackup and"
+            " put back with pg_restore: docs/how-to/postgresql.md shows how"
+        )
+    return database_path(plant)

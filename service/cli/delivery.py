@@ -19,7 +19,7 @@ from service.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.wiring.delivery import composer_of, receivers_of
-from service.wiring.stores import database_path, open_store
+from service.wiring.stores import has_store, open_store, store_name
 
 app = typer.Typer(no_args_is_help=True, help="Test receivers of alarms; send again.")
 
@@ -56,9 +56,8 @@ def send_again(
     """
     plant = read_plant_file(plant_file)
     names = [one.name for one in _chosen(plant, receiver)]
-    path = database_path(plant)
-    if not path.exists():
-        fail(f"padwatch delivery retry: {path.absolute()}: there is no such database")
+    if not has_store(plant):
+        fail(f"padwatch delivery retry: {store_name(plant)}: there is no such database")
     try:
         with closing(open_store(plant)) as store:
             now_ns = SystemClock().now_ns()

@@ -14,7 +14,7 @@ from service.films.rules import watched_estimator
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
 from service.store.port import StoreError
-from service.wiring.stores import database_path, open_store
+from service.wiring.stores import has_store, open_store, store_name
 
 app = typer.Typer(no_args_is_help=True, help="Readings of the films, out of the store.")
 
@@ -44,14 +44,13 @@ def export(
         end_ns = time_ns_of(end) if end else SystemClock().now_ns()
     except ValueError as error:
         fail(f"padwatch readings export: {error}", code=2)
-    path = database_path(plant)
-    if not path.exists():
-        fail(f"padwatch readings export: {path.absolute()}: there is no database")
+    if not has_store(plant):
+        fail(f"padwatch readings export: {store_name(plant)}: there is no database")
     try:
         with closing(open_store(plant)) as store, ReadingsFile(out) as file:
             n_readings = sum(_export(store.films, plant, file, start_ns, end_ns))
             if not n_readings:
-                raise StoreError(f"{path}: has no readings of films in this time")
+                raise StoreError(f"{store_name(plant)}: has no readings of films in this time")
     except StoreError as error:
         fail(f"padwatch readings export: {error}")
     except OSError as error:

@@ -26,7 +26,7 @@ from service.reference_setting import (
 from service.settings.plant import PlantFile
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import Store, StoreError
-from service.wiring.stores import database_path, open_store
+from service.wiring.stores import has_store, open_store, store_name
 
 app = typer.Typer(
     no_args_is_help=True, help="Set or list references: the probe gaps with the shaft centred."
@@ -111,9 +111,10 @@ def _all_references(plant: PlantFile) -> Iterator[BearingReferences]:
 
 def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
     """Store a reference and return its bearing's history."""
-    path = database_path(plant)
-    if not path.exists():  # its folder may be relative to another one than this
-        typer.echo(f"{path.absolute()}: a new database; is that where the service runs?", err=True)
+    if not has_store(plant):  # its folder may be relative to another one than this
+        typer.echo(
+            f"{store_name(plant)}: a new database; is that where the service runs?", err=True
+        )
     who = Acting(Source.COMMAND_LINE, person())
     with acting_as(who), closing(open_store(plant)) as store:
         store.add_reference(reference)
@@ -123,7 +124,7 @@ def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
 @contextmanager
 def _existing_store(plant: PlantFile) -> Iterator[Store | None]:
     """The plant's database; looking at one that is not there must not create it."""
-    if not database_path(plant).exists():
+    if not has_store(plant):
         yield None
         return
     with closing(open_store(plant)) as store:

@@ -20,6 +20,10 @@ class MisfitError(ValueError):
         self.at = at
 
 
+class SecretMisfitError(MisfitError):
+    """A value that does not fit and may hold a secret: it is not shown."""
+
+
 Identifier = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
 """Letters, digits, dot, dash and underscore; at most 32; fit for a URL."""
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from service.settings.base import MisfitError
+from service.settings.base import MisfitError, SecretMisfitError
 from service.settings.positions import Location
 from service.settings.schema import description, known_keys
 
@@ -39,6 +39,8 @@ def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -
     if error["type"] == "extra_forbidden":
         return f"{shown}: unknown key; known here: {', '.join(known_keys(location[:-1]))}"
     if error["type"] == "value_error":
+        if isinstance(error["ctx"]["error"], SecretMisfitError):
+            return f"{key}: {error['ctx']['error']}"
         return f"{shown if found else f'{key} (by default)'}: {error['ctx']['error']}"
     if not found:
         problem = f"{key} is missing"

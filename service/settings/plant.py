@@ -18,6 +18,7 @@ from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.recording import RecordingSettings
 from service.settings.space import SpaceSettings
 from service.settings.spectra import SpectraSettings
+from service.settings.store import StoreSettings
 from service.settings.stream import StreamSettings
 from service.settings.units import UnitSettings
 
@@ -207,6 +208,9 @@ class PlantFile(Settings):
 
     spectra: SpectraSettings = SpectraSettings()
     """Spectra that are kept over time."""
+
+    store: StoreSettings = StoreSettings()
+    """Database of results."""
 
     space: SpaceSettings = SpaceSettings()
     """How little room on the disk is an alarm."""

@@ -1,0 +1,55 @@
+"""A server of a module's own, which its tests may stop; and ways that are cut."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from harness.cutting_proxy import CuttingProxy
+from harness.places import PostgresPlace
+from harness.postgres_server import PostgresServer
+
+from service.store.postgres import PostgresStore
+from service.store.postgres.address import PostgresAddress
+
+
+@pytest.fixture(scope="module")
+def own_server(postgres_server: PostgresServer) -> Iterator[PostgresServer]:  # noqa: ARG001
+    """A server that may be stopped; there is one only where there is the shared one."""
+    with PostgresServer(wal_writer_delay="10s") as server:
+        yield server
+
+
+@pytest.fixture
+def own_place(own_server: PostgresServer, tmp_path: Path) -> Iterator[PostgresPlace]:
+    """An empty database of the server that may be stopped."""
+    name = f"padwatch_{tmp_path.name.lower()[-20:]}"
+    own_server.create(name)
+    yield PostgresPlace(own_server, name, tmp_path / "data")
+    own_server.drop(name)
+
+
+@pytest.fixture
+def password_file(tmp_path: Path) -> Path:
+    """A file with the password of the server's administrator."""
+    path = tmp_path / "password"
+    path.touch(mode=0o600)
+    path.write_text(PostgresServer.PASSWORD + "\n")
+    return path
+
+
+@pytest.fixture
+def proxy(postgres_place: PostgresPlace) -> Iterator[CuttingProxy]:
+    """A way to the shared server that can be cut."""
+    with CuttingProxy(postgres_place.server.port) as opened:
+        yield opened
+
+
+@pytest.fixture
+def cut_store(
+    postgres_place: PostgresPlace, proxy: CuttingProxy, password_file: Path
+) -> Iterator[PostgresStore]:
+    """A store over that way."""
+    conninfo = f"host=127.0.0.1 port={proxy.port} user=postgres dbname={postgres_place.database}"
+    store = PostgresStore(PostgresAddress(conninfo, password_file), postgres_place.head)
+    yield store
+    store.close()

@@ -1,0 +1,224 @@
+"""Databases and servers that cannot be used: one sentence, and what to do."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import psycopg
+import pytest
+from harness.places import PostgresPlace
+from harness.postgres_server import PostgresServer
+
+from core.assessment import Assessment
+from service.origin import Origin
+from service.store import schema
+from service.store.port import StoreError
+from service.store.postgres import PostgresStore, connection
+from service.store.postgres.address import PostgresAddress
+
+
+def refused(address: PostgresAddress, folder: Path) -> str:
+    """Try to open a store; what is said."""
+    with pytest.raises(StoreError) as refusal:
+        PostgresStore(address, folder / "head.json")
+    said = str(refusal.value)
+    assert "\n" not in said
+    assert PostgresServer.PASSWORD not in said
+    return said
+
+
+def test_a_server_that_does_not_run_is_named(tmp_path: Path) -> None:
+    said = refused(PostgresAddress(f"host={tmp_path} dbname=padwatch user=p"), tmp_path)
+
+    assert said.startswith(f"PostgreSQL database padwatch at {tmp_path}: ")
+    assert said.endswith("see whether PostgreSQL runs and can be reached; it is tried again")
+
+
+def test_a_database_or_a_role_that_is_not_there_is_said(
+    postgres_server: PostgresServer, tmp_path: Path
+) -> None:
+    there = postgres_server.conninfo("nothing_like_it")
+
+    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there), tmp_path)
+    there = there.replace("user=postgres", "user=nobody_here")
+    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("password", "mode", "complaint"),
+    [
+        (b"wrong", 0o600, "password authentication failed"),
+        (b"", 0o600, "password_file"),
+        (b"x", 0o640, "can be read by others: chmod 600 it"),
+    ],
+)
+def test_a_wrong_password_is_refused_and_not_shown(
+    postgres_place: PostgresPlace, tmp_path: Path, password: bytes, mode: int, complaint: str
+) -> None:
+    path = tmp_path / "password"
+    path.write_bytes(password)
+    path.chmod(mode)
+    there = postgres_place.server.conninfo(postgres_place.database, by="tcp")
+
+    assert complaint in refused(PostgresAddress(there, path), tmp_path)
+    assert "No such file" in refused(PostgresAddress(there, tmp_path / "none"), tmp_path)
+
+
+def test_the_right_password_opens(
+    postgres_place: PostgresPlace, password_file: Path, tmp_path: Path
+) -> None:
+    there = postgres_place.server.conninfo(postgres_place.database, by="tcp")
+
+    PostgresStore(PostgresAddress(there, password_file), tmp_path / "head.json").close()
+
+
+def test_a_database_of_another_program_is_refused_and_left_as_it_is(
+    own_place: PostgresPlace, tmp_path: Path
+) -> None:
+    own_place.execute("CREATE TABLE precious (a int)")
+
+    said = refused(own_place.address, tmp_path)
+
+    assert "is not a padwatch database; create one for padwatch alone" in said
+    tables = "SELECT table_name FROM information_schema.tables WHERE table_schema = 'public'"
+    assert own_place.execute(tables) == [("precious",)]
+
+
+def test_a_database_of_a_newer_padwatch_is_refused(
+    postgres_place: PostgresPlace, tmp_path: Path
+) -> None:
+    newest = len(schema.MIGRATIONS)
+    postgres_place.execute("UPDATE padwatch SET schema_number = ?", (newest + 1,))
+
+    said = refused(postgres_place.address, tmp_path)
+
+    assert f"has schema {newest + 1}, this padwatch knows up to {newest}; run the padwatch" in said
+
+
+def test_live_and_replayed_results_never_share_a_database(
+    postgres_place: PostgresPlace,
+) -> None:
+    with pytest.raises(StoreError, match="holds live results and is not opened for replay ones"):
+        postgres_place.open(Origin.REPLAY)
+
+
+def test_a_migration_that_fails_leaves_the_database_as_it_was(
+    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    newest = len(schema.MIGRATIONS)
+    more = (*schema.MIGRATIONS, "CREATE TABLE half (a TEXT) STRICT; CREATE TABLE half (a TEXT);")
+    with monkeypatch.context() as upgrade:
+        upgrade.setattr(schema, "MIGRATIONS", more)
+        assert 'relation "half" already exists' in refused(postgres_place.address, tmp_path)
+
+    assert postgres_place.execute("SELECT schema_number FROM padwatch") == [(newest,)]
+    assert postgres_place.execute("SELECT to_regclass('half')") == [(None,)]
+    postgres_place.open().close()
+
+
+def test_a_server_that_loses_results_at_a_power_cut_is_refused(tmp_path: Path) -> None:
+    with PostgresServer(fsync="off") as careless:
+        careless.create("padwatch")
+        address = PostgresAddress(careless.conninfo("padwatch"))
+        said = refused(address, tmp_path)
+
+    assert "would lose results at a power cut: set fsync = on" in said
+
+
+def test_a_server_that_is_too_old_is_refused(
+    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(connection, "OLDEST_VERSION", 990_000)  # as if time had gone on
+
+    assert "which is too old: padwatch needs 99 or newer" in refused(
+        postgres_place.address, tmp_path
+    )
+
+
+def test_a_database_in_another_encoding_is_refused(
+    own_server: PostgresServer, tmp_path: Path
+) -> None:
+    own_server.execute("CREATE DATABASE latin TEMPLATE template0 ENCODING 'LATIN1' LOCALE 'C'")
+
+    said = refused(PostgresAddress(own_server.conninfo("latin")), tmp_path)
+
+    assert "has the encoding LATIN1: create it with ENCODING 'UTF8'" in said
+
+
+def test_a_role_that_may_not_write_is_refused(
+    postgres_place: PostgresPlace, tmp_path: Path
+) -> None:
+    there = postgres_place.address.conninfo.replace("user=postgres", "user=looker")
+    postgres_place.execute("DROP ROLE IF EXISTS looker")
+    postgres_place.execute("CREATE ROLE looker LOGIN")
+
+    said = refused(PostgresAddress(there), tmp_path)
+
+    assert "permission denied" in said
+    assert "give it the rights" in said
+
+
+def test_a_standby_is_refused(own_place: PostgresPlace, tmp_path: Path) -> None:
+    server = own_place.server
+    own_place.open().close()
+    server.stop()
+    (server.data / "standby.signal").touch()
+    try:
+        server.start()
+        said = refused(own_place.address, tmp_path)
+    finally:
+        server.stop()
+        (server.data / "standby.signal").unlink()
+        server.start()
+
+    assert "is a standby, which only reads: name the primary" in said
+
+
+def test_a_reader_can_write_nothing(postgres_place: PostgresPlace) -> None:
+    store = postgres_place.open()
+    try:
+        with (
+            pytest.raises(StoreError, match="read-only transaction"),
+            store.database.reading() as reader,
+        ):
+            reader.execute("DELETE FROM gap")
+    finally:
+        store.close()
+
+
+def test_a_query_that_takes_too_long_ends_with_a_sentence(
+    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "service.store.postgres.readers.SETTINGS", "SET statement_timeout = '20ms';"
+    )
+    store = postgres_place.open()
+    try:
+        with (
+            pytest.raises(StoreError, match="it took too long: the database is too slow"),
+            store.database.reading() as reader,
+        ):
+            reader.execute("SELECT pg_sleep(10)")
+    finally:
+        store.close()
+
+
+def test_a_full_disk_is_named_as_such(
+    postgres_place: PostgresPlace, assessment: Callable[..., Assessment]
+) -> None:
+    postgres_place.execute(
+        "CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
+        " RAISE EXCEPTION 'could not extend file' USING ERRCODE = 'disk_full'; END $$"
+    )
+    postgres_place.execute(
+        "CREATE TRIGGER full_disk BEFORE INSERT ON assessment"
+        " FOR EACH ROW EXECUTE FUNCTION full_disk()"
+    )
+    store = postgres_place.open()
+    try:
+        with pytest.raises(StoreError, match="the disk of the database is full: make room there"):
+            store.append([assessment()], [])
+        postgres_place.unguard("full_disk", "assessment")
+        store.append([assessment()], [])
+    finally:
+        store.close()
+    assert psycopg.errors.DiskFull.sqlstate == "53100"
