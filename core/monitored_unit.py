@@ -111,12 +111,17 @@ class MonitoredUnit(ABC):
             raise ValueError(f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
 
     def _write_to_ring(self, block: SampleBlock) -> None:
-        epoch = self._ring.epoch
-        gap = self._ring.write(block)
+        """Take a block in; all that is missing before it is a gap, whoever has refused it."""
+        epoch, stop_index = self._ring.epoch, self._ring.stop_index
+        self._ring.write(block)
         if epoch is None:
             self._gaps += outage(self._reach, block) if self._reach else []
-        elif epoch != block.epoch and self._reach is not None:
-            lost = restart(self._reach, block)
+        elif epoch != block.epoch:
+            lost = restart(self._reach, block) if self._reach else None
             self._gaps += [lost] if lost else []
-        self._gaps += [gap] if gap else []
-        self._reach = Reach(block.epoch, self._ring.stop_index, block.stop_ns)
+            stop_index = 0
+        if epoch is not None and block.first_index > stop_index:
+            n_missing = block.first_index - stop_index
+            self._gaps.append(Gap(block.epoch, stop_index, n_missing, block.start_ns))
+        if block.stop_index == self._ring.stop_index:
+            self._reach = Reach(block.epoch, block.stop_index, block.stop_ns)

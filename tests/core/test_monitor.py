@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.account import Gap
 from core.arrays import FloatArray
 from core.assessment import Assessment
-from core.blocks import SampleBlock
+from core.blocks import Rejection, SampleBlock
 from core.machine import Unit
 from core.monitor import UnitMonitor
 from core.quality import Level, Reason, bad
@@ -240,3 +241,17 @@ def test_few_or_lost_segments_make_a_result_uncertain(unit: Unit, blocks) -> Non
     results = watch(monitor, list(blocks(machine_signals(60.0))))
     reasons = [a.readings["order1_k_eff_xx_n_per_m"].quality.reason for a in results]
     assert reasons == [Reason.FEW_SEGMENTS] * 3 + [Reason.OK]
+
+
+def test_what_was_refused_is_missing_too_and_is_recorded_as_a_gap(
+    monitor: UnitMonitor, blocks
+) -> None:
+    first, *others = list(blocks(machine_signals(14.0)))[:4]
+    late = replace(others[-1], rejected=(Rejection("torn", 7),))
+    for block in (first, late):
+        monitor.ingest(block)
+
+    n_missing = late.first_index - first.stop_index
+    assert monitor.drain_gaps() == [Gap(late.epoch, first.stop_index, n_missing, late.start_ns)]
+    assert monitor.account.n_gap == n_missing - 7
+    assert monitor.account.rejected == {"torn": 7}
