@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
+from core.alarms.alarm import PLANT
 from service.bus import Bus
 from service.delivery.facts import Around
 from service.heartbeats import Heartbeats
@@ -16,6 +17,7 @@ from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
 from service.roles.analysis import Analysis, analysis_on
 from service.roles.ground import Ground, live_view
+from service.roles.reporting import reporting_loops
 from service.roles.serving import Serving, context_of, server_for
 from service.roles.stopping import stop_on_signals
 from service.roles.watched_unit import WatchedUnit
@@ -115,6 +117,17 @@ async def _run(
         await audit.end()
 
 
+def _reporting(analysis: Analysis, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
+    """Let replicas know, where there may be some: over a database of a server."""
+    ground = analysis.ground
+    if ground.plant.store.postgresql is None or ground.origin is not Origin.LIVE:
+        return []
+    held = [*(unit.id for unit in ground.plant.unit), PLANT]
+    loops = reporting_loops(analysis, lambda: held)
+    beats = ground.beats
+    return [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
+
+
 def _runner(units: Mapping[str, WatchedUnit], analysis: Analysis, bus: Bus) -> Runner:
     ground = analysis.ground
     return Runner(
@@ -136,7 +149,7 @@ async def _perform(
     stopped = stop_on_signals()
     async with asyncio.TaskGroup() as tasks:
         running = tasks.create_task(runner.run(), name="run")
-        beside = analysis.start(tasks)
+        beside = [*analysis.start(tasks), *_reporting(analysis, tasks)]
         server = serving.start(tasks)
         announcing = tasks.create_task(serving.tell(supervision), name="announce")
         supervising = tasks.create_task(supervision.run(), name="supervise")

@@ -1,6 +1,7 @@
 """The store as the rest of the service sees it, and what it hands out."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -15,6 +16,7 @@ from core.quality import Level, Reading
 from service.store.access_port import AccessStore
 from service.store.audit_port import AuditStore
 from service.store.commands_port import Commands
+from service.store.database import Hold
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity
@@ -269,6 +271,10 @@ class Store(Protocol):
 
     def alarm_events(self, query: AlarmQuery) -> Sequence[StoredEvent]:
         """Read events of alarms, newest first."""
+        ...
+
+    def hold(self, name: str) -> AbstractContextManager[Hold]:
+        """Take a name among all processes that use the database; see `Database.hold`."""
         ...
 
     def close(self) -> None:

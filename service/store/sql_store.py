@@ -1,6 +1,7 @@
 """The store in SQL, over one of two databases."""
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from core.account import Gap
@@ -17,7 +18,7 @@ from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import reference_deed
 from service.store.codec import Layout, columns_of, remember_layout
 from service.store.commands import StoredCommands
-from service.store.database import Connection, Database
+from service.store.database import Connection, Database, Hold
 from service.store.film_readings import insert_film_news
 from service.store.films import SqlFilms
 from service.store.gap_reference import GapReference
@@ -104,6 +105,10 @@ class SqlStore:
         self._layout = Layout.of(columns_of(CATALOGUE))
         with database.writing() as writer:
             self._layout_id = remember_layout(writer, self._layout)
+
+    def hold(self, name: str) -> AbstractContextManager[Hold]:
+        """Take a name among all processes that use the database; see `Database.hold`."""
+        return self.database.hold(name)
 
     def close(self) -> None:
         """Release the database; closing twice is fine."""
