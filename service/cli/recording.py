@@ -12,6 +12,7 @@ from acquisition.recording.export.writing import ExportFormat, export_recording
 from acquisition.recording.summary import summary_of
 from service.cli.made_by import made_by
 from service.cli.plant_file import fail, read_plant_file
+from service.cli.recording_check import check
 from service.cli.recording_listing import json_of, lines_of
 from service.cli.units import UnitOption, one_unit
 from service.settings.import_mapping import ImportMapping
@@ -22,6 +23,8 @@ from service.wiring.recordings import recording_of
 app = typer.Typer(
     no_args_is_help=True, help="Look into recordings, check them, export and import them."
 )
+app.command()(check)
+
 Folder = Annotated[Path, typer.Argument(help="Folder of the recording.", show_default=False)]
 JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 

@@ -130,7 +130,8 @@ class CaptureSettings(Settings):
     """Longest recording, s: alarms that come while one is being written prolong it up to this."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=100_000.0)] = 10.0
-    """Space of all of them together, GB (10^9 bytes); beyond it the oldest are removed."""
+    """Space of all of them together, GB (10^9 bytes); beyond it the oldest are removed, those last
+    that evidence of an alarm refers to."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

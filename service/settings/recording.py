@@ -34,7 +34,7 @@ class RecordingSettings(Settings):
     channels at 600 Hz take about half a GB a day."""
 
     max_days: Annotated[float, Field(gt=0.0, le=36_500.0)] = 30.0
-    """Older ones are removed, days."""
+    """Those are removed that are older than the newest one by more than this, days."""
 
     def require_units(self, units: Sequence[str]) -> None:
         """Refuse a unit that the plant does not have.

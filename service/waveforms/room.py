@@ -18,7 +18,7 @@ class RoomLimits:
     continuous_bytes, capture_bytes
         Of all of a kind together.
     continuous_days
-        Older continuous recordings go.
+        Continuous recordings go that are older than the newest by more than this.
     """
 
     continuous_bytes: int = 100_000_000_000
@@ -66,7 +66,9 @@ def _continuous(
     by_age: Sequence[WaveformFile], limits: RoomLimits, now_ns: int, short: int
 ) -> Iterator[tuple[WaveformFile, str]]:
     over = sum(file.n_bytes for file in by_age) - limits.continuous_bytes
-    since_ns = now_ns - ns_from_s(limits.continuous_days * S_PER_DAY)
+    # a clock that has jumped ahead makes nothing old: then the newest recording is
+    newest_ns = max((_stop_ns(file) for file in by_age), default=now_ns)
+    since_ns = min(now_ns, newest_ns) - ns_from_s(limits.continuous_days * S_PER_DAY)
     for file in by_age:
         if over > 0:
             why = "all together are over max_gb"

@@ -1,0 +1,78 @@
+"""`padwatch recording check`: all recordings of a plant, held against their index."""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acquisition.clock import SystemClock
+from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.settings.plant import PlantFile
+from service.store.port import StoreError
+from service.store.waveform_port import WaveformFile
+from service.waveforms.check import Found, RecordingCheck, Verdict
+from service.waveforms.place import place_of
+from service.wiring.stores import has_store, open_store
+from service.wiring.waveforms import custody_of
+
+WRONG = (Found.DAMAGED, Found.MISSING)
+
+
+def check(
+    plant_file: PlantPath,
+    json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Read all recordings of a plant, and compare them with the index. Changes nothing.
+
+    The service may go on running. Exit code 1 if a recording is damaged or missing.
+    """
+    plant = read_plant_file(plant_file)
+    try:
+        verdicts = _verdicts(plant)
+    except (OSError, StoreError) as error:
+        fail(f"padwatch recording check: {error}")
+    counts = Counter(verdict.found for verdict in verdicts)
+    others = [verdict for verdict in verdicts if verdict.found is not Found.SOUND]
+    if json_output:
+        typer.echo(json.dumps(_document(counts, others), indent=1))
+    else:
+        for verdict in others:
+            words = verdict.found.value.replace("_", " ")
+            typer.echo(f"{verdict.kind.value} {verdict.name}: {words}: {verdict.reason}")
+        typer.echo(", ".join(f"{counts[f]} {f.value.replace('_', ' ')}" for f in Found))
+    if any(verdict.found in WRONG for verdict in verdicts):
+        raise typer.Exit(1)
+
+
+def _verdicts(plant: PlantFile) -> list[Verdict]:
+    roots, files = custody_of(plant).roots, _index(plant)
+    checking = RecordingCheck(roots, files, SystemClock().now_ns())
+    found = []
+    hidden = not sys.stderr.isatty()
+    with typer.progressbar(
+        length=checking.n_to_read, label="Checking", file=sys.stderr, hidden=hidden
+    ) as bar:
+        for verdict in checking.verdicts():
+            found.append(verdict)
+            bar.update(1)
+    return found
+
+
+def _index(plant: PlantFile) -> Sequence[WaveformFile]:
+    if not has_store(plant):
+        return []
+    with closing(open_store(plant)) as store:
+        return store.waveforms.files(place_of(Path(plant.service.data_folder)))
+
+
+def _document(counts: Counter[Found], others: Sequence[Verdict]) -> dict[str, object]:
+    listed = [
+        {"kind": v.kind.value, "name": v.name, "found": v.found.value, "reason": v.reason}
+        for v in others
+    ]
+    return {found.value: counts[found] for found in Found} | {"recordings": listed}
