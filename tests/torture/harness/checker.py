@@ -129,7 +129,7 @@ def _check_unit(
     _check_shown(found, unit, rows, index, shown)
     _check_values(found, unit, rows, replay, runs)
     gaps = sorted(store.gaps(unit, *ALWAYS), key=lambda gap: gap.first_index)
-    _check_gaps(found, unit, gaps, runs, n_offered)
+    _check_gaps(found, unit, gaps, runs, n_offered, plant)
 
 
 def _check_shown(
@@ -171,11 +171,16 @@ def _check_values(
 
 
 def _check_gaps(
-    found: Findings, unit: str, gaps: Sequence[Gap], runs: Sequence[Run], n_offered: int
+    found: Findings,
+    unit: str,
+    gaps: Sequence[Gap],
+    runs: Sequence[Run],
+    n_offered: int,
+    plant: LedgerPlant,
 ) -> None:
     """Between two runs everything is in a gap, but what was taken and led to no result.
 
-    Within one life, samples that were taken before a gap may not suffice for another result.
+    Samples that were taken between two gaps, or before one, may not suffice for a result.
     """
     found.n_in_results += sum(run.stop - run.start for run in runs)
     found.n_in_gaps += sum(gap.n_samples for gap in gaps)
@@ -188,10 +193,15 @@ def _check_gaps(
             found.gaps.append(f"{unit}: {gap} is of samples that were never offered")
         if any(run.start < stop and gap.first_index < run.stop for run in runs):
             found.gaps.append(f"{unit}: {gap} is of samples that led to results")
+    ends = {gap.first_index + gap.n_samples for gap in gaps}
+    begins = {gap.first_index for gap in gaps}
     for run, after in pairwise(runs):
         left = uncovered(gaps, run.stop, after.start)
-        found.n_without_result += sum(b - a for a, b in left)
-        # what was taken since the last result is lost with the process, and kept without a stop
-        allowed = run.life == after.life and [a for a, _ in left] == [run.stop]
-        if left and (not allowed or left[0][1] == after.start):
-            found.gaps.append(f"{unit}: nothing tells of {left} between {run} and {after}")
+        found.n_without_result += sum(stop - start for start, stop in left)
+        # what was taken since the last result is lost with a process, and kept without a stop
+        allowed = {*ends, *([run.stop] if run.life == after.life else [])}
+        for start, stop in left:
+            least = plant.hop_samples if start == run.stop else plant.segment_samples
+            if start not in allowed or stop not in begins or stop - start >= least:
+                told = f"{start} to {stop} between {run} and {after}"
+                found.gaps.append(f"{unit}: nothing tells of {told}")
