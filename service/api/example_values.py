@@ -76,6 +76,7 @@ CHOSEN = {
     ("TrendModel", "time"): [1_795_248_192.4],
     ("TrendModel", "next_cursor"): None,
     ("TrendModel", "simulated_until"): None,
+    ("TrendModel", "coarse_until"): None,
     ("TrendModel", "groups"): None,
     ("TrendSeriesModel", "min"): [0.6893e9],
     ("TrendSeriesModel", "max"): [0.6931e9],

@@ -87,6 +87,10 @@ class TrendModel(ApiModel):
     """Until when readings are simulated, not measured on the machine; null where all in this range
     are measured."""
 
+    coarse_until: Time | None
+    """Up to when single readings were deleted, so that only buckets tell of that time and pages of
+    single readings leave it out; null where all in this range are kept."""
+
     next_cursor: Annotated[str | None, Field(examples=["1795248192400000000"])]
     """With ``cursor``: what to give for the next page; null if this was the last."""
 

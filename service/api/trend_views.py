@@ -32,6 +32,7 @@ def trend_model(
         end=rfc3339(query.end_ns),
         bucket_s=bucket_s(trend),
         simulated_until=simulated_until(query, past_end_ns),
+        coarse_until=None if trend.coarse_until_ns is None else rfc3339(trend.coarse_until_ns),
         next_cursor=None if trend.next_ns is None else str(trend.next_ns),
         time=times_s(trend),
         series=_series_models(trend),

@@ -22,6 +22,7 @@ from service.load.watch import LoadWatch
 from service.origin import Origin
 from service.recorder import Recorder
 from service.references import ReferencesInForce
+from service.retaining import Retaining
 from service.roles.analysing import Analyser
 from service.roles.ground import Ground
 from service.rolling import Rolling
@@ -30,6 +31,7 @@ from service.waveforms.keeper import WaveformKeeper
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of
 from service.wiring.evidence import evidence_of, watch
+from service.wiring.retention import retention_limits
 from service.wiring.sources import vector_rows
 from service.wiring.space import space_watch
 from service.wiring.tapes import tape_of
@@ -52,6 +54,7 @@ class Analysis:
     evidence: EvidenceKeeper
     references: ReferencesInForce
     rolling: Rolling
+    retaining: Retaining
     space: SpaceWatch
     load: LoadWatch
 
@@ -69,7 +72,7 @@ class Analysis:
             "load": self.load.run,
         }
         if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
-            loops["learn"] = self.films.run
+            loops |= {"learn": self.films.run, "retain": self.retaining.run}
             loops["recordings"] = self.recordings.run
         begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
         return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
@@ -140,6 +143,7 @@ async def analysis_on(
         evidence=evidence,
         references=references,
         rolling=Rolling(store.rollups, clock),
+        retaining=Retaining(store.retention, retention_limits(plant.retention), clock),
         space=space,
         load=load,
     )

@@ -16,6 +16,7 @@ from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.http_limits import HostName, HttpLimitSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.recording import RecordingSettings
+from service.settings.retention import RetentionSettings
 from service.settings.space import SpaceSettings
 from service.settings.spectra import SpectraSettings
 from service.settings.store import StoreSettings
@@ -214,6 +215,9 @@ class PlantFile(Settings):
 
     space: SpaceSettings = SpaceSettings()
     """How little room on the disk is an alarm."""
+
+    retention: RetentionSettings = RetentionSettings()
+    """For how long results are kept how finely."""
 
     stream: StreamSettings | None = None
     """Where `padwatch acquire` hands blocks to `padwatch analyse`; `padwatch run` needs none."""

@@ -4,7 +4,6 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Lock
 
 from acquisition.clock import SystemClock
 from service.origin import Origin
@@ -15,7 +14,9 @@ from service.store.port import StoreError
 from service.store.sqlite.file_length import why_cut
 from service.store.sqlite.holding import FileHold, held
 from service.store.sqlite.migrating import migrate
-from service.store.sqlite.readers import BUSY_TIMEOUT_S, Readers
+from service.store.sqlite.readers import Readers
+from service.store.sqlite.trouble import told
+from service.store.sqlite.writer import Writer, opened
 
 PAGE_BYTES = 8192
 """In pages of half that size, a result of all quantities would need a page of its own."""
@@ -51,35 +52,32 @@ class SqliteDatabase:
 
     def __init__(self, path: Path, origin: Origin) -> None:
         self._path = path
-        self.lock = Lock()
         self._readers = Readers(path)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
             if (cut := why_cut(path)) is not None:
                 raise StoreError(f"{path}: {cut}")
-            self.writer = sqlite3.connect(
-                path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
-            )
+            connection = opened(path)
             try:
-                self.had_trail = self._prepare(origin)
+                self.had_trail = self._prepare(connection, origin)
             except BaseException:
-                self.writer.close()
+                connection.close()
                 raise
 
     def close(self) -> None:
         """Release the file; closing twice is fine."""
         self._readers.close()  # first: the last to close brings the journal into the file
-        with self.lock:
+        with self.writer.lock:
             self.writer.close()
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
         """Open a transaction of the one writer; durable, and marked as such, when left."""
-        with self.lock, self._renamed_errors():
-            with self._transaction():
-                yield self.writer
-                self.marks.count(self.writer)
+        with self.writer.lock, self._renamed_errors():
+            with self.writer.transaction() as writer:
+                yield writer
+                self.marks.count(writer)
             self.marks.settle()
 
     @contextmanager
@@ -93,6 +91,11 @@ class SqliteDatabase:
             yield reader
             reader.text_factory = str
 
+    def give_back(self) -> bool:
+        """Give some free room back to the disk; whether there is more."""
+        with self.writer.lock, self._renamed_errors():
+            return self.writer.give_back()
+
     def ever_had(self, connection: Connection, table: str) -> bool:
         """Whether a table that numbers its rows ever had one."""
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
@@ -101,27 +104,16 @@ class SqliteDatabase:
         """Take a name, by the lock of a file beside the database."""
         return held(self._path, name)
 
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        self.writer.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-            self.writer.execute("COMMIT")
-        finally:
-            # a full disk has rolled back already; a refused commit leaves the transaction open
-            if self.writer.in_transaction:
-                self.writer.execute("ROLLBACK")
-
-    def _prepare(self, origin: Origin) -> bool:
+    def _prepare(self, connection: sqlite3.Connection, origin: Origin) -> bool:
         """Bring the file up to date; whether it had an audit trail before."""
         said = self.marks.said()
-        self.writer.execute(f"PRAGMA page_size = {PAGE_BYTES}")  # of a file yet to be written
-        had_trail = self.writer.execute(HAS_TRAIL).fetchone() is not None
-        migrate(self.writer, str(self._path), origin)  # first: what is not ours stays as it is
-        for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
-            self.writer.execute(f"PRAGMA {setting}")
-        with self._transaction():
-            self.marks.open(self.writer, said)
+        for setting in (f"page_size = {PAGE_BYTES}", "auto_vacuum = INCREMENTAL"):
+            connection.execute(f"PRAGMA {setting}")  # of a file yet to be written
+        had_trail = connection.execute(HAS_TRAIL).fetchone() is not None
+        migrate(connection, str(self._path), origin)  # first: what is not ours stays as it is
+        self.writer = Writer(self._path, connection, self.marks)
+        with self.writer.transaction():
+            self.marks.open(connection, said)
         return had_trail
 
     @contextmanager
@@ -129,4 +121,4 @@ class SqliteDatabase:
         try:
             yield
         except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"{self._path}: {error}") from error
+            raise StoreError(told(self._path, error)) from error

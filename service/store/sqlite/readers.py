@@ -1,11 +1,12 @@
 """Connections that only read: opening one costs more than most of what is read with it."""
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
+from acquisition.clock import SystemClock
 from service.asker import ASKER
 
 BUSY_TIMEOUT_S = 5.0
@@ -14,12 +15,22 @@ LOOK_AFTER_STEPS = 20_000
 """Steps of the database's machine, some tens of microseconds, after which a read looks whether
 anybody still waits for it."""
 
+CLOCK = SystemClock()
+LONGEST_S = 120.0
+"""A read that takes longer is ended: while it lasts, the log beside the file only grows."""
+
 
 class Readers:
-    """Read-only connections to one database; each is used by one thread at a time."""
+    """Read-only connections to one database; each is used by one thread at a time.
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    Parameters
+    ----------
+    now_s
+        Clock that only goes forward.
+    """
+
+    def __init__(self, path: Path, now_s: Callable[[], float] = CLOCK.monotonic_s) -> None:
+        self._path, self._now_s = path, now_s
         self._file: tuple[int, int] | None = None
         self._uri = f"{path.absolute().as_uri()}?mode=ro"
         self._lock = Lock()
@@ -31,9 +42,7 @@ class Readers:
         """Borrow a connection; one with which something went wrong is not used again."""
         reader = self._taken()
         try:
-            asker = ASKER.get()
-            if asker is not None:
-                reader.set_progress_handler(lambda: asker.has_gone, LOOK_AFTER_STEPS)
+            reader.set_progress_handler(self._is_in_vain(), LOOK_AFTER_STEPS)
             reader.execute("BEGIN")  # one state of the database until the end
             yield reader
             reader.set_progress_handler(None, 0)
@@ -51,6 +60,11 @@ class Readers:
             idle, self._idle = self._idle, []
         for reader in idle:
             reader.close()
+
+    def _is_in_vain(self) -> Callable[[], bool]:
+        """Whether a read that begins now should end: by the asker, or by time."""
+        asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
+        return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
 
     def _taken(self) -> sqlite3.Connection:
         with self._lock:

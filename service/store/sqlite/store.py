@@ -1,5 +1,6 @@
 """The store in a SQLite file."""
 
+import sqlite3
 from pathlib import Path
 
 from service.audit.head import head_path
@@ -8,6 +9,7 @@ from service.store.audit_chain import begin_head
 from service.store.integrity import Marked
 from service.store.outbox_port import Address, nobody
 from service.store.port import StoreError
+from service.store.retention.sql import SqlRetention
 from service.store.spectra_port import SpectraLimits
 from service.store.sql_store import SqlStore
 from service.store.sqlite.database import SqliteDatabase
@@ -42,11 +44,12 @@ class SqliteStore(SqlStore):
     ) -> None:
         self._path = path
         database = SqliteDatabase(path, origin)
-        self._writer, self._lock = database.writer, database.lock
+        self._file = database
         try:
             if not database.had_trail:
                 begin_head(head_path(path))
             super().__init__(database, head_path(path), address, spectra)
+            self.retention = SqlRetention(self._writing, self._reader, database.give_back)
             self.integrity = Marked(database.marks, self._writing, self._chain)
         except OSError as error:
             database.close()
@@ -54,3 +57,8 @@ class SqliteStore(SqlStore):
         except BaseException:
             database.close()
             raise
+
+    @property
+    def _writer(self) -> sqlite3.Connection:
+        """The connection that writes now; another one after an error of the disk."""
+        return self._file.writer.connection

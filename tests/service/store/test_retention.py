@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from harness.places import Place
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +21,7 @@ from service.store.port import Trend, TrendQuery
 from service.store.retention import deleting
 from service.store.retention.limits import RetentionLimits
 from service.store.rollups import rolling
+from service.store.sql_store import SqlStore
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
 
@@ -56,19 +58,19 @@ def reading(build: Build, random: np.random.Generator, at: int) -> Assessment:
     return replace(build(at, **readings), condition=BearingCondition(state, True, None))
 
 
-def gather_all(store: SqliteStore) -> None:
+def gather_all(store: SqlStore) -> None:
     while due := store.rollups.due(1 << 62):
         for series in due:
             store.rollups.gather(series, 1 << 62)
 
 
-def delete_all(store: SqliteStore, limits: RetentionLimits = KEEP_NOTHING) -> None:
+def delete_all(store: SqlStore, limits: RetentionLimits = KEEP_NOTHING) -> None:
     for series in _series(store):
         while store.retention.delete(series, limits, NOW_NS):
             pass
 
 
-def _series(store: SqliteStore) -> list[int]:
+def _series(store: SqlStore) -> list[int]:
     return list(store.retention.series())
 
 
@@ -421,3 +423,25 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
     assert n_rows(path, "outbox") == 3
     with closing(sqlite3.connect(path)) as connection, pytest.raises(sqlite3.IntegrityError):
         connection.execute("DELETE FROM outbox WHERE state = 'waiting'")
+
+
+def test_both_databases_say_the_same_before_and_after(place: Place, assessment: Build) -> None:
+    with closing(place.open()) as store:
+        store.append(life(assessment, 150), [])
+        gather_all(store)
+        before = store.trend(asked(60))
+        for limits, _ in TIERS:
+            delete_all(store, limits)
+            require_same(store.trend(asked(60)), before)
+        late = reading(assessment, np.random.default_rng(2), T0 + HOUR_NS + 7)
+        store.append([late], [])
+        unmerged = store.trend(asked(60))
+        gather_all(store)
+
+        require_same(store.trend(asked(60)), unmerged)
+        counts, more = before.series["speed_rpm"].count, unmerged.series["speed_rpm"].count
+        assert sum(more) == sum(counts) + 1
+        n_left = place.execute(
+            "SELECT count(*) FROM assessment WHERE time_ns < ?", (late.time_ns + 1,)
+        )
+        assert n_left[0][0] == 0

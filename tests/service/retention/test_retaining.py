@@ -1,0 +1,91 @@
+"""The loop that deletes what is old, and the settings that say what that is."""
+
+from collections.abc import Callable, Sequence
+
+import pytest
+from pydantic import ValidationError
+
+from acquisition.clock import Clock
+from service.retaining import LOOK_S, PERIOD_S, REST_SHARE, Retaining
+from service.settings.retention import RetentionSettings
+from service.store.port import StoreError
+from service.store.retention.limits import DAY_NS, RetentionLimits
+from service.wiring.retention import retention_limits
+
+LIMITS = RetentionLimits(readings_ns=DAY_NS)
+
+
+class OldStore:
+    """Two bearings with some work each, which takes a second a piece."""
+
+    def __init__(self, clock: Clock, step: Callable[[float], None]) -> None:
+        self._clock, self._step = clock, step
+        self.left = {1: 3, 2: 1}
+        self.done: list[int] = []
+        self.trouble: str | None = None
+
+    def series(self) -> Sequence[int]:
+        return list(self.left)
+
+    def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
+        assert (limits, now_ns <= self._clock.now_ns()) == (LIMITS, True)
+        if self.trouble:
+            raise StoreError(self.trouble)
+        self._step(1.0)
+        self.left[series] -= 1
+        self.done.append(series)
+        return self.left[series] >= 0
+
+    def prune(self, *_: object) -> bool:
+        return False
+
+    def give_back(self) -> bool:
+        return False
+
+
+@pytest.fixture
+def old(stepped_clock: Clock) -> OldStore:
+    return OldStore(stepped_clock, stepped_clock.step)  # type: ignore[attr-defined]
+
+
+async def test_bearings_take_turns_until_nothing_is_old(
+    old: OldStore, stepped_clock: Clock
+) -> None:
+    retaining = Retaining(old, LIMITS, stepped_clock)
+
+    assert [await retaining.round() for _ in range(4)] == [True, True, True, False]
+    assert old.done == [1, 2] * 4
+
+
+async def test_it_rests_longer_than_it_works(old: OldStore, stepped_clock: Clock) -> None:
+    begun_s = stepped_clock.monotonic_s()
+    await Retaining(old, LIMITS, stepped_clock).round()
+
+    lasted_s = stepped_clock.monotonic_s() - begun_s
+    assert lasted_s == pytest.approx(2.0 * (1.0 + REST_SHARE))
+    assert LOOK_S < PERIOD_S
+
+
+async def test_a_store_that_fails_is_asked_again(old: OldStore, stepped_clock: Clock) -> None:
+    retaining = Retaining(old, LIMITS, stepped_clock)
+    old.trouble = "disk full"
+    assert not await retaining.round()
+    old.trouble = None
+    assert await retaining.round()
+
+
+def test_nothing_finer_is_kept_longer_than_what_is_coarser() -> None:
+    for wrong in (
+        {"readings_days": 10.0, "minutes_days": 9.0},
+        {"readings_days": 0.0, "minutes_days": 9.0},
+        {"minutes_days": 500.0, "ten_minutes_days": 499.0},
+    ):
+        with pytest.raises(ValidationError, match="must be"):
+            RetentionSettings.model_validate(wrong)
+    everything = dict.fromkeys(("readings_days", "minutes_days", "ten_minutes_days"), 0.0)
+    RetentionSettings.model_validate(everything)
+
+
+def test_zero_days_are_for_ever() -> None:
+    found = retention_limits(RetentionSettings(readings_days=1.5, films_days=0.0))
+    assert (found.readings_ns, found.films_ns) == (round(1.5 * DAY_NS), None)

@@ -1,0 +1,122 @@
+"""After an error of the disk the connection is not trusted; the file stays of bounded size."""
+
+import resource
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+
+from core.assessment import Assessment
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore, readers, writer
+from service.store.sqlite.readers import Readers
+from service.store.sqlite.trouble import leaves_in_doubt
+
+Build = Callable[..., Assessment]
+At = Callable[[int], int]
+
+
+@contextmanager
+def files_up_to(n_bytes: int) -> Iterator[None]:
+    """Let no file of this process grow beyond that."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def stored_of(store: SqliteStore, batches: list[list[Assessment]]) -> tuple[int, str]:
+    """How many were stored until one was refused, and why."""
+    for number, some in enumerate(batches):
+        try:
+            store.append(some, [])
+        except StoreError as error:
+            return number, str(error)
+    pytest.fail("nothing was refused")
+
+
+def n_readings(path: Path) -> int:
+    with closing(sqlite3.connect(path)) as connection:
+        return int(connection.execute("SELECT count(*) FROM assessment").fetchone()[0])
+
+
+def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(
+    path: Path, assessment: Build, at: At
+) -> None:
+    batch = [[assessment(at(10 * n + i), speed_rpm=1.0) for i in range(10)] for n in range(100)]
+    with closing(SqliteStore(path)) as store:
+        first = store._writer
+        with files_up_to(1_000_000):
+            n_stored, refusal = stored_of(store, batch)
+        assert "no file may be larger than 1000000 bytes here" in refusal
+        store.append(batch[n_stored], [])
+
+        assert store._writer is not first
+        assert not store._file.marks.found
+    assert n_readings(path) == 10 * (n_stored + 1)
+
+
+def test_a_full_disk_leaves_no_doubt_and_other_errors_do() -> None:
+    full, torn = sqlite3.OperationalError("full"), sqlite3.OperationalError("disk I/O error")
+    full.sqlite_errorcode = 13  # type: ignore[misc]
+    torn.sqlite_errorcode = 10 | 4 << 8  # type: ignore[misc]
+
+    assert not leaves_in_doubt(full)
+    assert leaves_in_doubt(torn)
+    assert not leaves_in_doubt(StoreError("refused"))
+
+
+@pytest.mark.usefixtures("store")
+def test_a_read_that_takes_too_long_is_ended(path: Path) -> None:
+    now = iter([0.0] + 10_000 * [readers.LONGEST_S + 1.0])
+    slow = Readers(path, lambda: next(now))
+
+    with pytest.raises(sqlite3.OperationalError, match="interrupted"), slow.reading() as reader:
+        reader.execute(
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 10000000)"
+            " SELECT count(*) FROM n"
+        ).fetchone()
+    slow.close()
+
+
+def test_the_log_is_cut_after_a_long_read(
+    path: Path, assessment: Build, at: At, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limit = 2_000_000
+    monkeypatch.setattr(writer, "MAX_LOG_BYTES", limit)
+    log = path.with_name(path.name + "-wal")
+    with closing(SqliteStore(path)) as store:
+        with closing(sqlite3.connect(path, isolation_level=None)) as reader:
+            reader.execute("BEGIN")
+            reader.execute("SELECT count(*) FROM assessment").fetchone()
+            number = 0
+            while log.stat().st_size < 5 * limit:
+                store.append([assessment(at(number + i), speed_rpm=1.0) for i in range(50)], [])
+                number += 50
+            reader.execute("ROLLBACK")
+        for _ in range(3):
+            store.append([assessment(at(number), speed_rpm=1.0)], [])
+            number += 1
+
+        assert log.stat().st_size <= limit
+
+
+def test_room_that_becomes_free_is_given_back(
+    path: Path, assessment: Build, at: At, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer, "MIN_FREE_PAGES", 20)
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(at(i), speed_rpm=1.0) for i in range(400)], [])
+        assert not store.retention.give_back()
+        store._writer.execute("DELETE FROM assessment")
+        store._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        before = path.stat().st_size
+        while store.retention.give_back():
+            pass
+        store._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+
+        assert path.stat().st_size < 0.9 * before
