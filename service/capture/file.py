@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import ConfigError
+from acquisition.recording.manifest import checksum_of
 from acquisition.recording.writer import RecordingWriter
 from core.alarms.event import AlarmEvent
 from core.blocks import SampleBlock
@@ -95,7 +96,8 @@ class CaptureFile:
 
 
 def _write_alarms(path: Path, alarms: Sequence[AlarmEvent]) -> None:
-    text = json.dumps({"alarms": [_alarm(event) for event in alarms]}, indent=1) + "\n"
+    document: dict[str, object] = {"alarms": [_alarm(event) for event in alarms]}
+    text = json.dumps(document | {"checksum": checksum_of(document)}, indent=1) + "\n"
     with path.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()

@@ -10,7 +10,7 @@ from typing import Any
 from acquisition.errors import ConfigError
 from acquisition.recording.export.arrow import CsvExporter
 from acquisition.recording.export.rows import export_rows
-from acquisition.recording.manifest import Manifest, read_manifest
+from acquisition.recording.manifest import Manifest, checksum_of, read_manifest
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.summary import RecordingSummary, summary_of
 from service.capture.folders import ALARM, FILES
@@ -176,10 +176,12 @@ def _alarms(path: Path) -> list[Mapping[str, Any]]:
     """What a recording was made for; nothing where that cannot be read."""
     try:
         with path.open("rb") as file:
-            found = json.loads(file.read(MAX_ALARM_BYTES))["alarms"]
+            document = json.loads(file.read(MAX_ALARM_BYTES))
+        if document.get("checksum") not in (None, checksum_of(document)):  # older ones have none
+            return []
         return [
             {key: each[key] for key in ("alarm", "occurrence", "change", "level", "time")}
-            for each in found
+            for each in document["alarms"]
         ]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return []

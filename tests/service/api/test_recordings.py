@@ -191,3 +191,13 @@ async def test_no_name_leads_out_of_the_folder_of_recordings(
 async def test_without_any_recording_the_list_is_empty(service: Any) -> None:
     assert (await service.json(RECORDINGS))["recordings"] == []
     await service.problem(f"{RECORDINGS}/U1-20260101T000000.000Z-shaft_x", 404)
+
+
+async def test_a_bit_that_flips_in_what_a_recording_was_made_for_hides_it(
+    service: Any, keep: Keep
+) -> None:
+    path = keep(10) / "alarm.json"
+    path.write_text(path.read_text().replace('"occurrence": 1', '"occurrence": 3'))
+
+    [one] = (await service.json(RECORDINGS))["recordings"]
+    assert one["alarms"] == []
