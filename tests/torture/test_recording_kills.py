@@ -44,8 +44,9 @@ def killed(
     for number in range(n):
         rig.start()
         rig.wait_ready()
-        n_promised += until(lambda: promised(rig.url))
+        until(lambda: promised(rig.url))
         time.sleep(rng.uniform(0.0, 2.0 * SYNC_S))
+        n_promised += promised(rig.url)
         if number % 10 == 9:
             assert rig.stop() == 0
         else:
