@@ -5,7 +5,6 @@ TCP for every unit, says on its first line where, takes the commands of ``padwat
 on its standard input and ends with it. Into FILE goes one line for every slot that it offers.
 """
 
-import asyncio
 import dataclasses
 import json
 import signal
@@ -18,6 +17,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
+
+import uvloop
 
 from acquisition.clock import SystemClock
 from acquisition.daq.ledger import Ledger
@@ -62,7 +63,7 @@ def main() -> None:
             )
             device = RingDevice(LedgerFeed(plant, number, t0_ns), unit, settings, ledger)
             servers[unit] = ModbusRingServer(device, clock)
-        asyncio.run(run_daq(servers, lambda line: print(line, flush=True), controlled=True))
+        uvloop.run(run_daq(servers, lambda line: print(line, flush=True), controlled=True))
 
 
 @dataclass
@@ -130,7 +131,11 @@ def ledger_daq(plant: LedgerPlant, folder: Path) -> Iterator[LedgerDaq]:
     finally:
         process.send_signal(signal.SIGCONT)
         process.terminate()
-        process.wait(10)
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:  # a machine that has no time for it
+            process.kill()
+            process.wait()
         for pipe in (process.stdin, process.stdout):
             if pipe is not None:
                 pipe.close()
