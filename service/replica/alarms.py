@@ -41,7 +41,8 @@ class ReplicaAlarms:
         """Take what was written down of a unit."""
         self._revision += 1
         self._judged[unit], self._chattering[unit] = state.judged, state.chattering
-        self.take_stored(state.alarms)
+        # a process may remember alarms of units that others have taken over
+        self.take_stored(alarm for alarm in state.alarms if self._owner(alarm) == unit)
 
     def take_stored(self, alarms: Iterable[Alarm]) -> None:
         """Take alarms, unless something later is known of them."""

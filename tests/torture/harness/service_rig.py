@@ -64,7 +64,7 @@ UNREACHABLE = (OSError, http.client.HTTPException)
 
 
 class ServiceRig:
-    """One `padwatch run` after another on the same plant file.
+    """One `padwatch run` after another on the same plant file; or another role.
 
     Parameters
     ----------
@@ -72,6 +72,10 @@ class ServiceRig:
         Module that is run instead of the command, as one with a planted bug.
     before
         Words before the interpreter, such as ``strace``.
+    role
+        What the program is to do, and its options.
+    log
+        Name of the file beside the plant file that takes its log.
     """
 
     def __init__(
@@ -80,10 +84,13 @@ class ServiceRig:
         program: str = "service.cli.main",
         before: tuple[str, ...] = (),
         environment: dict[str, str] | None = None,
+        role: tuple[str, ...] = ("run",),
+        log: str = "service.log",
     ) -> None:
         self._plant_file, self._program, self._before = plant_file, program, before
         self._environment = environment or {}
-        self.log = plant_file.with_name("service.log")
+        self._role = role
+        self.log = plant_file.with_name(log)
         self.process: subprocess.Popen[str] | None = None
         self.url = ""
         self.started_s = 0.0
@@ -103,10 +110,11 @@ class ServiceRig:
             "PYTHONUNBUFFERED": "1",
             **self._environment,
         }
-        command = [sys.executable, "-m", self._program, "run", str(self._plant_file), "--port", "0"]
+        role, *options = self._role
+        command = [sys.executable, "-m", self._program, role, str(self._plant_file), "--port", "0"]
         with self.log.open("a", encoding="utf-8") as log:
             self.process = subprocess.Popen(
-                [*self._before, *command],
+                [*self._before, *command, *options],
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
@@ -120,8 +128,8 @@ class ServiceRig:
         assert self.process is not None
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            if line.startswith("padwatch: http"):
-                self.url = line.split()[-1].rstrip("/")
+            if line.startswith("padwatch") and ": http" in line:
+                self.url = line.split()[-1].removesuffix("readyz").rstrip("/")
                 return time.monotonic() - self.started_s
         raise AssertionError(f"the service did not start: {self.newest_log()}")
 

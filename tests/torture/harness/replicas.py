@@ -1,0 +1,155 @@
+"""A plant whose results lie in PostgreSQL, with one process that analyses and two that serve."""
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.kill_cycles import act
+from harness.ledger_daq import LedgerDaq
+from harness.ledger_plant import LedgerPlant
+from harness.postgres_server import PostgresServer
+from harness.service_rig import PATIENCE_S, UNREACHABLE, RefusedError, ServiceRig
+from harness.watch import Watch
+
+STORE = """
+[store]
+postgresql = "{conninfo}"
+"""
+
+
+@dataclass
+class Replicas:
+    """All processes of a plant but its DAQ.
+
+    Parameters
+    ----------
+    analysis
+        Those that bring results: they are killed, and started again at once.
+    serving
+        Those that people ask.
+    lives
+        For each unit, the number of the newest sample offered as the first of `analysis` started.
+    """
+
+    plant: LedgerPlant
+    plant_file: Path
+    daq: LedgerDaq
+    postgres: PostgresServer
+    analysis: list[ServiceRig]
+    serving: list[ServiceRig]
+    watches: list[Watch]
+    lives: dict[str, list[int]]
+
+    def start(self) -> None:
+        """Start all, those that serve last."""
+        self._note_life()
+        for rig in self.analysis:
+            rig.start()
+        for rig in self.analysis:
+            rig.wait_ready()
+        for rig, watch in zip(self.serving, self.watches, strict=True):
+            rig.start()
+            rig.wait_ready()
+            watch.begin(rig.url)
+
+    def kill_analysis(self, number: int) -> None:
+        """Kill one that analyses; it is started again."""
+        rig = self.analysis[number % len(self.analysis)]
+        rig.kill()
+        if rig is self.analysis[0]:
+            self._note_life()
+        rig.start()
+        rig.wait_ready()
+
+    def kill_serving(self, number: int) -> None:
+        """Kill one that serves, while people ask it; it is started again."""
+        at = number % len(self.serving)
+        self.serving[at].kill()
+        self.watches[at].end()
+        self.serving[at].start()
+        self.serving[at].wait_ready()
+        self.watches[at].begin(self.serving[at].url)
+
+    def restart_postgres(self, number: int) -> None:
+        """Restart the database: every other time as after a power cut."""
+        self.postgres.restart("immediate" if number % 2 else "fast")
+
+    def act(self, number: int) -> None:
+        """Be an operator at one of those that serve."""
+        rig, watch = self.serving[number % 2], self.watches[number % 2]
+        with rig.api() as api:
+            act(api, number, watch)
+
+    def wait_for_result(self) -> None:
+        """Wait until a result is stored that nobody has seen yet."""
+        for watch in self.watches:
+            watch.wait_for_result()
+
+    def stop(self) -> None:
+        """Let everything come to its end in good order."""
+        for rig, watch in zip(self.serving, self.watches, strict=True):
+            rig.stop()
+            watch.end()
+        for rig in self.analysis:
+            rig.stop()
+
+    def whole_watch(self) -> Watch:
+        """What all clients together were shown and promised."""
+        whole = Watch(self.plant, self.daq.offered)
+        for watch in self.watches:
+            for key, values in watch.shown.items():
+                whole.shown[key].update(values)
+            whole.events |= watch.events
+            whole.promised |= watch.promised
+            whole.n_answers += watch.n_answers
+        return whole
+
+    def _note_life(self) -> None:
+        for (unit, _), n in self.daq.offered().samples.items():
+            self.lives.setdefault(unit, []).append(n)
+
+
+@contextmanager
+def replicas(
+    plant: LedgerPlant, folder: Path, daq: LedgerDaq, postgres: PostgresServer
+) -> Iterator[Replicas]:
+    """One `padwatch run` over PostgreSQL, and two `padwatch serve`."""
+    extra = STORE.format(conninfo=postgres.create("plant"))
+    plant_file = plant.write(folder / "plant.toml", folder / "data", daq.ports, extra)
+    with ExitStack() as running:
+        analysis = running.enter_context(ServiceRig(plant_file))
+        serving = []
+        for number in (1, 2):
+            # a folder of its own each, as on a host of its own
+            own = plant.write(
+                folder / f"serve{number}.toml", folder / f"serve{number}", daq.ports, extra
+            )
+            rig = ServiceRig(own, role=("serve",), log=f"serve{number}.log")
+            serving.append(running.enter_context(rig))
+        watches = [Watch(plant, daq.offered) for _ in serving]
+        yield Replicas(plant, plant_file, daq, postgres, [analysis], serving, watches, {})
+        for watch in watches:
+            watch.end()
+
+
+def chance(rng: np.random.Generator, mean_s: float, most_s: float) -> None:
+    """Let a random time pass."""
+    time.sleep(min(rng.exponential(mean_s), most_s))
+
+
+def until_answered(rig: ServiceRig, path: str) -> bool:
+    """Whether a path is answered in good time."""
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        try:
+            with rig.api() as api:
+                api.get(path)
+        except (*UNREACHABLE, RefusedError):
+            time.sleep(0.1)
+        else:
+            return True
+    return False
