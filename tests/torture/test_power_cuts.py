@@ -79,6 +79,7 @@ def damage(path: Path) -> list[str]:
     return [line for line in said if line not in wrong]
 
 
+@pytest.mark.timeout(3600)
 def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
     recorded: Record,
     tmp_path: Path,
@@ -101,6 +102,7 @@ def _planted(bug: str, what: str) -> object:
     return pytest.param(bug, what, marks=pytest.mark.planted(bug), id=bug)
 
 
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
     ("bug", "what"),
     [
