@@ -10,6 +10,7 @@ from acquisition.clock import Clock
 from core.alarms.alarm import Alarm, AlarmKind, Condition
 from core.alarms.chatter import ChatterRule, ChatterWatch
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import VectorReference
@@ -76,6 +77,15 @@ class AlarmEngine:
             self._publish(own.restore(mine, now_ns))
         others = [alarm for alarm in found if alarm.identity.unit not in self._units]
         self._publish(self._service.restore(others, now_ns))
+
+    def memory(self, unit: str) -> AlarmMemory:
+        """What must be known of the alarms of a unit, beside their events, to go on elsewhere."""
+        return self._units[unit].memory
+
+    def resume(self, unit: str, memory: AlarmMemory) -> None:
+        """Go on where another process stopped; after `restore`."""
+        self.revision += 1
+        self._units[unit].resume(memory)
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
         """Remember what alarms did lately, oldest first, to know which are chattering."""

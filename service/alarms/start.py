@@ -22,6 +22,7 @@ from service.conversion import machine_of
 from service.films.rules import film_rules_of
 from service.origin import Origin
 from service.recorder import Findings
+from service.roles.plant_part import WHOLE, PlantPart
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.store.port import AlarmQuery, Store
@@ -42,6 +43,7 @@ async def alarm_engine(
     rows: Mapping[str, Sequence[str]] = MappingProxyType({}),
     look: LookAtHealth | None = None,
     tape: Callable[[SampleBlock], None] | None = None,
+    part: PlantPart = WHOLE,
 ) -> AlarmEngine:
     """Put the engine together and let it go on where the service stopped.
 
@@ -55,6 +57,8 @@ async def alarm_engine(
         How the service itself does.
     tape
         Takes every block, if all samples are kept.
+    part
+        What of the plant this process looks after; alarms of the rest are left to others.
 
     Raises
     ------
@@ -71,17 +75,18 @@ async def alarm_engine(
         for unit in plant.unit
     }
     # how a replay is served depends on the host, and is nothing that the recording tells
-    seen = look if origin is Origin.LIVE else None
+    seen = look if origin is Origin.LIVE and part.leads else None
     service = ServiceAlarms(units, service_rules_of(plant.alarms), seen)
     chatter = chatter_rule_of(plant.alarms)
     listener = _listener(captures, tape)
     engine = AlarmEngine(units, put, clock, listener, service, chatter)
-    engine.restore(await asyncio.to_thread(store.alarms))
-    for found in await asyncio.to_thread(store.order1_references.in_force):
-        engine.refer_to(found.reference)
+    stored = await asyncio.to_thread(store.alarms)
+    engine.restore(alarm for alarm in stored if part.looks_after(alarm.identity.unit))
+    for held in await asyncio.to_thread(store.order1_references.in_force):
+        engine.refer_to(held.reference)
     lately = AlarmQuery(start_ns=max(0, clock.now_ns() - SHOWN_NS), limit=MAX_RECALLED)
     events = await asyncio.to_thread(store.alarm_events, lately)
-    engine.recall(stored.event for stored in reversed(events))
+    engine.recall(found.event for found in reversed(events))
     return engine
 
 

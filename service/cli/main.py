@@ -8,6 +8,7 @@ import typer
 
 from service.cli import audit, config, delivery, keys, probe, readings, recording, reference, users
 from service.cli.acquire import acquire
+from service.cli.analyse import analyse
 from service.cli.backtest import backtest
 from service.cli.backup import backup, restore
 from service.cli.daq import daq
@@ -27,6 +28,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 app.command()(run)
 app.command()(demo)
 app.command()(acquire)
+app.command()(analyse)
 app.command()(serve)
 app.command()(daq)
 app.command()(record)

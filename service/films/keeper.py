@@ -12,6 +12,7 @@ from core.assessment import Assessment
 from core.baseline.baseline import BearingBaseline
 from core.films.film_finding import alarm_condition
 from core.films.film_judge import FilmJudge, FilmNews
+from core.films.film_memory import FilmMemory
 from core.films.film_rules import FilmRules
 from core.films.film_watch import FilmWatch
 from core.machine import Unit
@@ -82,6 +83,15 @@ class FilmKeeper:
             response = responses.get(unit)
             found = await asyncio.to_thread(unit_start, self._store, unit, films.rules, response)
             _go_on(films.watch, found)
+
+    def memory(self, unit: str) -> FilmMemory | None:
+        """What must be known of the films of a unit, beside stored readings, to go on elsewhere."""
+        return self._films[unit].watch.memory if unit in self._films else None
+
+    def resume(self, unit: str, memory: FilmMemory) -> None:
+        """Go on where another process stopped; after `start`."""
+        if unit in self._films:
+            self._films[unit].watch.resume(memory)
 
     def rules(self, unit: str) -> FilmRules | None:
         """How the films of a unit are watched; None if they are not."""

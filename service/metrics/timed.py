@@ -67,6 +67,11 @@ class TimedMonitor:
         return list(self.steps(block))
 
 
+def timed_monitors(monitors: Mapping[str, Monitor], timings: Timings) -> dict[str, Monitor]:
+    """The same monitors, timed."""
+    return {unit: TimedMonitor(monitor, timings) for unit, monitor in monitors.items()}
+
+
 def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, WatchedUnit]:
     """The same units with monitors that are timed."""
     return {

@@ -5,12 +5,16 @@ from collections.abc import Mapping
 
 from core.blocks import SampleBlock
 from core.monitor_port import Monitor
+from core.monitor_state import MonitorState
 from service.alarms.engine import AlarmEngine
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
 from service.recorder import Findings, Recorder
 from service.roles.link_news import LinkNews
+from service.roles.unit_memory import UnitMemory
 from service.store.port import UnitGap
+
+NOTHING = Findings()
 
 TURNS = 3
 """Of the event loop between two bearings: what a request takes from its arrival to its answer."""
@@ -32,6 +36,12 @@ class Analyser:
 
     async def take(self, block: SampleBlock) -> None:
         """Take a block in, and hand over what it has taught."""
+        findings = await self.learn(block)
+        if findings != NOTHING:
+            self._recorder.put(findings)
+
+    async def learn(self, block: SampleBlock) -> Findings:
+        """Take a block in, and return what it has taught."""
         monitor = self._monitors[block.unit]
         found = []
         for assessment in monitor.steps(block):
@@ -44,7 +54,39 @@ class Analyser:
         self._live.set_received(block, monitor.account)
         news = self._alarms.take(block, assessments, self._films.conditions(films))
         if assessments or gaps or news:
-            self._recorder.put(Findings(assessments, gaps, news, films))
+            return Findings(assessments, gaps, news, films)
+        return NOTHING
+
+    async def relive(self, block: SampleBlock) -> None:
+        """Take a block in whose findings are stored already; nobody is told again."""
+        monitor = self._monitors[block.unit]
+        for _ in monitor.steps(block):
+            await _others()
+        monitor.drain_gaps()
+        self._live.set_received(block, monitor.account)
+
+    def state(self, unit: str) -> MonitorState:
+        """What must be known of a monitor beside its newest samples."""
+        return self._monitors[unit].state
+
+    def memory(self, unit: str) -> UnitMemory:
+        """What must be known of a unit beside its newest samples."""
+        return UnitMemory(self.state(unit), self._alarms.memory(unit), self._films.memory(unit))
+
+    def resume(self, unit: str, memory: UnitMemory) -> None:
+        """Let alarms and films of a unit be as they were."""
+        self._alarms.resume(unit, memory.alarms)
+        if memory.films is not None:
+            self._films.resume(unit, memory.films)
+
+    def rewind(self, unit: str, memory: UnitMemory) -> None:
+        """Let the monitor of a unit expect its newest samples once more, none of them missing."""
+        self._monitors[unit].go_on(None)
+        self._monitors[unit].rewind(memory.monitor)
+
+    def settle(self, unit: str, memory: UnitMemory) -> None:
+        """Let the monitor of a unit, after these samples, be as it was."""
+        self._monitors[unit].settle(memory.monitor)
 
     def hear(self, news: LinkNews) -> None:
         """Let alarms know whether samples of a unit arrive."""

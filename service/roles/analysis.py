@@ -1,7 +1,7 @@
 """`Analysis`: the parts that turn blocks into stored results, alarms, evidence and messages."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from core.monitor_port import Monitor
@@ -17,6 +17,7 @@ from service.delivery.facts import Around
 from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
+from service.heartbeats import Pulse
 from service.load.strain import LoadLimits
 from service.load.watch import LoadWatch
 from service.origin import Origin
@@ -25,6 +26,7 @@ from service.references import ReferencesInForce
 from service.retaining import Retaining
 from service.roles.analysing import Analyser
 from service.roles.ground import Ground
+from service.roles.plant_part import WHOLE, PlantPart
 from service.rolling import Rolling
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
@@ -37,12 +39,16 @@ from service.wiring.space import space_watch
 from service.wiring.tapes import tape_of
 from service.wiring.waveforms import waveform_keeper
 
+Loop = Callable[[Pulse], Awaitable[None]]
+"""Something that runs until it is cancelled, and is heard."""
+
 
 @dataclass(frozen=True)
 class Analysis:
     """All that analysing needs; whoever has it feeds `analyser`, and runs `recorder`."""
 
     ground: Ground
+    part: PlantPart
     analyser: Analyser
     recorder: Recorder
     deliveries: Deliveries
@@ -60,22 +66,37 @@ class Analysis:
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Begin the loops beside the blocks; they run until they are cancelled."""
-        beats = self.ground.beats
-        loops = {
+        beats, loops = self.ground.beats, self.own_loops
+        if self.part == WHOLE:  # there is nobody to share with
+            loops = {**loops, **self.shared_loops}
+        begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
+        if self.part == WHOLE:
+            begun.append(tasks.create_task(self.deliveries.run(beats), name="deliver"))
+        return begun
+
+    @property
+    def own_loops(self) -> dict[str, Loop]:
+        """What every process does for its own units."""
+        loops: dict[str, Loop] = {
             "references": self.references.run,
             "alarms": self.alarms.run,
             "captures": self.captures.run,
             "tape": self.tape.run,
             "evidence": self.evidence.run,
-            "gather": self.rolling.run,
             "space": self.space.run,
             "load": self.load.run,
         }
         if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
-            loops |= {"learn": self.films.run, "retain": self.retaining.run}
-            loops["recordings"] = self.recordings.run
-        begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
-        return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
+            loops |= {"learn": self.films.run, "recordings": self.recordings.run}
+        return loops
+
+    @property
+    def shared_loops(self) -> dict[str, Loop]:
+        """What one process does for the whole plant, beside delivering messages."""
+        loops: dict[str, Loop] = {"gather": self.rolling.run}
+        if self.ground.origin is Origin.LIVE:
+            loops["retain"] = self.retaining.run
+        return loops
 
     async def close(self) -> None:
         """Write what is not written yet; also when a bug ends the program."""
@@ -87,7 +108,11 @@ class Analysis:
 
 
 async def analysis_on(
-    ground: Ground, monitors: Mapping[str, Monitor], bus: Bus, around: Around
+    ground: Ground,
+    monitors: Mapping[str, Monitor],
+    bus: Bus,
+    around: Around,
+    part: PlantPart = WHOLE,
 ) -> Analysis:
     """Put the parts together, and let them go on where the service stopped.
 
@@ -97,6 +122,8 @@ async def analysis_on(
         Where blocks wait for the analysis.
     around
         Is shown the films, of which messages tell.
+    part
+        What of the plant this process looks after.
 
     Raises
     ------
@@ -121,7 +148,16 @@ async def analysis_on(
         monitors, live, recorder, captures, bus, space, load, tape=tape, recordings=recordings
     )
     alarms = await alarm_engine(
-        plant, origin, store, recorder.put, clock, captures, vector_rows(plant), look, tape.take
+        plant,
+        origin,
+        store,
+        recorder.put,
+        clock,
+        captures,
+        vector_rows(plant),
+        look,
+        tape.take,
+        part,
     )
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
@@ -132,6 +168,7 @@ async def analysis_on(
     await references.look()  # before the first result
     return Analysis(
         ground=ground,
+        part=part,
         analyser=Analyser(monitors, live, recorder, alarms, films),
         recorder=recorder,
         deliveries=deliveries,

@@ -1,0 +1,241 @@
+"""`padwatch analyse` from start to end: blocks from the stream in, results to the store out."""
+
+import asyncio
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+
+import structlog
+from prometheus_client.metrics_core import Metric
+from prometheus_client.process_collector import ProcessCollector
+
+from acquisition.clock import Clock
+from core.alarms.alarm import PLANT
+from core.monitor_port import Monitor
+from service.bus import Bus
+from service.delivery.facts import Around
+from service.health.page import Health
+from service.health.serving import HealthServer
+from service.heartbeats import Heartbeats, Pulse
+from service.http.listening import url_of
+from service.instance import only_one
+from service.metrics.timed import timed_monitors
+from service.metrics.timings import Timings
+from service.notify import NOBODY, ServiceManager
+from service.origin import Origin
+from service.roles.analysis import Analysis, Loop, analysis_on
+from service.roles.ground import Ground, live_view
+from service.roles.holding import Holds
+from service.roles.leadership import Leadership
+from service.roles.partition import Partition
+from service.roles.reporting import reporting_loops
+from service.roles.stopping import stop_on_signals
+from service.runner import BUS_CAPACITY
+from service.settings.plant import PlantFile
+from service.settings.stream import StreamSettings
+from service.store.positions_port import StreamPosition
+from service.stream.consumer import Consumer
+from service.stream.consumer_metrics import consumer_metrics
+from service.stream.names import identity_of
+from service.stream.progress import UnitProgress
+from service.supervision import Supervision
+from service.wiring.delivery import router_of
+from service.wiring.stores import database_path, open_store
+
+log = structlog.get_logger()
+
+WATCH_EVERY_S = 1.0
+
+
+async def run_analyse(
+    plant: PlantFile,
+    partition: Partition,
+    settings: StreamSettings,
+    monitors: Mapping[str, Monitor],
+    listener: socket.socket,
+    clock: Clock,
+    announce: Callable[[str], None],
+    manager: ServiceManager = NOBODY,
+) -> None:
+    """Analyse the units of a partition until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    plant
+        The whole plant.
+    monitors
+        Of the units of the partition.
+    listener
+        Where the health page is served.
+    announce
+        Called with its URL once it answers.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used, or others may have taken the units over.
+    StreamAnewError
+        If the stream is another one than when it began.
+    """
+    part = partition.part_of(plant)
+    live = live_view(part, clock)
+    around = Around(live)
+    with ExitStack() as stack:
+        if plant.store.postgresql is None:
+            stack.enter_context(only_one(database_path(plant)))
+        store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, around, clock))
+        stack.callback(store.close)
+        ground = Ground(
+            part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
+        )
+        analysing = Analysing(plant, partition, settings, monitors, ground, around)
+        try:
+            await analysing.run(listener, announce, manager)
+        finally:
+            await analysing.close()
+
+
+class Analysing:
+    """The process while it stands by, analyses and stops."""
+
+    def __init__(
+        self,
+        plant: PlantFile,
+        partition: Partition,
+        settings: StreamSettings,
+        monitors: Mapping[str, Monitor],
+        ground: Ground,
+        around: Around,
+    ) -> None:
+        self._share, self._settings = partition.share_of(plant), settings
+        self._monitors, self._ground, self._around = monitors, ground, around
+        self._plant = plant
+        self._holds = Holds(ground.store, monitors, ground.clock)
+        self._analysis: Analysis | None = None
+        self._consumer: Consumer | None = None
+
+    async def run(
+        self, listener: socket.socket, announce: Callable[[str], None], manager: ServiceManager
+    ) -> None:
+        """Stand by, analyse, stop."""
+        ground = self._ground
+        health = HealthServer(self._health(), listener, ground.clock)
+        supervision = Supervision(manager, ground.beats, ground.live, self._monitors, ground.clock)
+        stopped = stop_on_signals()
+        async with asyncio.TaskGroup() as tasks:
+            server = health.start(tasks, ground.beats)
+            await health.started()
+            supervision.ready()
+            announce(url_of(listener))
+            supervising = tasks.create_task(supervision.run(), name="supervise")
+            analysing = tasks.create_task(self._analyse(), name="analyse")
+            await stopped.wait()
+            supervision.stopping()
+            health.stop()
+            supervising.cancel()
+            analysing.cancel()
+            await asyncio.wait([server])
+
+    async def close(self) -> None:
+        """Write what is not written yet, then let others take over."""
+        if self._analysis is not None:
+            await self._analysis.close()
+        self._holds.release()
+
+    async def _analyse(self) -> None:
+        ground = self._ground
+        await self._holds.take()
+        bus = Bus(BUS_CAPACITY, ground.clock)  # nothing waits in this one: the stream does
+        monitors = timed_monitors(self._monitors, ground.timings)
+        analysis = await analysis_on(ground, monitors, bus, self._around, self._share)
+        self._analysis = analysis
+        consumer = Consumer(
+            self._plant, self._settings, self._begin, analysis.recorder, ground.clock
+        )
+        self._consumer = consumer
+        tend = ground.beats.tend
+        async with asyncio.TaskGroup() as tasks:
+            analysis.start(tasks)
+            leading = Leadership(
+                ground.store.hold, shared_work(analysis), ground.beats, ground.clock
+            )
+            tasks.create_task(tend("lead", leading.run), name="lead")
+            tasks.create_task(tend("record", analysis.recorder.run), name="record")
+            tasks.create_task(tend("stream", consumer.run), name="stream")
+            tasks.create_task(tend("watch", self._watch), name="watch")
+            for name, loop in reporting_loops(analysis, self._held).items():
+                tasks.create_task(tend(name, loop), name=name)
+
+    def _held(self) -> list[str]:
+        """What this process tells of: its units, and who leads also of the service itself."""
+        return [*self._monitors, *([PLANT] if self._share.leads else [])]
+
+    async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
+        """Where each unit goes on."""
+        return {unit: await self._progress(unit, stream, newest) for unit in self._monitors}
+
+    async def _progress(self, unit: str, stream: str, newest: int) -> UnitProgress:
+        ground, analysis = self._ground, self._analysis
+        if analysis is None:
+            raise RuntimeError("there is no analysis yet")
+        stored = usable(await asyncio.to_thread(ground.store.position, unit), stream, newest)
+        settings = next(its for its in ground.plant.unit if its.id == unit)
+        identity = identity_of(self._plant, settings)
+        parts = (analysis.analyser, ground.live, analysis.recorder)
+        return UnitProgress(identity, stream, stored, *parts)
+
+    async def _watch(self, pulse: Pulse) -> None:
+        """See that the units are still this process's, and which have fallen silent."""
+        while True:
+            pulse.beat(WATCH_EVERY_S)
+            await asyncio.to_thread(self._holds.require)
+            units = self._consumer.units if self._consumer else {}
+            for progress in units.values():
+                progress.fall_silent(self._settings.silent_after_s)
+            await self._ground.clock.sleep(WATCH_EVERY_S)
+
+    def _health(self) -> Health:
+        def checks() -> dict[str, str | None]:
+            consumer = self._consumer
+            waits_for = self._holds.waits_for
+            loops = {f"loop {name}": t for name, t in self._ground.beats.look().items()}
+            return {
+                "units": None if waits_for is None else f"standing by: {waits_for}",
+                "store": self._ground.live.store_error,
+                "stream": "not begun" if consumer is None else consumer.trouble,
+                **loops,
+            }
+
+        def shown() -> dict[str, str]:
+            return {f"unit {u}": self._ground.live.status(u).state.value for u in self._monitors}
+
+        def metrics() -> Iterator[Metric]:
+            if self._consumer is not None:
+                yield from consumer_metrics(self._consumer)
+            yield from ProcessCollector(registry=None).collect()
+
+        return Health(checks, shown, metrics)
+
+
+def shared_work(analysis: Analysis) -> dict[str, Loop]:
+    """What is done once for the plant, in whichever process holds the name of it."""
+
+    async def deliver(pulse: Pulse) -> None:
+        pulse.rest()  # its senders are heard each for itself
+        await analysis.deliveries.run(analysis.ground.beats)
+        await asyncio.Event().wait()  # where nobody is told, that is all there is to do
+
+    return {**analysis.shared_loops, "deliver": deliver}
+
+
+def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
+    """A stored position, if it is one on this stream as the stream is."""
+    if stored is None:
+        return None
+    if stored.stream != stream:
+        log.error("the stream was made anew: results go on with what is on it", unit=stored.unit)
+        return None
+    if stored.sequence > newest:
+        log.error("the stream has lost what it had confirmed", unit=stored.unit)
+        return None
+    return stored

@@ -1,0 +1,27 @@
+"""`UnitMemory`: what must be known of a unit, beside its newest samples, to go on elsewhere."""
+
+from dataclasses import dataclass
+
+from core.alarms.memory import AlarmMemory
+from core.films.film_memory import FilmMemory
+from core.monitor_state import MonitorState
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class UnitMemory:
+    """A unit between two blocks.
+
+    Parameters
+    ----------
+    films
+        Where they are watched.
+    version
+        Of this form.
+    """
+
+    monitor: MonitorState
+    alarms: AlarmMemory
+    films: FilmMemory | None
+    version: int = VERSION

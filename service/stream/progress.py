@@ -1,0 +1,156 @@
+"""`UnitProgress`: one unit on its way along the stream, whatever connections come and go."""
+
+from collections import Counter
+from dataclasses import replace
+
+import structlog
+
+from core.blocks import SampleBlock
+from service.live import LinkState, LiveView
+from service.recorder import Findings, Recorder
+from service.roles.analysing import Analyser
+from service.roles.link_news import LinkNews
+from service.roles.unit_memory import UnitMemory
+from service.store.positions_port import StreamPosition
+from service.stream.identity import UnitIdentity
+from service.stream.memory import read, written
+from service.stream.window import Window
+from service.stream.wire import decoded
+from service.stream.wire_errors import WireError
+
+log = structlog.get_logger()
+
+
+class UnitProgress:
+    """Takes the messages of one unit in, in order and each once.
+
+    Messages up to the stored position are seen once more without a word, so that the monitor holds
+    what it held; from then on everything is as if it had never stopped.
+
+    Parameters
+    ----------
+    stored
+        How far results reach that are stored, on the same stream; None where there are none.
+    """
+
+    def __init__(
+        self,
+        identity: UnitIdentity,
+        stream: str,
+        stored: StreamPosition | None,
+        analyser: Analyser,
+        live: LiveView,
+        recorder: Recorder,
+    ) -> None:
+        self.unit, self._identity, self._stream = identity.unit, identity, stream
+        self._analyser, self._live, self._recorder = analyser, live, recorder
+        self._window = Window()
+        self._stored = stored
+        self._memory: UnitMemory | None = None
+        self.sequence = 0
+        self.refused: Counter[str] = Counter()
+        self.n_repeated = 0
+        if stored is not None:
+            self._go_on(stored)
+
+    @property
+    def first_needed(self) -> int:
+        """First message that is wanted, at the start."""
+        return 1 if self._stored is None else self._stored.window_sequence
+
+    def reaches_back(self, first_sequence: int) -> None:
+        """Hear where the stream begins now.
+
+        What is there no more is a gap in the samples, which the monitor finds by their index.
+        """
+        stored, memory = self._stored, self._memory
+        if stored is None or memory is None or self.sequence:
+            return
+        if first_sequence > stored.sequence + 1:
+            log.error("the stream does not reach back to what is stored", unit=self.unit)
+        elif first_sequence > stored.window_sequence:
+            log.warning("the stream holds less than the window", unit=self.unit)
+        if first_sequence <= stored.sequence:
+            self._analyser.rewind(self.unit, memory)
+
+    async def take(self, sequence: int, payload: bytes) -> bool:
+        """Take a message in; False if it is refused."""
+        if sequence <= self.sequence:
+            self.n_repeated += 1
+            return True
+        try:
+            message = decoded(payload, self._identity)
+        except WireError as error:
+            self._refuse(error)
+            self.sequence = sequence
+            return False
+        if self._stored is not None and sequence <= self._stored.sequence:
+            await self._relive(sequence, message)
+        else:
+            self._settle()
+            await self._live_on(sequence, message)
+        return True
+
+    def position(self) -> StreamPosition:
+        """How far the unit is; its memory of now goes with it."""
+        memory = written(self._analyser.memory(self.unit))
+        first = self._window.first(self.sequence + 1)
+        return StreamPosition(self.unit, self._stream, self.sequence, first, memory)
+
+    @property
+    def is_reliving(self) -> bool:
+        """Whether what was taken in last is stored already."""
+        return self._stored is not None and self.sequence <= self._stored.sequence
+
+    def fall_silent(self, after_s: float) -> None:
+        """Count the unit as lost where nothing has come of it for so long."""
+        age_s, status = self._live.data_age_s(self.unit), self._live.status(self.unit)
+        if status.state is LinkState.CONNECTED and age_s is not None and age_s > after_s:
+            reason = f"no block for {after_s:g} s: is `padwatch acquire` running?"
+            self._hear(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
+
+    def _go_on(self, stored: StreamPosition) -> None:
+        self._memory = read(stored.memory)
+        if self._memory is None:
+            log.error("what was known of a unit is of another version", unit=self.unit)
+            return
+        self._analyser.resume(self.unit, self._memory)
+
+    async def _relive(self, sequence: int, message: SampleBlock | LinkNews) -> None:
+        self.sequence = sequence
+        if isinstance(message, LinkNews):
+            self._live.set_link(self.unit, message.state, message.reason)
+            return
+        self._live.set_link(self.unit, LinkState.CONNECTED)
+        await self._analyser.relive(message)
+        self._window.note(sequence, message, self._analyser.state(self.unit))
+
+    def _settle(self) -> None:
+        """After the last message that was seen once more."""
+        if self._memory is not None and self.sequence:
+            self._analyser.settle(self.unit, self._memory)
+        self._stored = self._memory = None
+
+    async def _live_on(self, sequence: int, message: SampleBlock | LinkNews) -> None:
+        if isinstance(message, LinkNews):
+            self._hear(message)
+            self.sequence = sequence
+            return
+        if self._live.status(self.unit).state is not LinkState.CONNECTED:
+            self._hear(LinkNews(self.unit, LinkState.CONNECTED))
+        findings = await self._analyser.learn(message)
+        self.sequence = sequence
+        self._window.note(sequence, message, self._analyser.state(self.unit))
+        if findings != Findings():
+            self._recorder.put(replace(findings, position=self.position()))
+
+    def _hear(self, news: LinkNews) -> None:
+        if self._live.set_link(news.unit, news.state, news.reason):
+            tell = log.info if news.is_connected else log.warning
+            tell(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
+        self._analyser.hear(news)
+
+    def _refuse(self, error: WireError) -> None:
+        if not self.refused[error.kind]:
+            log.error("a message is refused", unit=self.unit, reason=str(error))
+        self.refused[error.kind] += 1
