@@ -11,9 +11,9 @@ import pytest
 
 from service.audit.entry import Deed
 from service.audit.head import head_path
-from service.store.sqlite.trail import verify_trail
 from service.store.audit_chain import COLUMNS
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.trail import verify_trail
 
 N_ENTRIES = 9
 N_CORRUPTIONS = 2000

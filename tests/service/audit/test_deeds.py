@@ -18,12 +18,12 @@ from core.condition.operating_state import OperatingState
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import AuditEntry, Source
 from service.audit.life import Release, start_deeds, stop_deed
-from service.store.sqlite.trail import verify_trail
 from service.store.audit_port import AuditQuery
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.trail import verify_trail
 from service.store.vector_reference_port import SetVectorReference
 
 T0 = 1_767_225_600_000_000_000

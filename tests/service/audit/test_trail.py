@@ -16,10 +16,10 @@ from core.account import Gap
 from service.audit.entry import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
 from service.audit.head import AuditHead, head_path, read_head
 from service.audit.walk import HEAD_DIFFERED
-from service.store.sqlite.trail import verify_trail
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, UnitGap
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.trail import verify_trail
 
 Build = Callable[..., Deed]
 
