@@ -60,9 +60,10 @@ accuracy: install
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2
 
 SEED ?= $(shell date +%s)
+PLANTED = $$(grep -rl --include='test_*.py' mark.planted tests --exclude-dir torture)
 torture: install
-	@echo "make torture SEED=$(SEED)"
-	$(BIN)/python -m pytest tests/torture --torture --torture-seed $(SEED) --durations 20
+	@echo "make torture SEED=$(SEED); it takes hours"
+	$(BIN)/python -m pytest tests/torture $(PLANTED) --torture --torture-seed $(SEED) --durations 20
 
 format: install
 	$(BIN)/ruff format .

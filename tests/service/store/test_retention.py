@@ -369,8 +369,14 @@ def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
 @pytest.mark.parametrize(
     ("module", "name", "bug"),
     [
-        (rolling, "merge_late", overwritten),
-        (deleting, "_stands_in", lambda *_: True),
+        pytest.param(
+            *(rolling, "merge_late", overwritten),
+            marks=pytest.mark.planted("late readings overwrite what was rolled up"),
+        ),
+        pytest.param(
+            *(deleting, "_stands_in", lambda *_: True),
+            marks=pytest.mark.planted("readings deleted before they were rolled up"),
+        ),
     ],
 )
 def test_planted_bugs_are_found(

@@ -148,6 +148,7 @@ async def test_a_process_killed_after_its_commit_is_not_followed_by_a_second_tim
     assert store.commands.look(command.id).state is CommandState.DONE
 
 
+@pytest.mark.planted("command answered apart from what it did")
 async def test_an_answer_apart_from_the_event_would_be_noticed(
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
