@@ -1,0 +1,82 @@
+"""A program that goes on when the disk fails, again and again: one process for each time.
+
+``python -m harness.enduring DEEDS [BUG]``: for each folder on its standard input, a process of its
+own stops until it is continued, then appends the transactions that are pickled in the file DEEDS to
+a store there. One that fails is tried again, as the service does. The numbers of those that are
+durable go into the file ``acks``, what failed into ``errors``. Says the number of each process, and
+when it has ended ``END`` and its exit code: 0 if all are durable, 3 if it gave up.
+"""
+
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from harness.deeds import Deed, letters
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+
+ATTEMPTS = 4
+GAVE_UP = 3
+DATABASE = "padwatch.sqlite3"
+
+
+def main() -> None:
+    """Begin one process after the other."""
+    with Path(sys.argv[1]).open("rb") as file:
+        deeds: list[Deed] = pickle.load(file)  # noqa: S301  our own
+    for line in sys.stdin:
+        sys.stdout.flush()
+        pid = os.fork()
+        if pid == 0:
+            os.kill(os.getpid(), signal.SIGSTOP)
+            os._exit(_endure(Path(line.strip()), deeds, sys.argv[2:]))
+        print(pid, flush=True)
+        _, status = os.waitpid(pid, 0)
+        print("END", os.waitstatus_to_exitcode(status), flush=True)
+
+
+def _endure(folder: Path, deeds: Sequence[Deed], bugs: Sequence[str]) -> int:
+    acks = os.open(folder / "acks", os.O_WRONLY | os.O_CREAT)
+    errors = os.open(folder / "errors", os.O_WRONLY | os.O_CREAT)
+    path = folder / "data" / DATABASE
+    store = _opened(path, errors)
+    if store is None:
+        return GAVE_UP
+    for number, deed in enumerate(deeds):
+        if not _is_done(store, deed, errors, bugs) and "promises_anyway" not in bugs:
+            return GAVE_UP
+        os.write(acks, f"{number}\n".encode())
+    with suppress(StoreError):
+        store.close()
+    return 0
+
+
+def _opened(path: Path, errors: int) -> SqliteStore | None:
+    for _ in range(ATTEMPTS):
+        try:
+            return SqliteStore(path, address=letters)
+        except StoreError as error:
+            os.write(errors, f"open: {error}\n".encode())
+    return None
+
+
+def _is_done(store: SqliteStore, deed: Deed, errors: int, bugs: Sequence[str]) -> bool:
+    for _ in range(ATTEMPTS):
+        try:
+            if "in_two_parts" in bugs:
+                store.append([deed.assessment], [deed.gap])
+                store.append([], [], [deed.alarm], [deed.film])
+            deed.append_to(store)
+        except StoreError as error:
+            os.write(errors, f"{error}\n".encode())
+        else:
+            return True
+    return False
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,180 @@
+"""Any write or sync fails, once or for ever: transactions are whole or absent, the store lives."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.deeds import Build, Loss, deed, letters, loss
+from harness.enduring import DATABASE, GAVE_UP
+from harness.failing_calls import Case, FailingCalls, Outcome, failing_calls, n_calls
+
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+from service.store.sqlite.trail import verify_trail
+
+N_DEEDS = 8
+FAILURES = (
+    ("pwrite64", "EIO"),
+    ("pwrite64", "ENOSPC"),
+    ("fdatasync", "EIO"),
+    ("fsync", "EIO"),
+    ("ftruncate", "EIO"),
+    ("rename", "EIO"),
+)
+N_CASES = 300
+"""Of the fast run a twenty-fifth of it; of the long one all there are."""
+
+pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
+
+
+Begun = Callable[..., AbstractContextManager[FailingCalls]]
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build) -> Begun:
+    """Starts what processes are begun from, perhaps with a bug."""
+    deeds = [deed(torture_seed, n, assessment) for n in range(N_DEEDS)]
+    return lambda *bugs: failing_calls(tmp_path_factory.mktemp("calls"), deeds, *bugs)
+
+
+@pytest.fixture(scope="module")
+def calls(begun: Begun) -> Iterator[FailingCalls]:
+    """Processes of the store as it is."""
+    with begun() as running:
+        yield running
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> Path:
+    """A folder with a database that is up to date and has nothing in it."""
+    folder = tmp_path / "empty"
+    (folder / "data").mkdir(parents=True)
+    SqliteStore(folder / "data" / DATABASE, address=letters).close()
+    return folder
+
+
+def all_cases(tape: Path) -> list[Case]:
+    """Every call of a run that may fail, in every way."""
+    return [
+        Case(call, error, number, is_for_ever)
+        for call, error in FAILURES
+        for number in range(1, n_calls(tape, call) + 1)
+        for is_for_ever in (False, True)
+    ]
+
+
+def wrong(folder: Path, outcome: Outcome, seed: int, build: Build) -> Loss | str | None:
+    """What is lost, torn or altered when the database is opened again; None if nothing is."""
+    path = folder / "data" / DATABASE
+    try:
+        with closing(SqliteStore(path)) as store:
+            found = loss(store, seed, outcome.acknowledged, N_DEEDS - 1, build)
+            if found:
+                return found
+            if store.integrity.found:
+                return f"{store.integrity.found}"
+    except StoreError as error:
+        return None if outcome.acknowledged < 0 else str(error)
+    # a trail without any entry has no head until there is one
+    is_whole = outcome.acknowledged < 0 or verify_trail(path).is_whole
+    return None if is_whole else "the audit trail is not whole"
+
+
+def require_all_or_nothing(
+    calls: FailingCalls, base: Path, n: int | None, seed: int, build: Build
+) -> None:
+    """Let chosen calls fail, n of them or all, each on a copy of a folder."""
+    folder = base.with_name("case")
+    shutil.copytree(base, folder)
+    undisturbed = calls.run(folder)
+    assert (undisturbed.exit_code, undisturbed.errors) == (0, ())
+    cases = all_cases(folder / "tape")
+    rng = np.random.default_rng(seed)
+    chosen = range(len(cases)) if n is None else rng.choice(len(cases), n, replace=False).tolist()
+    n_failed = 0
+    for case in (cases[i] for i in sorted(chosen)):
+        shutil.rmtree(folder)
+        shutil.copytree(base, folder)
+        outcome = calls.run(folder, str(case))
+        assert outcome.exit_code in ((0, GAVE_UP) if case.is_for_ever else (0,)), (case, outcome)
+        assert wrong(folder, outcome, seed, build) is None, (case, outcome)
+        n_failed += bool(outcome.errors)
+    print(f"{len(chosen)} of {len(cases)} calls failed, {n_failed} times the store said so")
+
+
+@pytest.mark.timeout(7200)
+def test_whatever_call_fails_a_transaction_is_whole_or_absent_and_the_store_goes_on(
+    calls: FailingCalls,
+    empty: Path,
+    torture_seed: int,
+    assessment: Build,
+    times: Callable[[int], int],
+) -> None:
+    n = None if times(N_CASES) == N_CASES else times(N_CASES)
+    require_all_or_nothing(calls, empty, n, torture_seed, assessment)
+
+
+@pytest.mark.timeout(3600)
+def test_whatever_call_fails_a_new_database_is_made_all_the_same(
+    calls: FailingCalls,
+    tmp_path: Path,
+    torture_seed: int,
+    assessment: Build,
+    times: Callable[[int], int],
+) -> None:
+    nothing = tmp_path / "nothing"
+    nothing.mkdir()
+    require_all_or_nothing(calls, nothing, times(N_CASES // 2), torture_seed, assessment)
+
+
+def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") -> Outcome:
+    """Let no call of a kind succeed any more, half way."""
+    folder = base.with_name("case")
+    shutil.copytree(base, folder)
+    calls.run(folder)
+    n = n_calls(folder / "tape", call)
+    shutil.rmtree(folder)
+    shutil.copytree(base, folder)
+    return calls.run(folder, str(Case(call, "EIO", n // 2, True)))
+
+
+def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
+    calls: FailingCalls, empty: Path, torture_seed: int, assessment: Build
+) -> None:
+    outcome = failing_for_ever(calls, empty, "fdatasync")
+
+    assert outcome.exit_code == GAVE_UP
+    assert 0 <= outcome.acknowledged < N_DEEDS - 1
+    assert all("SQLITE_IOERR" in error for error in outcome.errors)
+    assert wrong(empty.with_name("case"), outcome, torture_seed, assessment) is None
+
+
+@pytest.mark.parametrize(("bug", "what"), [("promises_anyway", "lost"), ("in_two_parts", "torn")])
+def test_planted_bugs_are_found(
+    begun: Begun, empty: Path, torture_seed: int, assessment: Build, bug: str, what: str
+) -> None:
+    """A program that promises what was refused, and one that writes in two transactions."""
+    with begun(bug) as calls:
+        provoke = {"lost": failing_for_ever, "torn": stopped_between}[what]
+        outcome = provoke(calls, empty)
+    found = wrong(empty.with_name("case"), outcome, torture_seed, assessment)
+
+    assert isinstance(found, Loss)
+    assert getattr(found, what)
+
+
+def stopped_between(calls: FailingCalls, base: Path) -> Outcome:
+    """Let syncs fail for ever from the second transaction of a deed on."""
+    folder = base.with_name("case")
+    for number in range(2, 40):
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(base, folder)
+        outcome = calls.run(folder, str(Case("fdatasync", "EIO", number, True)))
+        with closing(SqliteStore(folder / "data" / DATABASE)) as store:
+            n_gaps = len(store.gaps("U1", 0, 2**62))
+            if n_gaps > len(store.alarms()):
+                return outcome
+    pytest.fail("the second transaction could not be hit")
