@@ -36,14 +36,18 @@ def settings(name: str) -> dict[str, list[str]]:
     return found
 
 
-def test_there_is_a_service_and_a_backup_every_night() -> None:
-    assert SERVICES == ["padwatch-backup.service", "padwatch.service"]
+def test_there_is_a_service_in_one_or_several_processes_and_a_backup_every_night() -> None:
+    roles = ["padwatch-acquire.service", "padwatch-analyse@.service", "padwatch-serve.service"]
+    assert sorted(["padwatch.service", "padwatch-backup.service", *roles]) == SERVICES
     assert settings("padwatch-backup.timer")["OnCalendar"]
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_service_is_hardly_exposed(name: str) -> None:
-    said = analyse("security", "--offline=true", str(UNITS / name))
+def test_a_service_is_hardly_exposed(name: str, tmp_path: Path) -> None:
+    instance = tmp_path / name.replace("@", "@1-2")
+    instance.write_bytes((UNITS / name).read_bytes())
+
+    said = analyse("security", "--offline=true", str(instance))
 
     level = re.search(r"Overall exposure level for \S+: ([0-9.]+)", said)
     assert level is not None, said
@@ -57,7 +61,10 @@ def test_systemd_understands_every_line_of_a_unit(name: str, tmp_path: Path) -> 
         text = re.sub(r"^ExecStart=\S+", "ExecStart=/bin/true", text, flags=re.MULTILINE)
         (tmp_path / path.name).write_text(text, encoding="utf-8")
 
-    said = analyse("verify", "--man=no", str(tmp_path / name))
+    instance = tmp_path / name.replace("@", "@1-2")
+    instance.write_bytes((tmp_path / name).read_bytes())
+
+    said = analyse("verify", "--man=no", str(instance))
 
     assert [line for line in said.splitlines() if "padwatch" in line] == []
 
@@ -73,8 +80,9 @@ def test_a_service_runs_a_command_that_there_is(name: str) -> None:
     assert all(option in helped.output for option in options if option.startswith("--"))
 
 
-def test_the_service_is_watched_and_begins_anew() -> None:
-    found = settings("padwatch.service")
+@pytest.mark.parametrize("name", [name for name in SERVICES if name != "padwatch-backup.service"])
+def test_the_service_is_watched_and_begins_anew(name: str) -> None:
+    found = settings(name)
 
     assert found["Type"] == ["notify"]
     assert found["WatchdogSec"] == ["30"]
