@@ -159,7 +159,9 @@ class Caretaker:
         for kind, root in self._custody.roots.items():
             space = self._custody.measure(root)
             limits = self._custody.space.of(space.total_bytes)
-            alert, danger = limits.alert_below or 0.0, limits.danger_below or 0.0
+            # more than the alarm needs, so that recordings never raise it
+            alert = (limits.alert_below or 0.0) + limits.deadband
+            danger = limits.danger_below or 0.0
             if kind is WaveformKind.CONTINUOUS:
                 soft = round(alert * space.total_bytes) - space.free_bytes
                 self.is_full = space.free_share < danger

@@ -9,6 +9,7 @@ from service.space.limits import SpaceLimits
 from service.space.watch import SpaceWatch
 from service.wiring.captures import CAPTURES
 from service.wiring.evidence import EVIDENCE
+from service.wiring.tapes import RECORDINGS, recordings_folder
 
 BYTES_PER_GB = 1e9
 
@@ -17,6 +18,8 @@ def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
     """Looks at whatever the plant's data are on; captures may be on a disk of their own."""
     data = Path(plant.service.data_folder)
     folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
+    if plant.recording.samples == "kept":
+        folders[RECORDINGS] = recordings_folder(plant)
     return SpaceWatch(folders, space_limits(plant.space), clock)
 
 

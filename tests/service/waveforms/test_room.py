@@ -49,7 +49,7 @@ def test_a_disk_that_is_nearly_full_costs_continuous_recordings_only(rig: Any) -
     kept = [rig.make(hour).name for hour in range(4)]
     size = size_of(rig)
     total = 1000 * size
-    rig.space = DiskSpace(1, total, round(0.1 * total - 1.5 * size))
+    rig.space = DiskSpace(1, total, round(0.11 * total - 1.5 * size))
     rig.caretaker.look()
 
     assert rig.names() == kept[2:]
