@@ -7,7 +7,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import oaconvolve
 
 from core.arrays import ComplexArray, FloatArray
 from core.key_phase import ODD_TURN, rising_edges
@@ -70,6 +69,8 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
     turned = np.where(there, trace_um, 0.0) * np.exp(
         -2.0j * math.pi * frequency_hz / rate_hz * np.arange(trace_um.size)
     )
+    from scipy.signal import oaconvolve  # slow to load, and not needed to begin
+
     weight = oaconvolve(there.astype(np.float64), taper, mode="same")
     total = oaconvolve(turned, taper, mode="same")
     phasors: ComplexArray = np.full(trace_um.size, np.nan, dtype=np.complex128)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from core.arrays import ComplexArray, FloatArray
 
@@ -118,6 +117,8 @@ class ResponseTable:
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
         """Complex factor at frequencies above zero, (n_lines,)."""
+        from scipy.interpolate import PchipInterpolator  # slow to load, and not needed to begin
+
         points = np.log(self.frequency_hz)
         phase_rad = np.unwrap(np.radians(self.phase_deg))
         values = np.stack([np.log(self.magnitude), phase_rad])

@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-import scipy.signal
 
 from core.arrays import FloatArray
 from core.units import STANDARD_GRAVITY_M_S2
@@ -49,11 +48,15 @@ class AccelerometerNoise:
 
     def advance(self, n_samples: int) -> FloatArray:
         """Give the next noise, (n_channels, n_samples)."""
+        import scipy.signal  # slow to load, and not needed to begin
+
         white, pink = self._white * self._random.standard_normal((2, self._n_channels, n_samples))
         pink, self._pink_state = scipy.signal.sosfilt(self._pink, pink, zi=self._pink_state)
         return np.array(list(self._floored(white + pink))).reshape(white.shape)
 
     def _floored(self, noise: FloatArray) -> Iterator[FloatArray]:
+        import scipy.signal  # slow to load, and not needed to begin
+
         for channel, floor in enumerate(self._floors):
             row, self._floor_states[channel] = scipy.signal.sosfilt(
                 floor, noise[channel], zi=self._floor_states[channel]
@@ -63,6 +66,8 @@ class AccelerometerNoise:
 
 def _floor(integrates: bool, rate_hz: float) -> FloatArray:
     """High-pass of order 2, from m/s² to m/s² or, with one zero less, to mm/s."""
+    import scipy.signal  # slow to load, and not needed to begin
+
     floor_rad_s = 2.0 * math.pi * FLOOR_HZ
     numerator = [1e3, 0.0] if integrates else [1.0, 0.0, 0.0]
     denominator = [1.0, math.sqrt(2.0) * floor_rad_s, floor_rad_s**2]
@@ -71,6 +76,8 @@ def _floor(integrates: bool, rate_hz: float) -> FloatArray:
 
 def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
     """Filter whose power falls as corner / f: poles and zeros take turns (Oustaloup, 1991)."""
+    import scipy.signal  # slow to load, and not needed to begin
+
     low_hz, high_hz = PINK_BAND_HZ
     high_hz = min(high_hz, 0.3 * rate_hz)
     n_poles = math.ceil(POLES_PER_DECADE * math.log10(high_hz / low_hz))

@@ -4,7 +4,6 @@ import math
 from typing import Protocol
 
 import numpy as np
-import scipy.signal
 
 from acquisition.simulated.rotation import Turning
 from core.arrays import FloatArray
@@ -85,6 +84,8 @@ class HydraulicForce:
 
     def advance(self, n_samples: int) -> FloatArray:
         """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        import scipy.signal  # slow to load, and not needed to begin
+
         force_n = self._rms_n * self._random.standard_normal((n_samples, 2)).T
         if self._sections is not None:
             force_n, self._filter_state = scipy.signal.sosfilt(
@@ -99,6 +100,8 @@ def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
 
 def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
     """Second-order sections that keep the rms value of white noise."""
+    import scipy.signal  # slow to load, and not needed to begin
+
     sections: FloatArray = scipy.signal.butter(
         CUTOFF_FILTER_ORDER, cutoff_hz, fs=rate_hz, output="sos"
     )

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from acquisition.errors import ConfigError
 from core.arrays import ComplexArray, FloatArray
@@ -74,6 +73,8 @@ class _Stage:
     state: FloatArray | None = None
 
     def advance(self, samples: FloatArray) -> FloatArray:
+        import scipy.signal  # slow to load, and not needed to begin
+
         if self.state is None:
             self.state = scipy.signal.lfilter_zi(self.numerator, self.denominator) * samples[0]
         filtered, self.state = scipy.signal.lfilter(
@@ -146,4 +147,6 @@ def _taps(columns: ComplexArray, wanted: FloatArray) -> FloatArray:
 def _response(
     numerator: FloatArray, denominator: FloatArray, frequency_hz: FloatArray, rate_hz: float
 ) -> ComplexArray:
+    import scipy.signal  # slow to load, and not needed to begin
+
     return np.asarray(scipy.signal.freqz(numerator, denominator, frequency_hz, fs=rate_hz)[1])

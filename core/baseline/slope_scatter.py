@@ -7,7 +7,6 @@ in the contrast to where the surface is flat; slopes that are all alike tell not
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from core.arrays import FloatArray
 from core.baseline.robust import robust_std
@@ -54,6 +53,8 @@ def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
     ----------
     slope, deviation : (n,)
     """
+    from scipy.optimize import nnls  # slow to load, and not needed to begin
+
     flat_square = float(np.quantile(slope**2, FLAT_SHARE))
     steep = np.maximum(slope**2 - flat_square, 0.0)
     terms = np.stack([np.ones(slope.size), steep], axis=1)

@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from core.arrays import FloatArray
 
@@ -55,6 +54,8 @@ def running_median(deviation: FloatArray) -> FloatArray:
 
 def forgetting_sum(x: FloatArray, forgotten: float) -> FloatArray:
     """(n,) sums in which the newest of x has weight `forgotten`."""
+    from scipy.signal import lfilter  # slow to load, and not needed to begin
+
     return np.asarray(lfilter([forgotten], [1.0, forgotten - 1.0], x))
 
 

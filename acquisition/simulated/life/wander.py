@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import scipy.signal
 
 from core.arrays import FloatArray
 
@@ -12,6 +11,8 @@ def wander(
     random: np.random.Generator, n: int, step_s: float, time_s: float, rms: float
 ) -> FloatArray:
     """First-order Gauss-Markov wander about zero, stationary from the first row on."""
+    import scipy.signal  # slow to load, and not needed to begin
+
     memory = math.exp(-step_s / time_s)
     fresh = random.standard_normal(n)
     fresh[1:] *= math.sqrt(1.0 - memory**2)
@@ -46,6 +47,8 @@ def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float
     initial
         Value before the first row.
     """
+    import scipy.signal  # slow to load, and not needed to begin
+
     followed = np.empty_like(target)
     edges = np.flatnonzero(np.diff(time_s)) + 1
     value = initial
