@@ -115,6 +115,17 @@ class Recorder:
                 lambda: all(findings.position is not position for findings in self._waiting)
             )
 
+    async def require_store(self) -> None:
+        """See whether something could be written now, by a transaction without anything in it.
+
+        Raises
+        ------
+        StoreError
+            If not.
+        """
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._thread, self._store.append, [], [])
+
     async def settled(self) -> None:
         """Wait until everything is on the disk, or the store has refused to take it."""
         async with self._progress:

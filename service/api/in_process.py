@@ -11,6 +11,7 @@ from service.films.actions import Action as BaselineAction
 from service.films.keeper import FilmKeeper
 from service.films.learning import FilmPlace
 from service.recorder import Recorder
+from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
 """How long an operator waits for the disk at most."""
@@ -23,7 +24,11 @@ class InProcess:
         self._alarms, self._films, self._recorder = alarms, films, recorder
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Do something to an alarm, and return when it is on the disk."""
+        """Do something to an alarm, and return when it is on the disk.
+
+        While the store takes nothing, nothing is done: what people did must be in the audit trail.
+        """
+        await self._require_store(self._alarms.alarm(id_))
         alarm = self._alarms.operate(id_, action)
         try:
             async with asyncio.timeout(STORED_WITHIN_S):
@@ -35,6 +40,17 @@ class InProcess:
                 " a restart now would undo it. It is tried again until it is stored",
             ) from error
         return alarm
+
+    async def _require_store(self, alarm: Alarm) -> None:
+        try:
+            async with asyncio.timeout(STORED_WITHIN_S):
+                await self._recorder.require_store()
+        except (StoreError, TimeoutError) as error:
+            raise NotCarriedOutError(
+                "Nothing was done",
+                f"alarm {alarm.identity.id} is {alarm.state.value}, as before: what people do is"
+                f" done only if it can be stored ({error or 'the store does not answer'})",
+            ) from error
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
         """Do something to the baselines of a bearing."""

@@ -2,6 +2,7 @@
 
 import sqlite3
 from pathlib import Path
+from threading import Lock
 
 from service.audit.head import head_path
 from service.origin import Origin
@@ -62,3 +63,8 @@ class SqliteStore(SqlStore):
     def _writer(self) -> sqlite3.Connection:
         """The connection that writes now; another one after an error of the disk."""
         return self._file.writer.connection
+
+    @property
+    def _lock(self) -> Lock:
+        """Held while somebody writes."""
+        return self._file.writer.lock

@@ -3,6 +3,7 @@
 import asyncio
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from typing import Any
 
 import httpx2
@@ -321,6 +322,27 @@ async def test_a_wrong_question_is_refused_by_name(
     problem = await service.problem(f"{ALARMS}/events", 422, **wanted)
 
     assert problem["errors"][0]["parameter"] == named
+
+
+async def test_while_nothing_can_be_stored_nothing_is_done(
+    service: Any, probes: Probes, as_problem: AsProblem
+) -> None:
+    probes.send(3, Reason.SENSOR_FAILURE)
+    await probes.stored()
+    with closing(sqlite3.connect(service.store._path)) as connection, connection:
+        connection.execute(
+            "CREATE TRIGGER no BEFORE INSERT ON high_water BEGIN SELECT RAISE(ABORT, 'full'); END"
+        )
+
+    answer = await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})
+
+    assert answer.status_code == 503
+    assert as_problem(answer)["title"] == "Nothing was done"
+    (alarm,) = (await service.json(ALARMS))["alarms"]
+    assert (alarm["state"], alarm["is_acknowledged"]) == ("unacknowledged", False)
+    with closing(sqlite3.connect(service.store._path)) as connection, connection:
+        connection.execute("DROP TRIGGER no")
+    assert (await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})).status_code == 200
 
 
 async def test_what_cannot_be_stored_is_said_and_kept(
