@@ -257,7 +257,7 @@ class Captures:
     def _clear(self) -> None:
         """Remove what a crash has left; in the thread."""
         try:
-            for folder in clear_leftovers(self._root):
+            for folder in clear_leftovers(self._root, self._histories):
                 log.warning("an unfinished capture is removed", folder=folder.name)
         except OSError as error:
             self._tell(str(error))

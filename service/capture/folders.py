@@ -1,7 +1,7 @@
 """The folder of captures: names, and what a crash has left in it."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,6 +9,7 @@ from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recording.writer import INCOMPLETE
 from core.alarms.event import AlarmEvent
 from core.units import NS_PER_S
+from service.continuous.names import unit_of
 
 ALARM = "alarm.json"
 
@@ -33,9 +34,12 @@ def aside(folder: Path) -> Path:
     return folder.with_name(folder.name + INCOMPLETE)
 
 
-def clear_leftovers(root: Path) -> list[Path]:
-    """Remove what was being written when the service was killed; it can no longer be read."""
-    left = [path for path in _folders(root) if path.name.endswith(INCOMPLETE)]
+def clear_leftovers(root: Path, units: Container[str | None]) -> list[Path]:
+    """Remove what was being written of units when the service was killed: it cannot be read.
+
+    Other processes may be writing captures of other units.
+    """
+    left = [p for p in _folders(root) if p.name.endswith(INCOMPLETE) and unit_of(p.name) in units]
     for path in left:
         _remove(path)
     return left

@@ -1,6 +1,6 @@
 """Parts of a stretch made into one recording, now or after a crash."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from pathlib import Path
 
 import structlog
@@ -9,7 +9,7 @@ from acquisition.errors import ConfigError
 from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES, RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.writer import INCOMPLETE, RecordingWriter
-from service.continuous.names import PARTS, damaged_folder, joined_folder, parts_folder
+from service.continuous.names import PARTS, damaged_folder, joined_folder, parts_folder, unit_of
 
 log = structlog.get_logger()
 
@@ -36,14 +36,16 @@ def join(folder: Path) -> bool:
     return folder.exists()
 
 
-def unjoined(root: Path) -> list[Path]:
-    """Stretches that a crash has left in parts, oldest first of each unit."""
-    if not root.is_dir():
-        return []
-    return [joined_folder(path) for path in sorted(root.glob(f"*{PARTS}")) if path.is_dir()]
+def unjoined(root: Path, units: Container[str | None]) -> list[Path]:
+    """Stretches of units that a crash has left in parts, oldest first of each.
+
+    Other processes may be writing those of other units.
+    """
+    found = sorted(path for path in root.glob(f"*{PARTS}") if unit_of(path.name) in units)
+    return [joined_folder(path) for path in found if path.is_dir()]
 
 
-def clear_unfinished(root: Path) -> None:
+def clear_unfinished(root: Path, units: Container[str | None]) -> None:
     """Remove what was being joined when the service was killed; its parts are still there.
 
     Raises
@@ -52,7 +54,8 @@ def clear_unfinished(root: Path) -> None:
         If the disk refuses.
     """
     for path in sorted(root.glob(f"*{INCOMPLETE}")):
-        _remove_folder(path)
+        if unit_of(path.name) in units:
+            _remove_folder(path)
 
 
 def _readable(parts: Path) -> Iterator[Recording]:

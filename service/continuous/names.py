@@ -1,6 +1,7 @@
 """Names of the folders of a continuous recording, finished or being written."""
 
 import os
+import re
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,6 +12,9 @@ KIND = "continuous"
 
 PARTS = ".parts"
 """Ending of the folder that holds the parts of a stretch until they are joined."""
+
+NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
+"""How the name of a recording begins: with its unit and its time."""
 
 DAMAGED = ".damaged"
 """Ending of what was set aside because it cannot be read."""
@@ -26,6 +30,12 @@ def stretch_folder(root: Path, unit: str, start_ns: int) -> Path:
         n += 1
         folder = root / f"{name}-{n}"
     return folder
+
+
+def unit_of(name: str) -> str | None:
+    """The unit that a recording is of by its name; None if that is not the name of one."""
+    found = NAME.match(name)
+    return found[1] if found else None
 
 
 def parts_folder(folder: Path) -> Path:

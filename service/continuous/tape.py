@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from operator import methodcaller
 from pathlib import Path
@@ -55,6 +55,8 @@ class Tape:
         What is recorded; blocks of others are let pass.
     press
         Why nothing is to be recorded just now, if so.
+    owned
+        Units whose recordings may have been left unfinished, recorded now or not.
 
     Attributes
     ----------
@@ -73,7 +75,9 @@ class Tape:
         settings: TapeSettings,
         clock: Clock,
         press: Callable[[], Shed | None] = unpressed,
+        owned: Collection[str] = (),
     ) -> None:
+        self._owned = {*units, *owned}
         self._root, self._units, self._settings = root, units, settings
         self._clock, self._press = clock, press
         self._tapes: dict[str, UnitTape] = {}
@@ -230,8 +234,8 @@ class Tape:
     def _recover(self) -> None:
         """Make recordings of what a crash has left; in the thread."""
         try:
-            left = unjoined(self._root)
-            clear_unfinished(self._root)
+            left = unjoined(self._root, self._owned)
+            clear_unfinished(self._root, self._owned)
         except OSError as error:
             self._tell(str(error))
             return

@@ -58,6 +58,10 @@ class UnitTape:
         TapeError
             If it cannot be kept, or if what was to be kept before it cannot.
         """
+        fresh = self._fresh(block)
+        if fresh is None:
+            return
+        block = fresh
         if self._stretch is not None and not self._stretch.goes_on_to(block):
             self.end()
         try:
@@ -93,6 +97,14 @@ class UnitTape:
         if stretch is not None:
             self.ended.append(stretch.folder)
             self._finish_part(stretch)
+
+    def _fresh(self, block: SampleBlock) -> SampleBlock | None:
+        """What of a block is not recorded already, as after a restart; None if all of it is."""
+        if self._end is None or self._end[0] != block.epoch or block.first_index >= self._end[1]:
+            return block
+        if block.stop_index <= self._end[1]:
+            return None
+        return block.from_sample(self._end[1] - block.first_index)
 
     def _put(self, block: SampleBlock, now_s: float) -> None:
         told = self._hole.before(block)

@@ -12,6 +12,7 @@ from service.heartbeats import UNHEARD, Pulse
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind
 from service.waveforms.caretaker import Caretaker, Findings
+from service.waveforms.watch_keeping import WatchKeeping
 
 log = structlog.get_logger()
 
@@ -33,6 +34,8 @@ class WaveformKeeper:
     ----------
     hire
         Makes the caretaker; called in the thread, and again while the store or the disk refuses.
+    watch
+        Says whether it is this process that looks after them.
 
     Attributes
     ----------
@@ -44,8 +47,8 @@ class WaveformKeeper:
         Why the last look failed; None if it did not.
     """
 
-    def __init__(self, hire: Callable[[], Caretaker], clock: Clock) -> None:
-        self._hire, self._clock = hire, clock
+    def __init__(self, hire: Callable[[], Caretaker], clock: Clock, watch: WatchKeeping) -> None:
+        self._hire, self._clock, self._watch = hire, clock, watch
         self._caretaker: Caretaker | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="waveforms")
         self.faults = NONE_DAMAGED
@@ -81,12 +84,14 @@ class WaveformKeeper:
     def close(self) -> None:
         """Let go of the thread."""
         self._thread.shutdown(wait=False)
+        self._watch.release()
 
     def look(self) -> None:
         """Look once; in the thread."""
         try:
-            self._caretaker = self._caretaker or self._hire()
-            self._caretaker.look()
+            if self._watch.take():
+                self._caretaker = self._caretaker or self._hire()
+                self._caretaker.look()
             self._tell(None)
         except (OSError, StoreError) as error:
             self._tell(str(error))

@@ -33,4 +33,5 @@ def tape_of(
         and not isinstance(unit.source, ModbusVectorSettings)
     }
     settings = TapeSettings(60.0 * found.length_min, found.sync_s)
-    return Tape(recordings_folder(plant), units, settings, clock, press)
+    owned = [unit.id for unit in plant.unit] if origin is Origin.LIVE else []
+    return Tape(recordings_folder(plant), units, settings, clock, press, owned)

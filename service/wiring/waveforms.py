@@ -14,6 +14,7 @@ from service.waveforms.index import Index
 from service.waveforms.keeper import WaveformKeeper
 from service.waveforms.place import place_of
 from service.waveforms.room import RoomLimits
+from service.waveforms.watch_keeping import WatchKeeping
 from service.wiring.captures import BYTES_PER_GB, CAPTURES
 from service.wiring.evidence import EVIDENCE
 from service.wiring.space import space_limits
@@ -27,7 +28,7 @@ def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKee
         index = Index(store.waveforms, place_of(Path(plant.service.data_folder)))
         return Caretaker(custody_of(plant), index, clock)
 
-    return WaveformKeeper(hire, clock)
+    return WaveformKeeper(hire, clock, WatchKeeping(Path(plant.service.data_folder)))
 
 
 def custody_of(plant: PlantFile) -> Custody:

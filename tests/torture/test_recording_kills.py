@@ -51,9 +51,9 @@ def killed(
             assert rig.stop() == 0
         else:
             rig.kill()
-    for folder in unjoined(root):  # what there was no time for at the end
+    for folder in unjoined(root, plant.units):  # what there was no time for at the end
         join(folder)
-    clear_unfinished(root)
+    clear_unfinished(root, plant.units)
     found = recorded(root, plant, 1, daq.offered())
     if found.n_samples < n_promised:
         found.wrong.append(f"lost: {n_promised} were promised, {found.n_samples} are there")

@@ -49,8 +49,8 @@ def killed_at(deed: int, patch: pytest.MonkeyPatch) -> Iterator[list[str]]:
 
 
 def recover(root: Path) -> None:
-    left = unjoined(root)
-    clear_unfinished(root)
+    left = unjoined(root, ("U1",))
+    clear_unfinished(root, ("U1",))
     for folder in left:
         join(folder)
 

@@ -189,3 +189,30 @@ async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
 
     assert aside.name == "U1-20260101T000000.000Z-continuous-00001.damaged"
     assert samples(open_recording(whole)) == numbers(0, 10) + numbers(20, 30)
+
+
+async def test_samples_that_come_once_more_after_a_restart_are_not_recorded_twice(
+    running: Any, root: Path, samples: Samples
+) -> None:
+    async with running(root) as rig:
+        rig.send(0, 20)
+    async with running(root) as rig:
+        rig.send(10, 30)
+    first, second = rig.recordings()
+
+    assert samples(first) + samples(second) == numbers(0, 30)
+
+
+async def test_what_another_process_is_writing_of_its_own_units_is_let_alone(
+    running: Any, root: Path
+) -> None:
+    theirs = [
+        root / f"U2-20260101T000000.000Z-continuous{end}" for end in (".parts", ".incomplete")
+    ]
+    for folder in theirs:
+        folder.mkdir(parents=True)
+    async with running(root) as rig:
+        rig.send(0, 10)
+        await rig.until(lambda: rig.tape.n_written == 100)
+
+    assert all(folder.is_dir() for folder in theirs)

@@ -42,8 +42,8 @@ def promised_before_it_is_synced() -> None:
 def parts_thrown_away_at_start() -> None:
     """Take what a crash has left in parts for rubbish."""
 
-    def cleared(root: Path) -> list[Path]:
-        for folder in joining.unjoined(root):
+    def cleared(root: Path, units: Any) -> list[Path]:
+        for folder in joining.unjoined(root, units):
             joining._remove_parts(joining.parts_folder(folder))
         return []
 
