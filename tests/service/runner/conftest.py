@@ -16,6 +16,7 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.monitor import UnitMonitor
+from core.outage import Reach
 from core.quality import GOOD
 from core.settings import AnalysisSettings
 from service.alarms.engine import AlarmEngine
@@ -182,12 +183,14 @@ class Plant:
         self.alarms = AlarmEngine(alarms, self.recorder.put, self.clock, listener)
         self.alarms.restore(self.store.alarms())
 
-    def runner(self, **units: ScriptedPlant) -> Runner:
+    def runner(self, reach: Reach | None = None, **units: ScriptedPlant) -> Runner:
         settings = AnalysisSettings(segment_samples=SEGMENT, n_segments=4, min_segments=2)
         watched = {
             name: WatchedUnit(source, UnitMonitor(unit_named(name), settings))
             for name, source in units.items()
         }
+        for unit in watched.values():
+            unit.monitor.go_on(reach)
         return Runner(watched, self.live, self.recorder, self.clock, self.alarms, self.films)
 
 
