@@ -5,7 +5,6 @@ import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 
-import structlog
 from prometheus_client.metrics_core import Metric
 from prometheus_client.process_collector import ProcessCollector
 
@@ -30,6 +29,7 @@ from service.roles.leadership import Leadership
 from service.roles.partition import Partition
 from service.roles.reporting import reporting_loops
 from service.roles.stopping import stop_on_signals
+from service.roles.unit_memory import UnitMemory
 from service.runner import BUS_CAPACITY
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
@@ -38,11 +38,10 @@ from service.stream.consumer import Consumer
 from service.stream.consumer_metrics import consumer_metrics
 from service.stream.names import identity_of
 from service.stream.progress import UnitProgress
+from service.stream.stored import memories_of, usable
 from service.supervision import Supervision
 from service.wiring.delivery import router_of
 from service.wiring.stores import database_path, open_store
-
-log = structlog.get_logger()
 
 WATCH_EVERY_S = 1.0
 
@@ -111,6 +110,8 @@ class Analysing:
         self._monitors, self._ground, self._around = monitors, ground, around
         self._plant = plant
         self._holds = Holds(ground.store, monitors, ground.clock)
+        self._stored: dict[str, StreamPosition] = {}
+        self._memories: dict[str, UnitMemory] = {}
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
 
@@ -147,7 +148,15 @@ class Analysing:
         await self._holds.take()
         bus = Bus(BUS_CAPACITY, ground.clock)  # nothing waits in this one: the stream does
         monitors = timed_monitors(self._monitors, ground.timings)
-        analysis = await analysis_on(ground, monitors, bus, self._around, self._share)
+        self._stored = {
+            unit: found
+            for unit in monitors
+            if (found := await asyncio.to_thread(ground.store.position, unit)) is not None
+        }
+        self._memories = memories_of(self._stored.values())
+        analysis = await analysis_on(
+            ground, monitors, bus, self._around, self._share, self._memories
+        )
         self._analysis = analysis
         consumer = Consumer(
             self._plant, self._settings, self._begin, analysis.recorder, ground.clock
@@ -172,17 +181,17 @@ class Analysing:
 
     async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
         """Where each unit goes on."""
-        return {unit: await self._progress(unit, stream, newest) for unit in self._monitors}
+        return {unit: self._progress(unit, stream, newest) for unit in self._monitors}
 
-    async def _progress(self, unit: str, stream: str, newest: int) -> UnitProgress:
+    def _progress(self, unit: str, stream: str, newest: int) -> UnitProgress:
         ground, analysis = self._ground, self._analysis
         if analysis is None:
             raise RuntimeError("there is no analysis yet")
-        stored = usable(await asyncio.to_thread(ground.store.position, unit), stream, newest)
+        stored = usable(self._stored.get(unit), stream, newest)
         settings = next(its for its in ground.plant.unit if its.id == unit)
         identity = identity_of(self._plant, settings)
         parts = (analysis.analyser, ground.live, analysis.recorder)
-        return UnitProgress(identity, stream, stored, *parts)
+        return UnitProgress(identity, stream, stored, self._memories.get(unit), *parts)
 
     async def _watch(self, pulse: Pulse) -> None:
         """See that the units are still this process's, and which have fallen silent."""
@@ -226,16 +235,3 @@ def shared_work(analysis: Analysis) -> dict[str, Loop]:
         await asyncio.Event().wait()  # where nobody is told, that is all there is to do
 
     return {**analysis.shared_loops, "deliver": deliver}
-
-
-def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
-    """A stored position, if it is one on this stream as the stream is."""
-    if stored is None:
-        return None
-    if stored.stream != stream:
-        log.error("the stream was made anew: results go on with what is on it", unit=stored.unit)
-        return None
-    if stored.sequence > newest:
-        log.error("the stream has lost what it had confirmed", unit=stored.unit)
-        return None
-    return stored

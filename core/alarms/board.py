@@ -94,12 +94,22 @@ class AlarmBoard:
                 self._rules[id_] = AlarmRule()
                 self.advance(id_, Condition(reason=NO_LONGER_WATCHED), host_ns)
 
-    def resume(self, alarms: Iterable[Alarm]) -> None:
-        """Be as when these were kept, delays included; what has had events since stays."""
-        for kept in alarms:
-            id_ = kept.identity.id
-            if id_ in self._alarms and self._alarms[id_].n_events == kept.n_events:
-                self._alarms[id_] = kept
+    def resume(self, kept: Iterable[Alarm], stored: Iterable[Alarm]) -> None:
+        """Go on as if nothing had been: from alarms as they were kept, with their delays.
+
+        Parameters
+        ----------
+        stored
+            As they were after their newest events, which may be newer: what people did since.
+        """
+        newest = {alarm.identity.id: alarm for alarm in stored}
+        for alarm in kept:
+            id_ = alarm.identity.id
+            if id_ in self._rules:
+                told = newest.get(id_, alarm)
+                later = told.n_events > alarm.n_events
+                found = replace(told, condition=alarm.condition, timers=alarm.timers)
+                self._alarms[id_] = found if later else alarm
 
     def told(self) -> list[AlarmNews]:
         """Hand over the news since the last call."""

@@ -162,12 +162,26 @@ class UnitAlarms:
         self._board.operate(id_, action, host_ns)
         return self._board.told()
 
-    def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
+    def restore(
+        self, alarms: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
+    ) -> list[AlarmNews]:
         """Go on where the service stopped: what was active is, and its condition is unknown.
 
         An alarm that nothing watches any more returns; it stays on the list until acknowledged.
+
+        Parameters
+        ----------
+        memory
+            Where it is known what was known then, and nothing is missing since: then all conditions
+            and delays go on.
         """
-        self._board.restore(alarms, host_ns)
+        stored = list(alarms)
+        kept = memory.alarms if memory else ()
+        known = {alarm.identity.id for alarm in kept}
+        self._board.restore((a for a in stored if a.identity.id not in known), host_ns)
+        self._board.resume(kept, stored)
+        if memory is not None:
+            self._resume(memory)
         return self._board.told()
 
     @property
@@ -181,13 +195,10 @@ class UnitAlarms:
             *self._link,
         )
 
-    def resume(self, memory: AlarmMemory) -> None:
-        """Go on from where another one was; after `restore`."""
-        self._board.resume(memory.alarms)
+    def _resume(self, memory: AlarmMemory) -> None:
         self._segment_faults = dict(memory.segment_faults)
         self._state = (memory.state, memory.state_ns)
         self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
-        self._resting_with = None
 
     def _is_repeated(self, block: SampleBlock) -> bool:
         """Whether the block brings nothing new; where samples are missing, delays stand still."""

@@ -26,6 +26,8 @@ log = structlog.get_logger()
 
 TICK_S = 0.5
 
+NO_MEMORIES: Mapping[str, AlarmMemory] = MappingProxyType({})
+
 NO_FILMS: Mapping[str, Condition] = MappingProxyType({})
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
@@ -69,23 +71,26 @@ class AlarmEngine:
         """Let somebody see all news at the moment at which it comes about."""
         self._witness = witness
 
-    def restore(self, alarms: Iterable[Alarm]) -> None:
-        """Go on where the service stopped, before anything else arrives."""
+    def restore(
+        self, alarms: Iterable[Alarm], memories: Mapping[str, AlarmMemory] = NO_MEMORIES
+    ) -> None:
+        """Go on where the service stopped, before anything else arrives.
+
+        Parameters
+        ----------
+        memories
+            What was known besides, by unit.
+        """
         now_ns, found = self._clock.now_ns(), list(alarms)
         for unit, own in self._units.items():
             mine = [alarm for alarm in found if alarm.identity.unit == unit]
-            self._publish(own.restore(mine, now_ns))
+            self._publish(own.restore(mine, now_ns, memories.get(unit)))
         others = [alarm for alarm in found if alarm.identity.unit not in self._units]
         self._publish(self._service.restore(others, now_ns))
 
     def memory(self, unit: str) -> AlarmMemory:
         """What must be known of the alarms of a unit, beside their events, to go on elsewhere."""
         return self._units[unit].memory
-
-    def resume(self, unit: str, memory: AlarmMemory) -> None:
-        """Go on where another process stopped; after `restore`."""
-        self.revision += 1
-        self._units[unit].resume(memory)
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
         """Remember what alarms did lately, oldest first, to know which are chattering."""

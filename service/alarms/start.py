@@ -8,11 +8,12 @@ from types import MappingProxyType
 from acquisition.clock import Clock
 from core.alarms.chatter import SHOWN_NS
 from core.alarms.event import AlarmNews
+from core.alarms.memory import AlarmMemory
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
 from core.films.film_rules import FilmRules
-from service.alarms.engine import AlarmEngine
+from service.alarms.engine import NO_MEMORIES, AlarmEngine
 from service.alarms.health import LookAtHealth
 from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.alarms.service_alarms import ServiceAlarms
@@ -44,6 +45,7 @@ async def alarm_engine(
     look: LookAtHealth | None = None,
     tape: Callable[[SampleBlock], None] | None = None,
     part: PlantPart = WHOLE,
+    memories: Mapping[str, AlarmMemory] = NO_MEMORIES,
 ) -> AlarmEngine:
     """Put the engine together and let it go on where the service stopped.
 
@@ -59,6 +61,8 @@ async def alarm_engine(
         Takes every block, if all samples are kept.
     part
         What of the plant this process looks after; alarms of the rest are left to others.
+    memories
+        What was known of alarms besides their events, by unit, where nothing is missing since.
 
     Raises
     ------
@@ -81,7 +85,8 @@ async def alarm_engine(
     listener = _listener(captures, tape)
     engine = AlarmEngine(units, put, clock, listener, service, chatter)
     stored = await asyncio.to_thread(store.alarms)
-    engine.restore(alarm for alarm in stored if part.looks_after(alarm.identity.unit))
+    ours = [alarm for alarm in stored if part.looks_after(alarm.identity.unit)]
+    engine.restore(ours, memories)
     for held in await asyncio.to_thread(store.order1_references.in_force):
         engine.refer_to(held.reference)
     lately = AlarmQuery(start_ns=max(0, clock.now_ns() - SHOWN_NS), limit=MAX_RECALLED)

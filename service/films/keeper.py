@@ -88,9 +88,9 @@ class FilmKeeper:
         """What must be known of the films of a unit, beside stored readings, to go on elsewhere."""
         return self._films[unit].watch.memory if unit in self._films else None
 
-    def resume(self, unit: str, memory: FilmMemory) -> None:
+    def resume(self, unit: str, memory: FilmMemory | None) -> None:
         """Go on where another process stopped; after `start`."""
-        if unit in self._films:
+        if memory is not None and unit in self._films:
             self._films[unit].watch.resume(memory)
 
     def rules(self, unit: str) -> FilmRules | None:

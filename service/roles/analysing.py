@@ -73,12 +73,6 @@ class Analyser:
         """What must be known of a unit beside its newest samples."""
         return UnitMemory(self.state(unit), self._alarms.memory(unit), self._films.memory(unit))
 
-    def resume(self, unit: str, memory: UnitMemory) -> None:
-        """Let alarms and films of a unit be as they were."""
-        self._alarms.resume(unit, memory.alarms)
-        if memory.films is not None:
-            self._films.resume(unit, memory.films)
-
     def rewind(self, unit: str, memory: UnitMemory) -> None:
         """Let the monitor of a unit expect its newest samples once more, none of them missing."""
         self._monitors[unit].go_on(None)

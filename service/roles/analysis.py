@@ -27,6 +27,7 @@ from service.retaining import Retaining
 from service.roles.analysing import Analyser
 from service.roles.ground import Ground
 from service.roles.plant_part import WHOLE, PlantPart
+from service.roles.unit_memory import NO_MEMORIES, UnitMemory
 from service.rolling import Rolling
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
@@ -113,6 +114,7 @@ async def analysis_on(
     bus: Bus,
     around: Around,
     part: PlantPart = WHOLE,
+    memories: Mapping[str, UnitMemory] = NO_MEMORIES,
 ) -> Analysis:
     """Put the parts together, and let them go on where the service stopped.
 
@@ -124,6 +126,8 @@ async def analysis_on(
         Is shown the films, of which messages tell.
     part
         What of the plant this process looks after.
+    memories
+        What was known of units besides what is stored, where no sample is missing since.
 
     Raises
     ------
@@ -158,9 +162,12 @@ async def analysis_on(
         look,
         tape.take,
         part,
+        {unit: memory.alarms for unit, memory in memories.items()},
     )
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
+    for unit, memory in memories.items():
+        films.resume(unit, memory.films)
     around.watch_films(films.newest)
     evidence = evidence_of(plant, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)

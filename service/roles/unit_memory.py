@@ -1,6 +1,8 @@
 """`UnitMemory`: what must be known of a unit, beside its newest samples, to go on elsewhere."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from core.alarms.memory import AlarmMemory
 from core.films.film_memory import FilmMemory
@@ -25,3 +27,6 @@ class UnitMemory:
     alarms: AlarmMemory
     films: FilmMemory | None
     version: int = VERSION
+
+
+NO_MEMORIES: Mapping[str, UnitMemory] = MappingProxyType({})

@@ -13,7 +13,7 @@ from service.roles.link_news import LinkNews
 from service.roles.unit_memory import UnitMemory
 from service.store.positions_port import StreamPosition
 from service.stream.identity import UnitIdentity
-from service.stream.memory import read, written
+from service.stream.memory import written
 from service.stream.window import Window
 from service.stream.wire import decoded
 from service.stream.wire_errors import WireError
@@ -31,6 +31,8 @@ class UnitProgress:
     ----------
     stored
         How far results reach that are stored, on the same stream; None where there are none.
+    memory
+        What was known of the unit then.
     """
 
     def __init__(
@@ -38,6 +40,7 @@ class UnitProgress:
         identity: UnitIdentity,
         stream: str,
         stored: StreamPosition | None,
+        memory: UnitMemory | None,
         analyser: Analyser,
         live: LiveView,
         recorder: Recorder,
@@ -46,12 +49,10 @@ class UnitProgress:
         self._analyser, self._live, self._recorder = analyser, live, recorder
         self._window = Window()
         self._stored = stored
-        self._memory: UnitMemory | None = None
+        self._memory = None if stored is None else memory
         self.sequence = 0
         self.refused: Counter[str] = Counter()
         self.n_repeated = 0
-        if stored is not None:
-            self._go_on(stored)
 
     @property
     def first_needed(self) -> int:
@@ -108,13 +109,6 @@ class UnitProgress:
         if status.state is LinkState.CONNECTED and age_s is not None and age_s > after_s:
             reason = f"no block for {after_s:g} s: is `padwatch acquire` running?"
             self._hear(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
-
-    def _go_on(self, stored: StreamPosition) -> None:
-        self._memory = read(stored.memory)
-        if self._memory is None:
-            log.error("what was known of a unit is of another version", unit=self.unit)
-            return
-        self._analyser.resume(self.unit, self._memory)
 
     async def _relive(self, sequence: int, message: SampleBlock | LinkNews) -> None:
         self.sequence = sequence

@@ -1,0 +1,86 @@
+"""Acquire and analyse apart find what a single process finds, to the last bit, kills or not."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from harness.nats_server import NatsServer
+from harness.service_rig import ServiceRig, until
+from harness.stream_rig import (
+    LEDGER,
+    blocks,
+    found_in,
+    on_the_stream,
+    positions,
+    single_process,
+    written_plant,
+)
+
+from acquisition.clock import SystemClock
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.stream.names import identity_of
+from service.stream.publisher import Publisher
+
+SEED = 3
+N_BLOCKS = 160
+
+
+async def publish(plant: PlantFile, first: int, last: int) -> None:
+    """Publish a stretch of every unit's blocks."""
+    assert plant.stream is not None
+    identities = {unit.id: identity_of(plant, unit) for unit in plant.unit}
+    publisher = Publisher(plant, plant.stream, identities, SystemClock())
+    running = asyncio.create_task(publisher.run())
+    try:
+        for pair in zip(*(blocks(plant, u, N_BLOCKS, SEED) for u in LEDGER.units), strict=True):
+            for block in pair:
+                if first <= number_of(block.start_ns) < last:
+                    await publisher.publish(block)
+        await asyncio.wait_for(publisher.waiting.drained(), 60.0)
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+def number_of(start_ns: int) -> int:
+    return round((start_ns - 1_767_225_600_000_000_000) / 1e9)
+
+
+async def test_results_are_those_of_a_single_process_through_kills_of_the_analysis_and_of_nats(
+    tmp_path: Path, server: NatsServer
+) -> None:
+    plant_file = written_plant(tmp_path, server)
+    plant = load_plant_file(plant_file)
+    database = tmp_path / "plant" / "padwatch.sqlite3"
+    with ServiceRig(plant_file, role=("analyse",), log="analyse.log") as rig:
+        rig.start()
+        await publish(plant, 0, 60)
+        until(lambda: min(positions(database).values(), default=0) > 50)
+        rig.kill()
+        await publish(plant, 60, 110)
+        rig.start()
+        until(lambda: min(positions(database).values(), default=0) > 130)
+        server.kill()
+        rig.kill()
+        server.start()
+        await publish(plant, 110, N_BLOCKS)
+        rig.start()
+        last = 2 * N_BLOCKS
+        until(lambda: max(positions(database).values(), default=0) == last)
+        until(lambda: min(positions(database).values(), default=0) >= last - 1)
+        assert rig.stop() == 0, rig.newest_log()
+    sent = await on_the_stream(plant, server)
+    assert len(sent) == last
+    wanted = found_in(await single_process(written_plant(tmp_path, server, "single"), sent))
+    found = found_in(database)
+    assert {name: len(rows) for name, rows in found.items()} == {
+        name: len(rows) for name, rows in wanted.items()
+    }
+    assert found == wanted
+    assert len(wanted["assessment"]) > 50
+    assert len(wanted["alarm_event"]) > 5
+    assert len(wanted["gap"]) > 2
+
+
+pytestmark = pytest.mark.timeout(300)

@@ -1,0 +1,161 @@
+"""Blocks on a real stream, and what a single process makes of the same blocks in the same order."""
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import nats
+import numpy as np
+
+from acquisition.clock import SystemClock
+from core.blocks import SampleBlock
+from core.quality import GOOD, Reading
+from core.units import NS_PER_S
+from harness.ledger_plant import LedgerPlant
+from harness.nats_server import NatsServer
+from service.bus import Bus
+from service.delivery.facts import Around
+from service.heartbeats import Heartbeats
+from service.live import LinkState
+from service.metrics.timings import Timings
+from service.origin import Origin
+from service.roles.analysis import analysis_on
+from service.roles.ground import Ground, live_view
+from service.roles.link_news import LinkNews
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.store.sqlite import SqliteStore
+from service.stream.names import identity_of, stream_name, subject
+from service.stream.wire import decoded
+from service.wiring.sources import monitor_of
+
+LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
+T0 = 1_767_225_600 * NS_PER_S
+N_SAMPLES = 600
+
+
+def written_plant(folder: Path, server: NatsServer, name: str = "plant") -> Path:
+    """A plant file whose units come from the stream; their devices are not there."""
+    stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 0.5\n'
+    ports = dict.fromkeys(LEDGER.units, 9)
+    return LEDGER.write(folder / f"{name}.toml", folder / name, ports, stream)
+
+
+def blocks(plant: PlantFile, unit: str, n_blocks: int, seed: int) -> Iterator[SampleBlock]:
+    """A turning shaft with noise, spells beyond the limit, gaps, and a restart of the device."""
+    settings = next(its for its in plant.unit if its.id == unit)
+    rng = np.random.default_rng([seed, sum(unit.encode())])
+    n_channels, rate_hz = len(settings.channel), settings.sampling_hz
+    shaft = np.array(["shaft" in channel.id for channel in settings.channel])
+    turn_hz = settings.rated_speed_rpm / 60.0
+    first, epoch = 0, 7
+    for number in range(n_blocks):
+        if number % 97 == 60:
+            first += 5 * N_SAMPLES
+        if number == n_blocks // 2 + 11:
+            first, epoch = 0, epoch + 1
+        size_um = 160.0 if number % 140 > 95 else 40.0
+        t_s = (number * N_SAMPLES + np.arange(N_SAMPLES)) / rate_hz
+        phase = np.arange(n_channels) * np.pi / 2
+        size = np.where(shaft, size_um, 2.0)[:, np.newaxis]
+        turning = size * np.cos(2 * np.pi * turn_hz * t_s - phase[:, np.newaxis])
+        noise = rng.normal(0.0, 0.5, (n_channels, N_SAMPLES))
+        samples = turning + noise + np.where(shaft, 2000.0, 0.0)[:, np.newaxis]
+        yield SampleBlock(
+            unit=unit,
+            epoch=epoch,
+            first_index=first,
+            start_ns=T0 + round(float(t_s[0]) * NS_PER_S),
+            rate_hz=rate_hz,
+            samples=samples.astype(np.float32),
+            channel_quality=(GOOD,) * n_channels,
+            slow={
+                channel.id: Reading(90.0 if channel.id == "speed" else 45.0)
+                for channel in settings.slow_channel
+            },
+        )
+        first += N_SAMPLES
+
+
+Sent = tuple[str, SampleBlock | LinkNews]
+
+
+async def on_the_stream(plant: PlantFile, server: NatsServer) -> list[Sent]:
+    """All that the stream holds, in its order."""
+    identities = {subject(plant, unit.id): identity_of(plant, unit) for unit in plant.unit}
+    client = await nats.connect(server.url)
+    try:
+        stream = client.jetstream()
+        state = (await stream.stream_info(stream_name(plant))).state
+        found: list[Sent] = []
+        for sequence in range(state.first_seq, state.last_seq + 1):
+            message = await stream.get_msg(stream_name(plant), sequence, direct=True)
+            identity = identities[str(message.subject)]
+            found.append((identity.unit, decoded(message.data or b"", identity)))
+        return found
+    finally:
+        await client.close()
+
+
+async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
+    """Let one process make of it what it makes; returns its database."""
+    plant, clock = load_plant_file(plant_file), SystemClock()
+    path = Path(plant.service.data_folder) / "padwatch.sqlite3"
+    store, live = SqliteStore(path), live_view(plant, clock)
+    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
+    beats, timings = Heartbeats(clock), Timings(monitors, clock)
+    ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
+    analysis = await analysis_on(ground, monitors, Bus(512, clock), Around(live))
+    try:
+        for unit, message in sent:
+            if isinstance(message, LinkNews):
+                analysis.analyser.hear(message)
+            else:
+                analysis.analyser.hear(LinkNews(unit, LinkState.CONNECTED))
+                await analysis.analyser.take(message)
+                await analysis.recorder.flush()
+    finally:
+        await analysis.close()
+        store.close()
+    return path
+
+
+QUERIES = {
+    "assessment": (
+        "SELECT unit, bearing, assessment.* FROM assessment JOIN series ON series.id = series"
+        " ORDER BY unit, bearing, time_ns"
+    ),
+    "gap": "SELECT * FROM gap ORDER BY unit, stop_ns, first_index",
+    "alarm_event": (
+        "SELECT * FROM alarm_event WHERE unit <> 'plant' AND kind <> 'link_lost'"
+        " ORDER BY alarm, number"
+    ),
+}
+
+NUMBERS = ("id", "series", "layout", "seal")
+"""What databases number as things come to them."""
+
+
+def found_in(database: Path) -> dict[str, list[dict[str, object]]]:
+    """Results, gaps and events of alarms, to the last bit; not what clocks of hosts have made."""
+    with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
+        connection.row_factory = sqlite3.Row
+        found = {name: connection.execute(query).fetchall() for name, query in QUERIES.items()}
+    connection.close()
+    return {
+        name: [{key: row[key] for key in row.keys() if key not in NUMBERS} for row in rows]  # noqa: SIM118
+        for name, rows in found.items()
+    }
+
+
+def positions(database: Path) -> dict[str, int]:
+    """How far each unit is on the stream."""
+    if not database.exists():
+        return {}
+    with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
+        try:
+            rows = connection.execute("SELECT unit, sequence FROM stream_position").fetchall()
+        except sqlite3.OperationalError:
+            rows = []
+    connection.close()
+    return dict(rows)
