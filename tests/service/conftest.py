@@ -89,7 +89,7 @@ def sqlite_place(tmp_path: Path) -> SqlitePlace:
 
 
 @pytest.fixture
-def place(request: pytest.FixtureRequest) -> Place:
+def store_place(request: pytest.FixtureRequest) -> Place:
     """Where the store is: tests that ask for it, or for a store in it, go over both databases."""
     found: Place = request.getfixturevalue(f"{request.param}_place")
     return found
@@ -97,6 +97,6 @@ def place(request: pytest.FixtureRequest) -> Place:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Both databases, except for tests that ask for the ``path`` of a file."""
-    if "place" in metafunc.fixturenames:
+    if "store_place" in metafunc.fixturenames:
         is_of_a_file = "path" in metafunc.fixturenames
-        metafunc.parametrize("place", PLACES[:1] if is_of_a_file else PLACES, indirect=True)
+        metafunc.parametrize("store_place", PLACES[:1] if is_of_a_file else PLACES, indirect=True)

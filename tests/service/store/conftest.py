@@ -37,9 +37,9 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def store(place: Place) -> Iterator[SqlStore]:
+def store(store_place: Place) -> Iterator[SqlStore]:
     """An open, empty store."""
-    opened = place.open()
+    opened = store_place.open()
     yield opened
     opened.close()
 

@@ -431,8 +431,10 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
         connection.execute("DELETE FROM outbox WHERE state = 'waiting'")
 
 
-def test_both_databases_say_the_same_before_and_after(place: Place, assessment: Build) -> None:
-    with closing(place.open()) as store:
+def test_both_databases_say_the_same_before_and_after(
+    store_place: Place, assessment: Build
+) -> None:
+    with closing(store_place.open()) as store:
         store.append(life(assessment, 150), [])
         gather_all(store)
         before = store.trend(asked(60))
@@ -447,7 +449,7 @@ def test_both_databases_say_the_same_before_and_after(place: Place, assessment: 
         require_same(store.trend(asked(60)), unmerged)
         counts, more = before.series["speed_rpm"].count, unmerged.series["speed_rpm"].count
         assert sum(more) == sum(counts) + 1
-        n_left = place.execute(
+        n_left = store_place.execute(
             "SELECT count(*) FROM assessment WHERE time_ns < ?", (late.time_ns + 1,)
         )
         assert n_left[0][0] == 0
