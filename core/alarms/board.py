@@ -60,6 +60,10 @@ class AlarmBoard:
             for id_, alarm in self._alarms.items()
         }
 
+    def pause(self) -> None:
+        """Let all delays stand still up to now: time has not passed as the clock says."""
+        self._alarms = {id_: interrupted(alarm) for id_, alarm in self._alarms.items()}
+
     def expire(self, host_ns: int) -> None:
         """Bring back what was shelved until now."""
         for id_, alarm in self._alarms.items():

@@ -143,6 +143,10 @@ class UnitAlarms:
         self._take_link(host_ns)
         return self._board.told()
 
+    def pause(self) -> None:
+        """Let all delays stand still up to now."""
+        self._board.pause()
+
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Let the host's time pass for a lost link and for what is shelved."""
         self._take_link(host_ns)

@@ -17,6 +17,7 @@ from core.alarms.vector_change import VectorReference
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from service.alarms.count import AlarmCount, count_of
+from service.alarms.host_time import HostTime
 from service.alarms.service_alarms import ServiceAlarms
 from service.audit.acting import acting
 from service.heartbeats import UNHEARD, Pulse
@@ -63,6 +64,7 @@ class AlarmEngine:
         self._service = service or ServiceAlarms()
         self.chatter_rule = chatter or ChatterRule()
         self._chatter = ChatterWatch(self.chatter_rule)
+        self._time = HostTime(clock)
         self._witness: Callable[[Sequence[AlarmNews]], None] | None = None
         self.revision = 0
         """Another number as soon as anything is known otherwise of any alarm."""
@@ -113,7 +115,7 @@ class AlarmEngine:
         own = self._units[block.unit]
         if assessments or films:
             self.revision += 1
-        news = own.take(block, assessments, self._clock.now_ns())
+        news = own.take(block, assessments, self._host_ns())
         news += own.films(films, block.stop_ns)
         self._tell(news)
         if self._listener is not None:
@@ -123,7 +125,7 @@ class AlarmEngine:
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
         """Note whether samples of a unit arrive."""
         self.revision += 1
-        self._publish(self._units[unit].link(is_connected, reason, self._clock.now_ns()))
+        self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Let time pass for lost links and for what is shelved, for ever."""
@@ -134,8 +136,9 @@ class AlarmEngine:
 
     def tick(self) -> None:
         """Look at the host's clock once."""
+        now_ns = self._host_ns()
         for own in self._boards:
-            self._publish(own.tick(self._clock.now_ns()))
+            self._publish(own.tick(now_ns))
 
     def operate(self, id_: str, action: Action) -> Alarm:
         """Do what somebody asks for; return the alarm as it is then.
@@ -182,6 +185,14 @@ class AlarmEngine:
     def count(self) -> AlarmCount:
         """How many alarms are on the list."""
         return count_of(self.alarms, self.is_judged)
+
+    def _host_ns(self) -> int:
+        """Host's time; where somebody has set its clock, that counts for no delay."""
+        now_ns, was_set = self._time.look()
+        if was_set:
+            for own in self._boards:
+                own.pause()
+        return now_ns
 
     def _publish(self, news: list[AlarmNews]) -> None:
         """Store what no block has brought."""

@@ -94,6 +94,10 @@ class ServiceAlarms:
         self._board.restore(alarms, host_ns)
         return self._board.told()
 
+    def pause(self) -> None:
+        """Let all delays stand still up to now."""
+        self._board.pause()
+
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Look at the service once."""
         if self._look is not None:

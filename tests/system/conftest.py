@@ -42,11 +42,15 @@ class Program:
         raise AssertionError(f"ended without a URL: {self.said} {self.errors}")
 
     async def get(self, path: str, **parameters: Any) -> Any:
-        """Ask the API; the answer must be 200."""
-        async with httpx2.AsyncClient(
-            base_url=self.url, trust_env=False, timeout=PATIENCE_S
-        ) as client:
+        """Ask the API, again where it is too busy to answer; the answer must be 200."""
+        async with (
+            httpx2.AsyncClient(base_url=self.url, trust_env=False, timeout=PATIENCE_S) as client,
+            asyncio.timeout(PATIENCE_S),
+        ):
             response = await client.get(path, params=parameters)
+            while response.status_code == 503 and "retry-after" in response.headers:
+                await asyncio.sleep(0.5)
+                response = await client.get(path, params=parameters)
         assert response.status_code == 200, response.text
         return response.json()
 

@@ -46,15 +46,14 @@ class Bench:
         daq: LedgerDaq,
         links: BadLinks,
         folder: Path,
+        extra: str = "",
         wrong_s: float = 0.0,
         time_zone: str = "UTC",
     ) -> None:
         self.plant, self.daq, self.links = plant, daq, links
         self._wall_clock = folder / "wall-clock"
         self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
-        self.plant_file = plant.write(
-            folder / "plant.toml", folder / "data", links.ports, LINK_ALARM
-        )
+        self.plant_file = plant.write(folder / "plant.toml", folder / "data", links.ports, extra)
         environment = {"WALL_CLOCK": str(self._wall_clock), "TZ": time_zone}
         self.rig = ServiceRig(self.plant_file, "harness.stepped_service", environment=environment)
         self.watch = Watch(plant, daq.offered)
@@ -136,11 +135,24 @@ class Bench:
 
 @contextmanager
 def bench_of(
-    plant: LedgerPlant, folder: Path, seed: int, wrong_s: float = 0.0, time_zone: str = "UTC"
+    plant: LedgerPlant,
+    folder: Path,
+    seed: int,
+    extra: str = "",
+    wrong_s: float = 0.0,
+    time_zone: str = "UTC",
 ) -> Iterator[Bench]:
-    """Build it, and let it run."""
+    """Build it, and let it run.
+
+    Parameters
+    ----------
+    extra
+        More tables of the plant file.
+    wrong_s
+        By how much the service's wall clock is wrong.
+    """
     with ledger_daq(plant, folder) as daq, bad_links(daq.ports, seed) as links:
-        bench = Bench(plant, daq, links, folder, wrong_s, time_zone)
+        bench = Bench(plant, daq, links, folder, extra, wrong_s, time_zone)
         with bench.rig:
             try:
                 bench.begin()
