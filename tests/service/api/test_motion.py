@@ -246,7 +246,7 @@ async def test_a_damaged_recording_is_not_played(
     content[len(content) // 2] ^= 1
     samples.write_bytes(content)
 
-    problem = await running.problem(f"/api/v1/recordings/{name}/motion", 500, bearing="UJB")
+    problem = await running.problem(f"/api/v1/recordings/{name}/motion", 410, bearing="UJB")
 
     assert str(tmp_path) not in problem["detail"]
 

@@ -57,7 +57,7 @@ def test_every_error_is_documented_as_a_problem(
         "GET /api/v1/units/{unit}/bearings/{bearing}/shaft-centre": {"404", "422", "503"},
         "GET /api/v1/configuration": {"404"},
         "GET /api/v1/recordings": {"404", "422"},
-        "GET /api/v1/recordings/{recording}": {"404", "422", "500", "503"},
+        "GET /api/v1/recordings/{recording}": {"404", "410", "422", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/references": {"404", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/film/readings": {"404", "409", "422", "503"},
         "GET /api/v1/units/{unit}/bearings/{bearing}/baselines": {"404", "503"},
