@@ -1,6 +1,8 @@
 """The service is killed at random moments under load: nothing that it promised is gone."""
 
+import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from harness.service_rig import ServiceRig
 N_CYCLES, N_FEW = 200, 3
 LOAD = 2.0
 SHORT_LIFE_S = 0.7
+N_LOST_SLOTS, SILENT_S = 3, 2.0
 ACCOUNTED_S = 2 * 3600.0
 
 
@@ -43,13 +46,25 @@ def test_a_killed_service_has_kept_what_it_has_shown(
     n_cycles = N_CYCLES if is_whole else N_FEW
     with ServiceRig(plant_file) as rig:
         if is_whole:
-            done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng)
+            trouble = partial(also, daq)
+            done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng, trouble=trouble)
         else:
             done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng, SHORT_LIFE_S)
     figure(f"kill -9 of the running service at {LOAD:g} times nominal\n{done.table()}")
     assert_all_accounted_for(done)
     assert done.findings.n_results > 0
+    assert done.findings.n_exceedances > 0 or not is_whole
     assert done.findings.n_shown > 0
+
+
+def also(daq: LedgerDaq, number: int) -> None:
+    """Let the link be in trouble, too, when the service is killed."""
+    if number % 5 == 2:
+        daq.tell(f"U1 drop {N_LOST_SLOTS}")
+    if number % 10 == 8:
+        daq.stop_answering()
+        time.sleep(SILENT_S)
+        daq.answer_again()
 
 
 def assert_all_accounted_for(done: Cycles) -> None:

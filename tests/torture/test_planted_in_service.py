@@ -11,7 +11,7 @@ from harness.ledger_daq import LedgerDaq, ledger_daq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig
 
-N_CYCLES = 6
+N_CYCLES = 4
 LIFE_S = 8.0
 SILENT_S = 12.0
 N_LOST_SLOTS = 3
@@ -46,7 +46,7 @@ def _planted(bug: str, kind: str) -> object:
         _planted("promised_before_commit", "lost"),
         _planted("finding_dropped", "missing"),
         _planted("value_altered", "altered"),
-        _planted("letter_queued_twice", "alarms"),
+        _planted("letter_forgotten", "alarms"),
     ],
 )
 def test_a_bug_in_the_service_is_found_out(

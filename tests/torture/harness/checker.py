@@ -14,7 +14,17 @@ from core.account import Gap
 from harness.alarm_ledger import alarm_faults
 from harness.ledger_daq import Offered
 from harness.ledger_plant import LedgerPlant
-from harness.lives import ALWAYS, Replay, Rows, Run, index_of, runs_of, stored_rows, uncovered
+from harness.lives import (
+    ALWAYS,
+    Replay,
+    Rows,
+    Run,
+    index_of,
+    runs_of,
+    stored_rows,
+    taken,
+    uncovered,
+)
 from harness.watch import Watch
 from service.settings.loading import load_plant_file
 from service.store.port import Store
@@ -127,8 +137,8 @@ def _check_unit(
     found.n_offered += n_offered
     found.n_results += len(rows)
     _check_shown(found, unit, rows, index, shown)
-    _check_values(found, unit, rows, replay, runs)
     gaps = sorted(store.gaps(unit, *ALWAYS), key=lambda gap: gap.first_index)
+    _check_values(found, unit, rows, replay, taken(runs, gaps))
     _check_gaps(found, unit, gaps, runs, n_offered, plant)
 
 

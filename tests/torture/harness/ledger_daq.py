@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -74,6 +75,15 @@ class Offered:
     samples: dict[tuple[str, int], int]
     """Per channel, by unit and epoch: all from 0 on."""
 
+    slots: dict[tuple[str, int], list[tuple[int, int]]]
+    """First sample after each slot, and when the slot was offered by the host's clock."""
+
+    def offered_ns(self, unit: str, stop: int, epoch: int = 1) -> int:
+        """When the last sample before this one was offered."""
+        slots = self.slots[unit, epoch]
+        at = bisect_left(slots, (stop, 0))
+        return slots[min(at, len(slots) - 1)][1]
+
 
 class LedgerDaq:
     """A running ledger DAQ."""
@@ -86,13 +96,14 @@ class LedgerDaq:
     def offered(self) -> Offered:
         """What it has offered so far."""
         lines = self.log.read_text(encoding="ascii").splitlines()
-        found = Offered(int(lines[0].split()[1]), {})
+        found = Offered(int(lines[0].split()[1]), {}, defaultdict(list))
         for line in lines[1:]:
             words = line.split()
             if len(words) < 5:
                 break  # the line that is being written
-            unit, epoch, first, n = words[0], *map(int, words[1:4])
+            unit, epoch, first, n, at_ns = words[0], *map(int, words[1:5])
             found.samples[unit, epoch] = max(found.samples.get((unit, epoch), 0), first + n)
+            found.slots[unit, epoch].append((first + n, at_ns))
         return found
 
     def stop_answering(self) -> None:

@@ -6,6 +6,7 @@ from one start of the process to its end; a monitor lives as long, and averages 
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from acquisition.calibration import UnitCalibration, calibrate
 from acquisition.raw import RawBlock
@@ -134,3 +135,15 @@ def uncovered(gaps: Sequence[Gap], start: int, stop: int) -> list[tuple[int, int
             if part[0] < part[1]
         ]
     return left
+
+
+def taken(runs: Sequence[Run], gaps: Sequence[Gap]) -> list[Run]:
+    """All that was taken: runs, and between two gaps what did not suffice for a result."""
+    ends = {gap.first_index + gap.n_samples for gap in gaps}
+    short = [
+        Run(after.life, start, stop)
+        for run, after in pairwise(runs)
+        for start, stop in uncovered(gaps, run.stop, after.start)
+        if start in ends
+    ]
+    return sorted([*runs, *short], key=lambda run: run.start)

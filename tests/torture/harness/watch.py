@@ -143,16 +143,15 @@ def silent_healthy_s(plant: LedgerPlant, offered: Offered, looks: list[Look]) ->
 
 
 def _is_wrong(plant: LedgerPlant, offered: Offered, look: Look) -> bool:
-    age_s = (look.at_ns - look.result_ns) / NS_PER_S
-    if age_s > detect_s(plant):
+    stop = round((look.result_ns - offered.t0_ns) * plant.rate_hz / NS_PER_S)
+    # by when it was offered: a DAQ that had no time is not the service's fault
+    if (look.at_ns - offered.offered_ns(look.unit, stop)) / NS_PER_S > detect_s(plant):
         return True
     truth = Truth(plant.seed, plant.units.index(look.unit) + 1, plant.rate_hz)
-    stop = round((look.result_ns - offered.t0_ns) * plant.rate_hz / NS_PER_S)
-    start = stop - plant.segment_samples
     bearing = BEARINGS.index(look.bearing)
     return any(
         spell.kind == "lost" and spell.bearing == bearing
-        for spell in truth.spells(max(0, start), stop)
+        for spell in truth.spells(max(0, stop - plant.segment_samples), stop)
     )
 
 
