@@ -1,0 +1,115 @@
+"""Killed while old results become coarser: every hour is there as it was, finer or coarser."""
+
+import os
+import subprocess
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.deeds import HOP_NS, T0_NS, Build, value
+from harness.deleting import LATER_NS
+from harness.tape import python
+
+from service.store.port import Trend, TrendQuery
+from service.store.retention import deleting
+from service.store.retention.limits import RetentionLimits
+from service.store.sqlite import SqliteStore
+
+N_KILLS = 100
+N = 1500
+HOUR_NS = 3_600_000_000_000
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def old_file(
+    tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build
+) -> bytes:
+    """A database with five hours of results, gathered."""
+    path = tmp_path_factory.mktemp("old") / "old.sqlite3"
+    with closing(SqliteStore(path)) as store:
+        store.append(
+            [
+                assessment(T0_NS + n * HOP_NS, speed_rpm=value(torture_seed, n, "speed"))
+                for n in range(N)
+            ],
+            [],
+        )
+        gather_all(store)
+    return path.read_bytes()
+
+
+def gather_all(store: SqliteStore) -> None:
+    while due := store.rollups.due(LATER_NS):
+        for series in due:
+            store.rollups.gather(series, LATER_NS)
+
+
+def by_the_hour(store: SqliteStore) -> Trend:
+    return store.trend(TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + 6 * HOUR_NS, 7, 1))
+
+
+def test_killed_while_deleting_every_hour_says_what_it_said(
+    old_file: bytes, tmp_path: Path, torture_seed: int, times: Callable[[int], int]
+) -> None:
+    rng = np.random.default_rng(torture_seed)
+    path = tmp_path / "old.sqlite3"
+    path.write_bytes(old_file)
+    with closing(SqliteStore(path)) as store:
+        before = by_the_hour(store)
+    n_cut_short = 0
+    for _ in range(times(N_KILLS)):
+        for left in tmp_path.glob("old.sqlite3*"):
+            left.unlink()
+        path.write_bytes(old_file)
+        n_cut_short += is_cut_short(path, rng.exponential(0.1))
+        with closing(SqliteStore(path)) as store:
+            require_same(by_the_hour(store), before)
+    assert n_cut_short > 0
+
+
+def is_cut_short(path: Path, after_s: float) -> bool:
+    """Begin to delete, and kill it after a while; whether it had not come to its end."""
+    environment = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parent)])}
+    process = subprocess.Popen(
+        python("-m", "harness.deleting", path),
+        stdout=subprocess.PIPE,
+        env=os.environ | environment,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"begun\n"
+    time.sleep(after_s)
+    process.kill()
+    said = process.stdout.read()
+    process.wait()
+    process.stdout.close()
+    return said == b""
+
+
+def require_same(found: Trend, before: Trend) -> None:
+    ours, theirs = found.series["speed_rpm"], before.series["speed_rpm"]
+    assert list(found.time_ns) == list(before.time_ns)
+    assert list(ours.count) == list(theirs.count)
+    assert list(ours.minimum) == list(theirs.minimum)
+    assert list(ours.maximum) == list(theirs.maximum)
+    assert list(ours.mean) == pytest.approx(list(theirs.mean), rel=1e-9)
+
+
+def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
+    old_file: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill between two transactions leaves readings deleted and nobody who knows of it."""
+    path = tmp_path / "old.sqlite3"
+    path.write_bytes(old_file)
+    with closing(SqliteStore(path)) as store:
+        before = by_the_hour(store)
+        monkeypatch.setattr(deleting, "set_gone", lambda *_: None)  # killed before the second one
+        (series,) = store.retention.series()
+        store.retention.delete(series, RetentionLimits(readings_ns=0), LATER_NS)
+        fine = TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + HOUR_NS, 5000, 1)
+
+        assert by_the_hour(store) == before  # by the hour nobody sees it
+        assert len(store.trend(fine).time_ns) == 0
