@@ -1,6 +1,6 @@
 """Any process of a plant over PostgreSQL is killed, or the database restarted: nothing is lost."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +8,10 @@ import pytest
 from harness.checker import check
 from harness.ledger_daq import LedgerDaq, ledger_daq
 from harness.ledger_plant import LedgerPlant
+from harness.nats_cluster import nats_cluster
+from harness.nats_server import nats_server_command
 from harness.postgres_server import PostgresServer, why_not
-from harness.replicas import Replicas, chance, replicas, until_answered
+from harness.replicas import Replicas, chain, chance, replicas, until_answered
 from harness.watch import silent_healthy_s
 
 N_KILLS = 50
@@ -31,52 +33,92 @@ def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
 
 
 @pytest.fixture
+def whole(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Replicas]:
+    """The whole chain: it takes six programs and three servers of a stream."""
+    if nats_server_command() is None:
+        pytest.skip("no nats-server is installed")
+    with (
+        PostgresServer() as postgres,
+        nats_cluster(tmp_path / "nats") as cluster,
+        chain(plant, tmp_path, daq, postgres, cluster) as found,
+    ):
+        yield found
+
+
+@pytest.fixture
 def running(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Replicas]:
     with PostgresServer() as postgres, replicas(plant, tmp_path, daq, postgres) as found:
         yield found
 
 
-def kills(is_whole: bool, rng: np.random.Generator) -> list[str]:
+def kills(kinds: list[str], n: int, rng: np.random.Generator) -> list[str]:
     """Which is killed, in what order."""
-    n = N_KILLS if is_whole else 1
-    wanted = [*["analysis"] * n, *["serving"] * n, *["postgres"] * n]
+    wanted = kinds * n
     return [wanted[at] for at in rng.permutation(len(wanted))]
 
 
+@pytest.fixture(autouse=True)
+def _only_whole(is_whole: bool) -> None:
+    """Programs and servers that are started again so often take too long for every test run."""
+    if not is_whole:
+        pytest.skip("part of the whole torture only")
+
+
 @pytest.mark.timeout(2 * 3600)
-def test_whatever_is_killed_nothing_that_was_shown_is_lost(
-    running: Replicas,
-    torture_seed: int,
-    is_whole: bool,
-    figure: Callable[[str], None],
+def test_whatever_is_killed_beside_a_single_process_nothing_is_lost(
+    running: Replicas, torture_seed: int, figure: Callable[[str], None]
 ) -> None:
-    rng = np.random.default_rng(torture_seed)
     does = {
         "analysis": running.kill_analysis,
         "serving": running.kill_serving,
         "postgres": running.restart_postgres,
     }
+    kill_in_turn(running, does, torture_seed, figure)
+
+
+@pytest.mark.timeout(4 * 3600)
+def test_whatever_is_killed_of_the_whole_chain_nothing_is_lost(
+    whole: Replicas, torture_seed: int, figure: Callable[[str], None]
+) -> None:
+    does = {
+        "acquiring": whole.kill_acquiring,
+        "analysis": whole.kill_analysis,
+        "serving": whole.kill_serving,
+        "node": whole.kill_node,
+        "postgres": whole.restart_postgres,
+    }
+    kill_in_turn(whole, does, torture_seed, figure)
+
+
+def kill_in_turn(
+    running: Replicas,
+    does: Mapping[str, Callable[[int], None]],
+    seed: int,
+    figure: Callable[[str], None],
+) -> None:
+    """Kill each kind so often, at random moments; then look at all that is left."""
+    rng = np.random.default_rng(seed)
     running.start()
-    order = kills(is_whole, rng)
+    order = kills(list(does), N_KILLS, rng)
     for number, kind in enumerate(order):
         running.wait_for_result()
         running.act(number)
-        chance(rng, LIFE_S if is_whole else 0.3, LONGEST_S)
+        chance(rng, LIFE_S, LONGEST_S)
         does[kind](number)
+        print(f"{number + 1} of {len(order)}: {kind}", flush=True)
     assert all(until_answered(rig, "/readyz") for rig in running.serving)
     running.wait_for_result()
     running.act(len(order))
     running.stop()
 
-    watch = running.whole_watch()
-    offered = running.daq.offered()
-    running._note_life()
+    watch, offered = running.whole_watch(), running.daq.offered()
     found = check(running.plant, running.plant_file, offered, running.lives, watch)
     silent_s = sum(silent_healthy_s(running.plant, offered, w.looks) for w in running.watches)
     rows = "".join(f"\n  {name:<32}{value}" for name, value in found.counts.items())
     figure(
-        f"kill -9 of analysis or serving, or restart of PostgreSQL: {len(order)} in all{rows}"
+        f"killed or restarted, {N_KILLS} times each: {', '.join(does)}{rows}"
         f"\n  promised to operators           {len(watch.promised)}"
+        f"\n  answers to clients              {watch.n_answers}"
         f"\n  silent-healthy seconds          {silent_s:.3f}"
     )
     assert found.wrong == {}

@@ -1,9 +1,9 @@
-"""A plant whose results lie in PostgreSQL, with one process that analyses and two that serve."""
+"""A plant whose results lie in PostgreSQL: processes that bring results, and two that serve."""
 
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +11,18 @@ import numpy as np
 from harness.kill_cycles import act
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
+from harness.nats_cluster import NatsCluster
 from harness.postgres_server import PostgresServer
 from harness.service_rig import PATIENCE_S, UNREACHABLE, RefusedError, ServiceRig
 from harness.watch import Watch
+
+STREAM = """
+[stream]
+servers = [{servers}]
+replicas = 3
+max_gb = 1.0
+silent_after_s = 5.0
+"""
 
 STORE = """
 [store]
@@ -31,8 +40,10 @@ class Replicas:
         Those that bring results: they are killed, and started again at once.
     serving
         Those that people ask.
+    begins_anew
+        Whether one that is killed knows nothing of the samples before; with a stream it does.
     lives
-        For each unit, the number of the newest sample offered as the first of `analysis` started.
+        For each unit, the number of the newest sample offered as one began that knew nothing.
     """
 
     plant: LedgerPlant
@@ -43,13 +54,17 @@ class Replicas:
     serving: list[ServiceRig]
     watches: list[Watch]
     lives: dict[str, list[int]]
+    begins_anew: bool = True
+    acquiring: list[ServiceRig] = field(default_factory=list)
+    cluster: NatsCluster | None = None
+    n_restarts: int = 0
 
     def start(self) -> None:
         """Start all, those that serve last."""
         self._note_life()
-        for rig in self.analysis:
+        for rig in (*self.acquiring, *self.analysis):
             rig.start()
-        for rig in self.analysis:
+        for rig in (*self.acquiring, *self.analysis):
             rig.wait_ready()
         for rig, watch in zip(self.serving, self.watches, strict=True):
             rig.start()
@@ -60,10 +75,22 @@ class Replicas:
         """Kill one that analyses; it is started again."""
         rig = self.analysis[number % len(self.analysis)]
         rig.kill()
-        if rig is self.analysis[0]:
+        if self.begins_anew:
             self._note_life()
         rig.start()
         rig.wait_ready()
+
+    def kill_acquiring(self, number: int) -> None:
+        """Kill one that acquires; it is started again."""
+        rig = self.acquiring[number % len(self.acquiring)]
+        rig.kill()
+        rig.start()
+        rig.wait_ready()
+
+    def kill_node(self, number: int) -> None:
+        """Kill one of three servers of the stream; it is started again."""
+        if self.cluster is not None:
+            self.cluster.kill(number)
 
     def kill_serving(self, number: int) -> None:
         """Kill one that serves, while people ask it; it is started again."""
@@ -84,17 +111,32 @@ class Replicas:
         with rig.api() as api:
             act(api, number, watch)
 
+    def supervise(self) -> None:
+        """Start what has ended by itself: who lost the database may not go on analysing."""
+        for rig in (*self.acquiring, *self.analysis):
+            if rig.process is not None and rig.process.poll() is not None:
+                self.n_restarts += 1
+                rig.kill()
+                rig.start()
+                rig.wait_ready()
+
     def wait_for_result(self) -> None:
-        """Wait until a result is stored that nobody has seen yet."""
+        """Wait until a result is shown that nobody has seen yet."""
+        end_s = time.monotonic() + PATIENCE_S
         for watch in self.watches:
-            watch.wait_for_result()
+            n_before = _n_shown(watch)
+            while _n_shown(watch) == n_before:
+                self.supervise()
+                if time.monotonic() > end_s:
+                    raise AssertionError(f"no result: {self.analysis[0].newest_log()}")
+                time.sleep(0.05)
 
     def stop(self) -> None:
         """Let everything come to its end in good order."""
         for rig, watch in zip(self.serving, self.watches, strict=True):
             rig.stop()
             watch.end()
-        for rig in self.analysis:
+        for rig in (*self.acquiring, *self.analysis):
             rig.stop()
 
     def whole_watch(self) -> Watch:
@@ -134,6 +176,45 @@ def replicas(
         yield Replicas(plant, plant_file, daq, postgres, [analysis], serving, watches, {})
         for watch in watches:
             watch.end()
+
+
+@contextmanager
+def chain(
+    plant: LedgerPlant,
+    folder: Path,
+    daq: LedgerDaq,
+    postgres: PostgresServer,
+    cluster: NatsCluster,
+) -> Iterator[Replicas]:
+    """`padwatch acquire`, two `padwatch analyse` and two `padwatch serve`, over three nodes."""
+    servers = ", ".join(f'"{url}"' for url in cluster.urls)
+    extra = STREAM.format(servers=servers) + STORE.format(conninfo=postgres.create("plant"))
+    roles = {
+        "acquire": ("acquire",),
+        "analyse1": ("analyse", "--partition", "1/2"),
+        "analyse2": ("analyse", "--partition", "2/2"),
+        "serve1": ("serve",),
+        "serve2": ("serve",),
+    }
+    with ExitStack() as running:
+        rigs = {}
+        for name, role in roles.items():
+            own = plant.write(folder / f"{name}.toml", folder / name, daq.ports, extra)
+            rig = ServiceRig(own, role=role, log=f"{name}.log")
+            rigs[name] = running.enter_context(rig)
+        serving = [rigs["serve1"], rigs["serve2"]]
+        analysis = [rigs["analyse1"], rigs["analyse2"]]
+        watches = [Watch(plant, daq.offered) for _ in serving]
+        one = folder / "serve1.toml"
+        found = Replicas(plant, one, daq, postgres, analysis, serving, watches, {})
+        found.begins_anew, found.acquiring, found.cluster = False, [rigs["acquire"]], cluster
+        yield found
+        for watch in watches:
+            watch.end()
+
+
+def _n_shown(watch: Watch) -> int:
+    return sum(len(values) for values in list(watch.shown.values()))
 
 
 def chance(rng: np.random.Generator, mean_s: float, most_s: float) -> None:
