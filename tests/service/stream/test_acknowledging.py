@@ -1,0 +1,237 @@
+"""What is acknowledged is stored, and where a unit goes on with it; bugs in this are seen."""
+
+import asyncio
+import sqlite3
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import nats
+import pytest
+from harness.nats_server import NatsServer
+from harness.stream_rig import (
+    blocks,
+    found_in,
+    on_the_stream,
+    positions,
+    single_process,
+    written_plant,
+)
+from nats.js.errors import NotFoundError
+
+from acquisition.clock import SystemClock
+from service.analyse_program import Analysing
+from service.delivery.facts import Around
+from service.heartbeats import Heartbeats
+from service.metrics.timings import Timings
+from service.origin import Origin
+from service.recorder import Recorder
+from service.roles.ground import Ground, live_view
+from service.roles.partition import Partition
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.store.port import StoreError
+from service.stream import publisher as publishing
+from service.stream.consumer import Consumer
+from service.stream.names import consumer_name, identity_of, stream_name
+from service.stream.publisher import Publisher
+from service.wiring.sources import monitor_of
+from service.wiring.stores import open_store
+
+N_BLOCKS = 60
+UNIT = "U1"
+WAIT_S = 60.0
+
+
+async def publish(plant: PlantFile, n_times: int = 1) -> None:
+    assert plant.stream is not None
+    identity = identity_of(plant, plant.unit[0])
+    publisher = Publisher(plant, plant.stream, {UNIT: identity}, SystemClock())
+    running = asyncio.create_task(publisher.run())
+    try:
+        for block in blocks(plant, UNIT, N_BLOCKS, 1):
+            for _ in range(n_times):
+                await publisher.publish(block)
+        await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+@asynccontextmanager
+async def analysing(plant: PlantFile) -> AsyncIterator[None]:
+    """The analysis of a process, until it is left; what is not stored by then is lost."""
+    clock = SystemClock()
+    store, live = open_store(plant), live_view(plant, clock)
+    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
+    beats, timings = Heartbeats(clock), Timings(monitors, clock)
+    ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
+    assert plant.stream is not None
+    process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(live))
+    task = asyncio.create_task(process._analyse())
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+        await process.close()
+        store.close()
+
+
+async def until(so: Callable[[], Awaitable[bool]]) -> None:
+    async with asyncio.timeout(WAIT_S):
+        while not await so():
+            await asyncio.sleep(0.02)
+
+
+class Look:
+    """How far a unit's analysis is by the servers' account, and by the database's."""
+
+    def __init__(self, plant: PlantFile, stream: Any, database: Path) -> None:
+        self._plant, self._stream, self._database = plant, stream, database
+
+    async def acknowledged(self) -> int:
+        return (await self._info())[0]
+
+    async def many_delivered(self) -> bool:
+        return (await self._info())[1] >= N_BLOCKS // 3
+
+    def stored(self) -> int:
+        return positions(self._database).get(UNIT, 0)
+
+    async def require_acknowledged_is_stored(self) -> None:
+        acknowledged = await self.acknowledged()
+        assert acknowledged <= self.stored(), "acknowledged before it was stored"
+
+    async def _info(self) -> tuple[int, int]:
+        try:
+            found = await self._stream.consumer_info(stream_name(self._plant), consumer_name(UNIT))
+        except NotFoundError:
+            return 0, 0
+        return found.ack_floor.stream_seq, found.delivered.stream_seq
+
+
+@asynccontextmanager
+async def looking(plant: PlantFile, server: NatsServer) -> AsyncIterator[Look]:
+    client = await nats.connect(server.url)
+    database = Path(plant.service.data_folder) / "padwatch.sqlite3"
+    try:
+        yield Look(plant, client.jetstream(), database)
+    finally:
+        await client.close()
+
+
+@asynccontextmanager
+async def busy_database(plant: PlantFile) -> AsyncIterator[None]:
+    """Somebody else writes, and goes on writing."""
+    blocker = sqlite3.connect(Path(plant.service.data_folder) / "padwatch.sqlite3")
+    blocker.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    finally:
+        blocker.close()
+
+
+async def check_acknowledging(plant: PlantFile, server: NatsServer) -> None:
+    """Acknowledge nothing while nothing can be stored, and everything afterwards."""
+    async with looking(plant, server) as look, analysing(plant):
+        await until(lambda: _is(look.stored() == 0))
+        async with busy_database(plant):
+            await publish(plant)
+            await until(look.many_delivered)
+            await asyncio.sleep(0.2)  # for who acknowledges at once to be seen doing it
+            await look.require_acknowledged_is_stored()
+        await until(lambda: _is(look.stored() == N_BLOCKS))
+
+        async def all_acknowledged() -> bool:
+            return await look.acknowledged() == N_BLOCKS
+
+        await until(all_acknowledged)
+
+
+async def _is(so: bool) -> bool:
+    return so
+
+
+@pytest.fixture
+def plant(tmp_path: Path, server: NatsServer) -> PlantFile:
+    return load_plant_file(written_plant(tmp_path, server))
+
+
+async def test_a_block_is_acknowledged_after_its_results_are_stored(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    await check_acknowledging(plant, server)
+
+
+async def test_who_acknowledges_before_the_commit_is_caught(
+    plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def at_once(*_: object) -> None:
+        """Wait for nothing."""
+
+    monkeypatch.setattr(Consumer, "_stored", at_once)
+    with pytest.raises(AssertionError, match="acknowledged before it was stored"):
+        await check_acknowledging(plant, server)
+
+
+async def test_who_sends_blocks_without_an_id_is_caught(
+    plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await publish(plant, n_times=2)
+    assert len(await on_the_stream(plant, server)) == N_BLOCKS
+    names = iter(range(10**6))
+    monkeypatch.setattr(publishing, "message_id", lambda *_: f"another {next(names)}")
+    await publish(plant, n_times=2)
+    assert len(await on_the_stream(plant, server)) == 3 * N_BLOCKS
+
+
+Append = Callable[..., None]
+
+
+def dying(append: Append, died: list[bool], *, position_apart: bool) -> Append:
+    """An append that dies at the second results; with a bug, after it has stored the position."""
+    n_results = 0
+
+    def planted(
+        recorder: Recorder,
+        results: Sequence[Any],
+        gaps: Sequence[Any],
+        alarms: Sequence[Any],
+        films: Sequence[Any],
+        positions: Sequence[Any],
+    ) -> None:
+        nonlocal n_results
+        n_results += bool(results)
+        if position_apart:
+            recorder._store.append([], [], positions=positions)
+        if n_results >= 2:
+            died.append(True)
+            raise StoreError("it is dead")
+        append(recorder, results, gaps, alarms, films, () if position_apart else positions)
+
+    return planted
+
+
+@pytest.mark.parametrize("position_apart", [False, True], ids=["as it is", "planted bug"])
+async def test_a_position_that_is_not_stored_with_its_results_is_caught(
+    plant: PlantFile,
+    server: NatsServer,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    position_apart: bool,
+) -> None:
+    await publish(plant)
+    database = tmp_path / "plant" / "padwatch.sqlite3"
+    with monkeypatch.context() as patched:
+        died: list[bool] = []
+        planted = dying(Recorder._append, died, position_apart=position_apart)
+        patched.setattr(Recorder, "_append", planted)
+        async with analysing(plant):
+            await until(lambda: _is(bool(died)))
+    async with analysing(plant):
+        await until(lambda: _is(positions(database).get(UNIT) == N_BLOCKS))
+    sent = await on_the_stream(plant, server)
+    wanted = found_in(await single_process(written_plant(tmp_path, server, "single"), sent))
+    assert (found_in(database) == wanted) == (not position_apart)
