@@ -19,7 +19,7 @@ from service.store.trends import Span
 MAX_READINGS = 1000
 """Of one piece of work, during which nobody else writes: some tens of milliseconds."""
 
-MAX_HOURS = 24
+MAX_HOURS = 6
 """Of roll-ups, likewise."""
 
 MEAN_TOLERANCE = 1e-9
