@@ -142,7 +142,6 @@ def test_deadlines_by_the_wall_clock_are_found_out(assessment: Build, monkeypatc
 @asynccontextmanager
 async def mixed_up_gateway() -> AsyncIterator[int]:
     """Registers that hold their own address, behind a gateway that answers another request."""
-
     ended = asyncio.Event()
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
