@@ -46,10 +46,8 @@ async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStrea
             watching = tasks.create_task(_ended(lost, settings), name="stream watch")
             yield client.jetstream(timeout=settings.ack_timeout_s)
             watching.cancel()
-    except* (Error, OSError) as group:
-        raise _renamed(_first(group), settings) from None
-    except* StreamError as group:
-        raise _first(group) from None
+    except* (StreamError, Error, OSError) as group:  # one clause: two would make a group again
+        raise _told(group, settings) from None
     finally:
         await _closed(client)
 
@@ -130,13 +128,21 @@ def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
     return StreamError(f"NATS at {_places(settings)} cannot be used: {words}")
 
 
+def _told(group: BaseExceptionGroup[BaseException], settings: StreamSettings) -> StreamError:
+    """The one of several that says most: a loss makes many fail at once."""
+    found = sorted(_leaves(group), key=lambda error: not isinstance(error, StreamMisfitError))
+    own = [error for error in found if isinstance(error, StreamError)]
+    return own[0] if own else _renamed(found[0], settings)
+
+
 def _places(settings: StreamSettings) -> str:
     return ", ".join(settings.servers)
 
 
-def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
-    found = group.exceptions[0]
-    return _first(found) if isinstance(found, BaseExceptionGroup) else found
+def _leaves(error: BaseException) -> list[BaseException]:
+    if isinstance(error, BaseExceptionGroup):
+        return [leaf for part in error.exceptions for leaf in _leaves(part)]
+    return [error]
 
 
 def _tls(settings: StreamSettings) -> ssl.SSLContext | None:

@@ -7,6 +7,7 @@ import nats
 import numpy as np
 import pytest
 from harness.nats_server import NatsServer
+from nats.errors import ConnectionClosedError
 from nats.js.client import JetStreamContext
 
 from acquisition.clock import SystemClock
@@ -16,8 +17,10 @@ from service.live import LinkState
 from service.roles.link_news import LinkNews
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
+from service.stream.errors import StreamError, StreamMisfitError
 from service.stream.names import identity_of, stream_name, subject
 from service.stream.publisher import Publisher
+from service.stream.session import session
 from service.stream.wire import decoded
 
 WAIT_S = 30.0
@@ -232,3 +235,25 @@ async def test_a_server_that_lets_nobody_in_without_a_token_is_named_with_what_t
             await drained(out)
     finally:
         closed.stop()
+
+
+async def fail(error: Exception) -> None:
+    raise error
+
+
+async def use(server: NatsServer, *errors: Exception) -> None:
+    """Use a connection in ways that fail, while the server is killed."""
+    settings = StreamSettings(servers=(server.url,))
+    async with session(settings, "test"), asyncio.TaskGroup() as tasks:
+        for error in errors:
+            tasks.create_task(fail(error))
+        server.kill()
+        await asyncio.Event().wait()
+
+
+async def test_a_connection_that_several_lose_at_once_is_one_trouble(server: NatsServer) -> None:
+    with pytest.raises(StreamError, match="NATS at"):
+        await use(server)
+    server.start()
+    with pytest.raises(StreamMisfitError, match="the worse one"):
+        await use(server, ConnectionClosedError(), StreamMisfitError("the worse one"))
