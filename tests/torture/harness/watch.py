@@ -35,12 +35,15 @@ class Look:
         When the answer had come, by the host's clock.
     result_ns
         End of the samples of the result that was shown.
+    is_good
+        Whether it was shown without any reserve; it was shown as current anyhow.
     """
 
     at_ns: int
     unit: str
     bearing: str
     result_ns: int
+    is_good: bool
 
 
 class Watch:
@@ -104,9 +107,10 @@ class Watch:
         at_ns = time.time_ns()
         for unit in overview["units"]:
             for bearing in unit["bearings"]:
-                if bearing["quality"]["level"] == "good":
+                if bearing["quality"]["level"] != "bad":
                     time_ns = round(datetime.fromisoformat(bearing["time"]).timestamp() * NS_PER_S)
-                    self.looks.append(Look(at_ns, unit["id"], bearing["bearing"], time_ns))
+                    good = bearing["quality"]["level"] == "good"
+                    self.looks.append(Look(at_ns, unit["id"], bearing["bearing"], time_ns, good))
 
     def _note_trend(self, unit: str, bearing: str, api: Api) -> None:
         now_s = time.time()
@@ -149,7 +153,7 @@ def _is_wrong(plant: LedgerPlant, offered: Offered, look: Look) -> bool:
         return True
     truth = Truth(plant.seed, plant.units.index(look.unit) + 1, plant.rate_hz)
     bearing = BEARINGS.index(look.bearing)
-    return any(
+    return look.is_good and any(
         spell.kind == "lost" and spell.bearing == bearing
         for spell in truth.spells(max(0, stop - plant.segment_samples), stop)
     )
