@@ -127,8 +127,8 @@ QUERIES = {
     ),
     "gap": "SELECT * FROM gap ORDER BY unit, stop_ns, first_index",
     "alarm_event": (
-        "SELECT * FROM alarm_event WHERE unit <> 'plant' AND kind <> 'link_lost'"
-        " ORDER BY alarm, number"
+        "SELECT * FROM alarm_event WHERE unit <> 'plant' AND kind NOT IN"
+        " ('link_lost', 'clock_offset', 'clock_drift', 'time_stamps') ORDER BY alarm, number"
     ),
 }
 
