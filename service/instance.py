@@ -2,11 +2,16 @@
 
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import structlog
+
+from service.store.file_system import FileSystem, file_system_of
 from service.store.port import StoreError
+
+log = structlog.get_logger()
 
 SUFFIX = ".lock"
 _PID_BYTES = 20
@@ -22,19 +27,25 @@ def lock_path(database: Path) -> Path:
 
 
 @contextmanager
-def only_one(database: Path) -> Iterator[None]:
+def only_one(database: Path, look: Callable[[Path], FileSystem] = file_system_of) -> Iterator[None]:
     """Be the only service that works with a database.
 
     The lock ends with the process, however that ends; the file stays and means nothing by itself.
+
+    Parameters
+    ----------
+    look
+        Says what a folder is on.
 
     Raises
     ------
     AlreadyRunningError
         If another process is.
     StoreError
-        If the folder cannot be written to.
+        If the folder cannot be written to, or is on a network file system.
     """
     path = lock_path(database)
+    _require_local(database.parent, look(database.parent))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
@@ -45,6 +56,17 @@ def only_one(database: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _require_local(folder: Path, found: FileSystem) -> None:
+    """Refuse a folder whose locks and syncs are those of another machine."""
+    if found.is_remote:
+        raise StoreError(
+            f"{folder} is on a network file system ({found.kind}), where two services may write at"
+            " once and what is acknowledged may be lost: choose a data folder on a local disk"
+        )
+    if found.warning:
+        log.warning("the data folder may forget", folder=str(folder), why=found.warning)
 
 
 def _take(descriptor: int, database: Path) -> None:

@@ -67,6 +67,7 @@ class AlarmKind(StrEnum):
     RECORDINGS_DAMAGED = "recordings_damaged"
     QUESTIONS_REFUSED = "questions_refused"
     DISK_NEARLY_FULL = "disk_nearly_full"
+    STORED_DATA_DAMAGED = "stored_data_damaged"
 
 
 PLANT = "plant"

@@ -11,6 +11,7 @@ from service.continuous.tape import Tape
 from service.live import LiveView
 from service.load.watch import LoadWatch
 from service.recorder import Recorder
+from service.soundness import Soundness
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
 
@@ -48,6 +49,8 @@ class ServiceHealth:
         Recordings that were found damaged or missing since the start.
     refused
         Which questions are refused because the service is behind; None if none are.
+    stored_trouble
+        In what stored data are not what was stored; None as far as nothing is known to be wrong.
     accounts
         Where samples went, by unit.
     disk
@@ -63,6 +66,7 @@ class ServiceHealth:
     recording_error: str | None = None
     n_recordings_damaged: int = 0
     refused: str | None = None
+    stored_trouble: str | None = None
     accounts: Mapping[str, SampleAccount] = field(default_factory=dict)
     disk: DiskJudge = enough_room
 
@@ -80,6 +84,7 @@ def health_of(
     load: LoadWatch | None = None,
     tape: Tape | None = None,
     recordings: WaveformKeeper | None = None,
+    soundness: Soundness | None = None,
 ) -> LookAtHealth:
     """A look at the parts of the running service."""
     names = list(units)
@@ -95,6 +100,7 @@ def health_of(
             recording_error=tape.trouble if tape else None,
             n_recordings_damaged=recordings.n_lost if recordings else 0,
             refused=load.words if load else None,
+            stored_trouble=soundness.trouble if soundness else None,
             accounts={unit: live.status(unit).account for unit in names},
             disk=enough_room if space is None else space.condition,
         )

@@ -118,6 +118,7 @@ class ServiceAlarms:
         self._find(AlarmKind.RECORDINGS_DAMAGED, self._damaged(health), now_ns)
         self._find(AlarmKind.QUESTIONS_REFUSED, _refused(health), now_ns)
         self._find(AlarmKind.DISK_NEARLY_FULL, self._disk(health), now_ns)
+        self._find(AlarmKind.STORED_DATA_DAMAGED, _stored(health), now_ns)
         for unit, account in health.accounts.items():
             share = self._losses[unit].share(account, now_ns)
             self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)
@@ -156,6 +157,12 @@ class ServiceAlarms:
 
     def _find(self, key: str, condition: Condition, now_ns: int) -> None:
         self._board.find(self._watches[key], condition, now_ns)
+
+
+def _stored(health: ServiceHealth) -> Condition:
+    if health.stored_trouble is None:
+        return WITHIN
+    return Condition(AlarmLevel.DANGER, reason=health.stored_trouble)
 
 
 def _refused(health: ServiceHealth) -> Condition:

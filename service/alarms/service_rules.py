@@ -69,6 +69,7 @@ def service_watches(units: Iterable[str], rules: ServiceRules) -> dict[str, Watc
         Watch(_identity(RECORDINGS, AlarmKind.RECORDINGS_DAMAGED), lasting, RECORDINGS),
         Watch(_identity(SERVICE, AlarmKind.QUESTIONS_REFUSED), steady, SERVICE),
         Watch(_identity(DISK, AlarmKind.DISK_NEARLY_FULL), steady, DISK),
+        Watch(_identity(STORE, AlarmKind.STORED_DATA_DAMAGED), soon, STORE),
     ]
     found = {watch.identity.kind.value: watch for watch in watches}
     lost = {unit: _limit(unit, AlarmKind.SAMPLES_LOST, soon, rules.loss) for unit in units}

@@ -53,6 +53,7 @@ AlarmKindName = Literal[
     "recordings_damaged",
     "questions_refused",
     "disk_nearly_full",
+    "stored_data_damaged",
 ]
 
 AlarmChangeName = Literal[

@@ -52,6 +52,8 @@ class Context:
         What is told to Prometheus; None where nobody asks.
     loops
         What is wrong with each loop of the program; None where nothing is.
+    stored_trouble
+        In what stored data are not what was stored; None as far as nothing is known to be wrong.
     checks
         What readiness is told besides, by name; none of it makes the service unready.
     access
@@ -90,6 +92,7 @@ class Context:
     metrics: Callable[[], Awaitable[Collector]] | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
     checks: Callable[[], Mapping[str, str]] = dict
+    stored_trouble: Callable[[], str | None] = lambda: None
     refusals: Refusals | None = None
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     access: AccessDesk | None = None

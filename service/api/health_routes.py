@@ -30,6 +30,7 @@ def health_router(context: Context) -> APIRouter:
         checks["store"] = context.live.store_error or "ok"
         if context.space is not None:
             checks["disk"] = str(context.space)
+        checks["stored data"] = context.stored_trouble() or "ok"
         checks |= context.checks()
         loops = context.loops()
         checks |= {f"loop {name}": trouble or "alive" for name, trouble in loops.items()}

@@ -21,6 +21,7 @@ WITHOUT_SAMPLES = (
     AlarmKind.SAMPLES_NOT_RECORDED,
     AlarmKind.RECORDINGS_DAMAGED,
     AlarmKind.DISK_NEARLY_FULL,
+    AlarmKind.STORED_DATA_DAMAGED,
     AlarmKind.QUESTIONS_REFUSED,
 )
 """Kinds of alarms that no sample can explain."""

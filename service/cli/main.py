@@ -20,6 +20,7 @@ from service.cli.record import record
 from service.cli.replay import replay
 from service.cli.run import run
 from service.cli.serve import serve
+from service.cli.store import app as store_app
 from service.cli.validate import validate
 
 EXIT_BUG = 70
@@ -42,6 +43,7 @@ app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")
 app.add_typer(audit.app, name="audit")
 app.add_typer(recording.app, name="recording")
+app.add_typer(store_app, name="store")
 app.add_typer(readings.app, name="readings")
 app.add_typer(probe.app, name="probe")
 app.add_typer(delivery.app, name="delivery")

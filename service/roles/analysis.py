@@ -29,6 +29,7 @@ from service.roles.ground import Ground
 from service.roles.plant_part import WHOLE, PlantPart
 from service.roles.unit_memory import NO_MEMORIES, UnitMemory
 from service.rolling import Rolling
+from service.soundness import Soundness
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
 from service.wiring.captures import captures_of
@@ -64,6 +65,7 @@ class Analysis:
     retaining: Retaining
     space: SpaceWatch
     load: LoadWatch
+    soundness: Soundness
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Begin the loops beside the blocks; they run until they are cancelled."""
@@ -86,6 +88,7 @@ class Analysis:
             "evidence": self.evidence.run,
             "space": self.space.run,
             "load": self.load.run,
+            "soundness": self.soundness.run,
         }
         if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
             loops |= {"learn": self.films.run, "recordings": self.recordings.run}
@@ -136,6 +139,8 @@ async def analysis_on(
     """
     plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
     live = ground.live
+    soundness = Soundness(store, clock)
+    await soundness.look()  # before anything is written
     if origin is Origin.LIVE:  # a replay begins anew, and misses nothing
         for unit, monitor in monitors.items():
             monitor.go_on(await asyncio.to_thread(store.reach, unit))
@@ -149,7 +154,7 @@ async def analysis_on(
     tape = tape_of(plant, origin, clock, pressure.look)
     space = space_watch(plant, clock)
     look = health_of(
-        monitors, live, recorder, captures, bus, space, load, tape=tape, recordings=recordings
+        monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness
     )
     alarms = await alarm_engine(
         plant,
@@ -190,4 +195,5 @@ async def analysis_on(
         retaining=Retaining(store.retention, retention_limits(plant.retention), clock),
         space=space,
         load=load,
+        soundness=soundness,
     )

@@ -113,6 +113,7 @@ def context_of(
         tape=analysis.tape,
         recordings=(recordings_folder(ground.plant),),
         faults=lambda: analysis.recordings.faults,
+        stored_trouble=lambda: analysis.soundness.trouble,
     )
 
 

@@ -8,6 +8,7 @@ from service.store.audit_chain import AuditChain
 from service.store.database import Connection
 from service.store.highwater.commits import CommitMarks
 from service.store.highwater.comparison import MarkFinding
+from service.store.seals.damage import DamageLog, Place
 
 
 class Marked:
@@ -21,6 +22,8 @@ class Marked:
         Opens a transaction.
     chain
         Is told.
+    damage
+        Of its rows.
     """
 
     def __init__(
@@ -28,8 +31,10 @@ class Marked:
         marks: CommitMarks,
         writing: Callable[[], AbstractContextManager[Connection]],
         chain: AuditChain,
+        damage: DamageLog,
     ) -> None:
         self._marks, self._writing, self._chain = marks, writing, chain
+        self._damage = damage
 
     @property
     def found(self) -> Sequence[MarkFinding]:
@@ -40,6 +45,16 @@ class Marked:
     def mark_error(self) -> str | None:
         """Why the high-water mark could not be written last; None if it could."""
         return self._marks.error
+
+    @property
+    def n_damaged(self) -> int:
+        """Rows that were found damaged since the start, and are left out of what is read."""
+        return self._damage.n_damaged
+
+    @property
+    def damaged(self) -> Sequence[Place]:
+        """Where they are, as far as places are remembered."""
+        return self._damage.places
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
         """Go on with the database as it is, and tell the audit trail; what was wrong with it.

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from service.store.highwater.comparison import MarkFinding
+from service.store.seals.damage import Place
 
 
 class Integrity(Protocol):
@@ -19,6 +20,16 @@ class Integrity(Protocol):
         """Why the high-water mark could not be written last; None if it could."""
         ...
 
+    @property
+    def n_damaged(self) -> int:
+        """Rows that were found damaged since the start, and are left out of what is read."""
+        ...
+
+    @property
+    def damaged(self) -> Sequence[Place]:
+        """Where they are, as far as places are remembered."""
+        ...
+
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
         """Go on with the database as it is, and tell the audit trail; what was wrong with it."""
         ...
@@ -29,6 +40,8 @@ class Unmarked:
 
     found: Sequence[MarkFinding] = ()
     mark_error: str | None = None
+    n_damaged: int = 0
+    damaged: Sequence[Place] = ()
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:  # noqa: ARG002
         """Nothing is to be adopted."""

@@ -8,7 +8,7 @@ from core.quality import Level
 from service.store.codec import Layout
 from service.store.conditions import BETWEEN_BOUNDS, IN_STATES
 from service.store.database import Connection
-from service.store.port import QueryTooLargeError, TrendQuery
+from service.store.port import QueryTooLargeError, StoreError, TrendQuery
 from service.store.summaries import Summaries
 
 MAX_ROWS = 1_000_000
@@ -122,6 +122,8 @@ def decoded_rows(rows: list[Row], layouts: dict[int, Layout], names: tuple[str, 
     value = np.full((len(rows), len(names)), np.nan)
     level = np.full((len(rows), len(names)), Level.BAD, dtype=np.uint8)
     for id_ in np.unique(layout_of_row).tolist():
+        if id_ not in layouts:
+            raise StoreError(f"layout {id_} of readings is damaged or missing")
         layout, where = layouts[id_], np.flatnonzero(layout_of_row == id_)
         numbers, levels = layout.decode([rows[i][2] for i in where], [rows[i][3] for i in where])
         place = {name: column for column, name in enumerate(layout.quantities)}

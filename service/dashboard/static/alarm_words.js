@@ -43,6 +43,7 @@ const KINDS = {
   recordings_damaged: "Recordings damaged or missing",
   questions_refused: "Too busy to answer",
   disk_nearly_full: "Disk nearly full",
+  stored_data_damaged: "Stored data damaged or missing",
 };
 
 const STATES = {

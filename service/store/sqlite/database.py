@@ -11,10 +11,12 @@ from service.store.database import Connection, Unreadable
 from service.store.highwater.commits import CommitMarks
 from service.store.highwater.file import MarkFile, mark_path
 from service.store.port import StoreError
+from service.store.seals.damage import DamageLog
 from service.store.sqlite.file_length import why_cut
 from service.store.sqlite.holding import FileHold, held
 from service.store.sqlite.migrating import migrate
 from service.store.sqlite.readers import Readers
+from service.store.sqlite.sealing import Seals
 from service.store.sqlite.trouble import told
 from service.store.sqlite.writer import Writer, opened
 
@@ -39,6 +41,8 @@ class SqliteDatabase:
     ----------
     had_trail
         Whether there was an audit trail in it before it was opened.
+    damage
+        Rows that were found not to be what was written.
     marks
         Whether it is the database that was here last.
 
@@ -52,7 +56,9 @@ class SqliteDatabase:
 
     def __init__(self, path: Path, origin: Origin) -> None:
         self._path = path
-        self._readers = Readers(path)
+        self.damage = DamageLog()
+        self.seals = Seals(self.damage)
+        self._readers = Readers(path, prepare=self.seals.guard)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._renamed_errors():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -111,9 +117,10 @@ class SqliteDatabase:
             connection.execute(f"PRAGMA {setting}")  # of a file yet to be written
         had_trail = connection.execute(HAS_TRAIL).fetchone() is not None
         migrate(connection, str(self._path), origin)  # first: what is not ours stays as it is
-        self.writer = Writer(self._path, connection, self.marks)
+        self.writer = Writer(self._path, connection, self.marks, self.seals.begin)
         with self.writer.transaction():
             self.marks.open(connection, said)
+            self.seals.begin(connection)
         return had_trail
 
     @contextmanager

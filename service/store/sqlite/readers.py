@@ -27,10 +27,17 @@ class Readers:
     ----------
     now_s
         Clock that only goes forward.
+    prepare
+        Makes a new connection fit for reading.
     """
 
-    def __init__(self, path: Path, now_s: Callable[[], float] = CLOCK.monotonic_s) -> None:
-        self._path, self._now_s = path, now_s
+    def __init__(
+        self,
+        path: Path,
+        now_s: Callable[[], float] = CLOCK.monotonic_s,
+        prepare: Callable[[sqlite3.Connection], None] = lambda _: None,
+    ) -> None:
+        self._path, self._prepare, self._now_s = path, prepare, now_s
         self._file: tuple[int, int] | None = None
         self._uri = f"{path.absolute().as_uri()}?mode=ro"
         self._lock = Lock()
@@ -73,7 +80,18 @@ class Readers:
                     self._idle.pop().close()
             if self._idle:
                 return self._idle.pop()
-        return sqlite3.connect(self._uri, uri=True, timeout=BUSY_TIMEOUT_S, check_same_thread=False)
+        return self._opened()
+
+    def _opened(self) -> sqlite3.Connection:
+        reader = sqlite3.connect(
+            self._uri, uri=True, timeout=BUSY_TIMEOUT_S, check_same_thread=False
+        )
+        try:
+            self._prepare(reader)
+        except BaseException:
+            reader.close()
+            raise
+        return reader
 
     def _is_another_file(self) -> bool:
         """Whether the file of that name was moved away or replaced; SQLite would not notice."""

@@ -51,7 +51,7 @@ class SqliteStore(SqlStore):
                 begin_head(head_path(path))
             super().__init__(database, head_path(path), address, spectra)
             self.retention = SqlRetention(self._writing, self._reader, database.give_back)
-            self.integrity = Marked(database.marks, self._writing, self._chain)
+            self.integrity = Marked(database.marks, self._writing, self._chain, database.damage)
         except OSError as error:
             database.close()
             raise StoreError(f"{path}: {error}") from error

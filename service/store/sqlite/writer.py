@@ -1,7 +1,7 @@
 """`Writer`: the one connection that writes, and is not trusted after an error of the disk."""
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
@@ -36,10 +36,18 @@ class Writer:
         Open.
     marks
         Whether it is the database that was here last.
+    prepare
+        Makes a connection fit for writing, within a transaction.
     """
 
-    def __init__(self, path: Path, connection: sqlite3.Connection, marks: CommitMarks) -> None:
-        self._path, self._marks = path, marks
+    def __init__(
+        self,
+        path: Path,
+        connection: sqlite3.Connection,
+        marks: CommitMarks,
+        prepare: Callable[[sqlite3.Connection], None],
+    ) -> None:
+        self._path, self._marks, self._prepare = path, marks, prepare
         self.connection = connection
         self.lock = Lock()
         self._is_in_doubt = False
@@ -84,6 +92,7 @@ class Writer:
         set_up(self.connection)
         with _begun(self.connection):
             self._marks.open(self.connection, said)
+            self._prepare(self.connection)
         self._is_in_doubt = False
 
 

@@ -11,7 +11,12 @@ async def test_a_service_that_works_is_alive_and_ready(running: Any) -> None:
 
     assert ready == {
         "status": "ok",
-        "checks": {"unit U1": "connected", "unit U2": "not_connected", "store": "ok"},
+        "checks": {
+            "unit U1": "connected",
+            "unit U2": "not_connected",
+            "store": "ok",
+            "stored data": "ok",
+        },
     }
 
 

@@ -194,16 +194,14 @@ def test_no_baseline_is_ever_changed_or_taken_away(
     connection.close()
 
 
-def test_a_damaged_baseline_is_refused_by_name(
-    store: SqliteStore, baseline: BearingBaseline, tmp_path: Path
+def test_a_baseline_that_makes_no_sense_is_refused_by_name(
+    store: SqliteStore, baseline: BearingBaseline
 ) -> None:
     store.films.add_baseline(baseline, [])
-    connection = sqlite3.connect(tmp_path / "padwatch.sqlite3")
-    connection.execute("DROP TRIGGER baseline_kept_as_learned")
-    connection.execute("UPDATE baseline SET document = replace(document, 'knot', 'kn0t')")
-    connection.execute("UPDATE baseline SET document = substr(document, 1, 5000)")
-    connection.commit()
-    connection.close()
+    writer = store._writer
+    writer.execute("DROP TRIGGER baseline_kept_as_learned")
+    writer.execute("UPDATE baseline SET document = replace(document, 'knot', 'kn0t')")
+    writer.execute("UPDATE baseline SET document = substr(document, 1, 5000)")
     with pytest.raises(StoreError, match="baseline 1 of unit U1 bearing UJB"):
         store.films.baseline("U1", "UJB", 1)
 

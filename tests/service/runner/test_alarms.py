@@ -183,9 +183,8 @@ async def test_an_alarm_that_nothing_watches_any_more_is_closed_and_says_so(
     plant: Any, scripted: Make, block: Make
 ) -> None:
     await play(plant, scripted, [lost(block(n)) for n in range(6)])
-    with sqlite3.connect(plant.path) as connection:  # as if the channel had been renamed since
-        connection.execute("UPDATE alarm SET id = 'U1:old:channel_not_ok', subject = 'old'")
-    connection.close()
+    with plant.store.database.writing() as writer:  # as if the channel had been renamed since
+        writer.execute("UPDATE alarm SET id = 'U1:old:channel_not_ok', subject = 'old'")
 
     plant.start_alarms()
     await plant.recorder.flush()

@@ -154,15 +154,13 @@ def test_a_reference_outside_its_limits_is_refused_with_value_and_limit(
         reference(**changes)
 
 
-def test_a_damaged_reference_is_an_error_of_the_store(store: SqliteStore, path: Path) -> None:
+def test_a_reference_that_makes_no_sense_is_an_error_of_the_store(store: SqliteStore) -> None:
     store.add_reference(reference())
-    connection = sqlite3.connect(path)
-    connection.execute(
-        "INSERT INTO gap_reference SELECT 7, unit, bearing, set_ns, '', x_um, y_um, NULL, NULL,"
-        " source, note FROM gap_reference"
-    )
-    connection.commit()
-    connection.close()
+    with store.database.writing() as writer:
+        writer.execute(
+            "INSERT INTO gap_reference SELECT 7, unit, bearing, set_ns, '', x_um, y_um, NULL, NULL,"
+            " source, note FROM gap_reference"
+        )
 
     with pytest.raises(StoreError, match="unit U1 bearing UJB: author '' is empty"):
         store.references()

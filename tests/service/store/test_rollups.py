@@ -289,13 +289,12 @@ def test_a_reading_from_the_future_does_not_make_all_others_late(
 
 
 def test_a_quantity_that_was_not_known_when_it_was_gathered_is_null_there(
-    rolled: SqliteStore, plain: SqliteStore, path_of: Callable[[str], Path]
+    rolled: SqliteStore, plain: SqliteStore
 ) -> None:
-    for name in ("rolled", "plain"):
-        with closing(sqlite3.connect(path_of(name))) as other, other:
-            other.execute(
-                "UPDATE layout SET quantities = replace(quantities, 'vortex_roundness', 'gone')"
-            )
+    for store in (rolled, plain):
+        store._writer.execute(
+            "UPDATE layout SET quantities = replace(quantities, 'vortex_roundness', 'gone')"
+        )
 
     require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
     assert set(rolled.trend(WHOLE).series["vortex_roundness"].worst_level) <= {Level.BAD, None}

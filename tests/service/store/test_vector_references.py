@@ -57,12 +57,11 @@ def test_what_was_set_is_kept(path: Path, statement: str) -> None:
 @pytest.mark.parametrize("vectors", ['{"shaft_x": [-1.0, null]}', '{"shaft_x": 7}'])
 def test_a_reference_that_makes_no_sense_is_named(path: Path, vectors: str) -> None:
     store = SqliteStore(path)
-    with sqlite3.connect(path) as other:
-        other.execute(
-            "INSERT INTO vector_reference (unit, bearing, state, set_ns, author, note, vectors)"
-            " VALUES ('U1', 'UJB', 5, 1, 'x', '', ?)",
-            (vectors,),
-        )
+    store._writer.execute(
+        "INSERT INTO vector_reference (unit, bearing, state, set_ns, author, note, vectors)"
+        " VALUES ('U1', 'UJB', 5, 1, 'x', '', ?)",
+        (vectors,),
+    )
     with pytest.raises(StoreError, match="1× reference of unit U1 bearing UJB"):
         store.order1_references.in_force()
     store.close()

@@ -1,0 +1,1 @@
+"""Seals: a checksum for each stored row, in a table beside it."""

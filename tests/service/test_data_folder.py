@@ -1,0 +1,40 @@
+"""A service keeps its results only where they are kept."""
+
+from pathlib import Path
+
+import pytest
+from structlog.testing import capture_logs
+
+from service.instance import only_one
+from service.store.file_system import FileSystem
+from service.store.port import StoreError
+
+
+def test_a_data_folder_on_a_network_file_system_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    database = tmp_path / "data" / "padwatch.sqlite3"
+    said = r"data is on a network file system \(nfs4\).*: choose a data folder on a local disk"
+
+    with (
+        pytest.raises(StoreError, match=said),
+        only_one(database, lambda _: FileSystem("nfs4", is_remote=True)),
+    ):
+        pytest.fail("it was let in")
+
+    assert not database.parent.exists()
+
+
+def test_a_data_folder_that_may_forget_is_used_and_warned_of(tmp_path: Path) -> None:
+    with (
+        capture_logs() as logs,
+        only_one(tmp_path / "x", lambda _: FileSystem("tmpfs", warning="is memory")),
+    ):
+        pass
+
+    assert [(entry["log_level"], entry["why"]) for entry in logs] == [("warning", "is memory")]
+
+
+def test_a_local_disk_is_nothing_to_speak_of(tmp_path: Path) -> None:
+    with capture_logs() as logs, only_one(tmp_path / "x", lambda _: FileSystem("ext4")):
+        pass
+
+    assert logs == []

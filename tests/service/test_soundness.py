@@ -1,0 +1,90 @@
+"""Damage to what is stored is told while the service runs: alarm, audit trail, readiness."""
+
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.alarms.alarm import AlarmKind, AlarmLevel
+from core.assessment import Assessment
+from service.alarms.health import ServiceHealth
+from service.alarms.service_alarms import ServiceAlarms
+from service.soundness import Soundness
+from service.store.audit_port import AuditQuery
+from service.store.port import TrendQuery
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Assessment]
+T0 = 1_767_225_600_000_000_000
+EVERYTHING = TrendQuery("U1", "UJB", ("speed_rpm",), 0, 2**62, 5000, 2**62)
+
+
+@pytest.fixture
+def path(tmp_path: Path, assessment: Build) -> Path:
+    """A database with three results."""
+    made = tmp_path / "data" / "padwatch.sqlite3"
+    with closing(SqliteStore(made)) as store:
+        store.append([assessment(T0 + n, speed_rpm=float(n)) for n in range(3)], [])
+    return made
+
+
+async def test_of_what_is_sound_nothing_is_said(path: Path, stepped_clock: Any) -> None:
+    with closing(SqliteStore(path)) as store:
+        soundness = Soundness(store, stepped_clock)
+        await soundness.look()
+
+        assert soundness.trouble is None
+        assert store.audit.entries(AuditQuery()) == []
+
+
+async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_runs(
+    path: Path, stepped_clock: Any, assessment: Build, tmp_path: Path
+) -> None:
+    old = tmp_path / "old"
+    shutil.copyfile(path, old)
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(T0 + 9, speed_rpm=9.0)], [])
+    shutil.copyfile(old, path)
+    with closing(SqliteStore(path)) as store:
+        soundness = Soundness(store, stepped_clock)
+        for _ in range(3):
+            await soundness.look()
+
+        assert soundness.trouble is not None
+        assert "rolled back: 2 transactions" in soundness.trouble
+        assert len(store.audit.entries(AuditQuery(action="store.rolled_back"))) == 1
+
+
+async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_clock: Any) -> None:
+    with closing(sqlite3.connect(path)) as other, other:
+        other.execute("UPDATE assessment SET coverage = 0.5")
+    with closing(SqliteStore(path)) as store:
+        soundness = Soundness(store, stepped_clock)
+        for _ in range(3):
+            assert list(store.trend(EVERYTHING).time_ns) == []
+            await soundness.look()
+        told = store.audit.entries(AuditQuery(action="store.row_damaged"))
+
+        assert soundness.trouble == "3 stored rows are damaged, and left out"
+        assert sorted(entry.object for entry in told) == [
+            f"assessment: series 1, time_ns {T0 + n}" for n in range(3)
+        ]
+
+
+def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() -> None:
+    trouble: list[str | None] = ["3 stored rows are damaged, and left out"]
+    alarms = ServiceAlarms((), None, lambda: ServiceHealth(stored_trouble=trouble[0]))
+    (raised,) = (e for news in alarms.tick(T0) for e in news.events)
+    trouble[0] = None
+    (returned,) = (e for news in alarms.tick(T0 + 10**9) for e in news.events)
+
+    assert raised.identity.kind is AlarmKind.STORED_DATA_DAMAGED
+    assert (raised.level, str(raised.reason)) == (
+        AlarmLevel.DANGER,
+        "3 stored rows are damaged, and left out",
+    )
+    assert returned.change.value == "returned"

@@ -1,0 +1,75 @@
+"""All that a store hands out, row by row, as those who ask it see it."""
+
+import sqlite3
+from collections.abc import Mapping
+from pathlib import Path
+
+from harness.deeds import T0_NS, Build, deed
+from service.audit.entry import Deed
+from service.security.keys import ApiKey
+from service.security.roles import Role
+from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+
+Rows = Mapping[str, frozenset[tuple[object, ...]]]
+
+OTHERS = (
+    "INSERT INTO baseline (unit, bearing, estimator, version, created_ns, author, learned_from_ns,"
+    " learned_until_ns, event, document) VALUES"
+    " ('U9', 'UJB', 'ratio', 1, 5, 'A', 1, 4, 'maintenance', hex(randomblob(6000)))",
+    "INSERT INTO baseline_step (unit, bearing, version, step, time_ns, actor, reason)"
+    " VALUES ('U9', 'UJB', 1, 'learned', 5, 'padwatch', '')",
+    "INSERT INTO shaft_response VALUES ('U9', 5, hex(randomblob(500)))",
+    "INSERT INTO simulated_past VALUES (1, 5, 50) ON CONFLICT DO NOTHING",
+    "INSERT INTO vector_reference (unit, bearing, state, set_ns, author, note, vectors)"
+    " VALUES ('U1', 'UJB', 5, 1, 'A', 'a note', '{\"shaft_x\": [12.5, 30.0]}')",
+    "INSERT INTO session VALUES (randomblob(32), 'A. Name', 5, 6)",
+)
+"""Rows that a store takes only from those who can make them."""
+
+
+WHAT = {"layout": "quantities, reasons"}
+"""A store that is opened writes the layout of its rows again where it does not find it."""
+
+
+def fill(path: Path, seed: int, n_deeds: int, build: Build) -> None:
+    """Write something of every kind; the last quarter of it is still in the log."""
+    store = SqliteStore(path)
+    for number in range(n_deeds):
+        deed(seed, number, build).append_to(store)
+        if number == n_deeds // 2:
+            _others(store)
+        if number == 3 * n_deeds // 4:
+            store._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    for series in store.rollups.due(T0_NS + 10**15):
+        store.rollups.gather(series, T0_NS + 10**15)
+
+
+def _others(store: SqliteStore) -> None:
+    source = ReferenceSource.GIVEN
+    for n in range(3):
+        gaps = (2000.0 + n, 2001.5)
+        store.add_reference(GapReference("U1", "UJB", T0_NS + n, "A", gaps, None, source, "note"))
+    store.access.accounts.add("A. Name", Role.ADMIN, "$argon2id$" + "x" * 80, T0_NS)
+    store.access.accounts.add("B. Name", Role.VIEWER, "$argon2id$" + "y" * 80, T0_NS)
+    store.access.keys.add(ApiKey("k1", "wall", b"d" * 32, Role.VIEWER, ("U1",), 5, 9, None, None))
+    store.audit.record(
+        [Deed(T0_NS + n, "A", "told", "something", after={"n": n}) for n in range(9)]
+    )
+    with store.database.writing() as writer:
+        for statement in OTHERS:
+            writer.execute(statement)
+
+
+def served(store: SqliteStore) -> tuple[Rows, list[str]]:
+    """What is in each table for those who read it, and what was refused with an error."""
+    rows, errors = {}, []
+    for table in store.database.seals.tables:
+        try:
+            with store.database.reading() as reader:
+                found = reader.execute(f"SELECT {WHAT.get(table, '*')} FROM {table}").fetchall()  # noqa: S608
+            rows[table] = frozenset(found)
+        except (StoreError, sqlite3.Error) as error:
+            errors.append(f"{table}: {error}")
+    return rows, errors

@@ -1,0 +1,178 @@
+"""Anything may be wrong with what lies on the disk: nothing wrong is served, and loss is told."""
+
+import shutil
+from collections import Counter
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.corruption import CHANGES, corrupted
+from harness.deeds import Build
+from harness.everything import Rows, fill, served
+
+from acquisition.errors import ConfigError
+from acquisition.raw import RawBlock
+from acquisition.recording.manifest import RecordedChannel, RecordedUnit
+from acquisition.recording.reader import open_recording
+from acquisition.recording.writer import RecordingWriter
+from core.machine import Measurand
+from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+from service.store.sqlite.checking import findings
+from service.store.sqlite.sealing import Seals
+
+N_STORES, N_RECORDINGS = 1600, 400
+N_DEEDS = 60
+DATABASE = "padwatch.sqlite3"
+TARGETS = (
+    DATABASE,
+    DATABASE,
+    DATABASE,
+    DATABASE + "-wal",
+    DATABASE + "-wal",
+    "padwatch.high-water-mark",
+    "padwatch.audit-head.json",
+)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build) -> Path:
+    """A data folder as kill -9 leaves it, with something of every kind in it."""
+    folder = tmp_path_factory.mktemp("whole")
+    live = folder / "live" / DATABASE
+    fill(live, torture_seed, N_DEEDS, assessment)
+    shutil.copytree(live.parent, folder / "data", ignore=shutil.ignore_patterns("*-shm"))
+    return folder / "data"
+
+
+@pytest.fixture(scope="module")
+def truth(whole: Path, tmp_path_factory: pytest.TempPathFactory) -> Rows:
+    """What is in it."""
+    copied = tmp_path_factory.mktemp("truth") / "data"
+    shutil.copytree(whole, copied)
+    with closing(SqliteStore(copied / DATABASE)) as store:
+        rows, errors = served(store)
+        assert store.integrity.n_damaged == 0
+    assert not errors
+    assert not list(findings(copied / DATABASE))
+    return rows
+
+
+def outcome(folder: Path, truth: Rows) -> tuple[str, set[str]]:
+    """What becomes of a damaged folder, and tables of which something wrong is served."""
+    path = folder / DATABASE
+    try:
+        store = SqliteStore(path)
+    except StoreError:
+        return "refused", set()
+    with closing(store):
+        rows, errors = served(store)
+        is_told = bool(errors or store.integrity.n_damaged or store.integrity.found)
+    wrong = {table for table, found in rows.items() if found - truth[table]}
+    is_missing = any(truth[table] - found for table, found in rows.items())
+    if not is_missing and not errors:
+        return ("told" if is_told else "harmless"), wrong
+    if is_told or any(True for _ in findings(path)):
+        return "told", wrong
+    return "silent", wrong
+
+
+def damaged(whole: Path, folder: Path, rng: np.random.Generator) -> str:
+    """A copy of the folder with one file damaged; what was done to it."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(whole, folder)
+    target = folder / TARGETS[rng.integers(len(TARGETS))]
+    kind = str(rng.choice(sorted(CHANGES)))
+    target.write_bytes(corrupted(target.read_bytes(), kind, rng))
+    return f"{kind} in {target.name}"
+
+
+def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
+    whole: Path, truth: Rows, tmp_path: Path, torture_seed: int, times: Callable[[int], int]
+) -> None:
+    rng = np.random.default_rng(torture_seed)
+    counted: Counter[str] = Counter()
+    for number in range(times(N_STORES)):
+        done = damaged(whole, tmp_path / "data", rng)
+        became, wrong = outcome(tmp_path / "data", truth)
+        assert not wrong, (number, done)
+        assert became != "silent", (number, done)
+        counted[became] += 1
+    print(dict(counted))
+    assert counted["told"]
+    assert counted["refused"]
+
+
+def test_a_store_without_seals_is_found_out(
+    whole: Path,
+    truth: Rows,
+    tmp_path: Path,
+    torture_seed: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Seals, "guard", lambda *_: None)
+    rng = np.random.default_rng(torture_seed)
+    for _ in range(300):
+        damaged(whole, tmp_path / "data", rng)
+        if outcome(tmp_path / "data", truth)[1]:
+            return
+    pytest.fail("nobody noticed that there are no seals")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
+    """A recording, and all its samples."""
+    folder = tmp_path_factory.mktemp("recording") / "run"
+    channels = tuple(
+        RecordedChannel(
+            id=f"c{n}",
+            measurand=Measurand.VELOCITY_MM_S,
+            full_scale_v=10.0,
+            unit_per_v=1.0,
+            ok_min_v=-9.0,
+            ok_max_v=9.0,
+        )
+        for n in range(3)
+    )
+    writer = RecordingWriter(
+        folder, RecordedUnit(unit="U1", rate_hz=600.0, channels=channels, slow_channels=()), "test"
+    )
+    rng = np.random.default_rng(5)
+    for n in range(40):
+        counts = rng.integers(-30000, 30000, (3, 50)).astype(np.int16)
+        start_ns = 1_767_225_600_000_000_000 + round(n * 50 / 600 * 1e9)
+        writer.write(RawBlock(3, 50 * n, start_ns, 600.0, counts, (True,) * 3, ()))
+    writer.finish()
+    return folder, read(folder)
+
+
+def read(folder: Path) -> bytes:
+    """Everything that a recording hands out."""
+    opened = open_recording(folder)
+    blocks = [
+        f"{b.epoch} {b.first_index} {b.start_ns} {b.ok} {b.slow}".encode() + b.counts.tobytes()
+        for b in opened.raw_blocks()
+    ]
+    return repr(opened.manifest.calibration).encode() + b"".join(blocks)
+
+
+def test_no_wrong_sample_is_read_from_a_damaged_recording(
+    recording: tuple[Path, bytes], tmp_path: Path, torture_seed: int, times: Callable[[int], int]
+) -> None:
+    whole, content = recording
+    rng = np.random.default_rng(torture_seed)
+    n_refused = 0
+    for _ in range(times(N_RECORDINGS)):
+        folder = tmp_path / "run"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(whole, folder)
+        files = sorted(folder.iterdir())
+        target, kind = files[rng.integers(len(files))], str(rng.choice(sorted(CHANGES)))
+        target.write_bytes(corrupted(target.read_bytes(), kind, rng))
+        try:
+            assert read(folder) == content, (kind, target.name)
+        except ConfigError:
+            n_refused += 1
+    assert n_refused
