@@ -71,6 +71,7 @@ def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(
         assert not verdict.told
 
 
+@pytest.mark.planted("writers of several processes at the same time, in PostgreSQL")
 def test_writers_that_do_not_wait_for_one_another_are_caught(
     postgres_place: PostgresPlace,
     tmp_path: Path,

@@ -78,6 +78,7 @@ def test_a_commit_that_never_reached_the_server_is_an_error_and_the_next_write_w
     assert len(stored(postgres_place)) == N_CUTS
 
 
+@pytest.mark.planted("a commit without an answer taken for written, in PostgreSQL")
 def test_a_writer_that_takes_silence_for_success_is_caught(
     cut_store: PostgresStore,
     proxy: CuttingProxy,
@@ -113,6 +114,7 @@ def test_what_was_acknowledged_outlives_a_server_that_stops_dead(
     assert lost_at_power_cuts(own_place, lambda number: assessment(at(number))) == 0
 
 
+@pytest.mark.planted("synchronous_commit off, in PostgreSQL")
 def test_commits_that_do_not_wait_for_the_disk_are_caught(
     own_place: PostgresPlace, assessment: Build, at: At, monkeypatch: pytest.MonkeyPatch
 ) -> None:
