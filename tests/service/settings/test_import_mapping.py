@@ -108,7 +108,9 @@ def test_a_wrong_mapping_is_refused_with_line_and_key(
 
 def test_the_example_in_the_guide_is_a_right_mapping(tmp_path: Path) -> None:
     guide = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
-    (tmp_path / "map.toml").write_text(guide.split("```toml\n")[1].split("```")[0])
+    blocks = [block.split("```")[0] for block in guide.split("```toml\n")[1:]]
+    mapping = next(block for block in blocks if "slow_channel" in block)
+    (tmp_path / "map.toml").write_text(mapping)
     assert load_toml(tmp_path / "map.toml", ImportMapping).slow_channel[0].unit == "degC"
 
 
