@@ -152,7 +152,13 @@ def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
     assert wrong(empty.with_name("case"), outcome, torture_seed, assessment) is None
 
 
-@pytest.mark.parametrize(("bug", "what"), [("promises_anyway", "lost"), ("in_two_parts", "torn")])
+@pytest.mark.parametrize(
+    ("bug", "what"),
+    [
+        pytest.param(bug, what, marks=pytest.mark.planted(f"failing call: {bug}"), id=bug)
+        for bug, what in (("promises_anyway", "lost"), ("in_two_parts", "torn"))
+    ],
+)
 def test_planted_bugs_are_found(
     begun: Begun, empty: Path, torture_seed: int, assessment: Build, bug: str, what: str
 ) -> None:

@@ -96,6 +96,7 @@ def _nothing_was(alarm: Alarm) -> Alarm:
 
 
 @pytest.mark.parametrize("bug", [_on_whatever_was, _nothing_was])
+@pytest.mark.planted("alarm edge lost or doubled by a restart")
 async def test_an_alarm_edge_that_a_restart_loses_or_doubles_is_found_out(
     plant: Any, scripted: Any, block: Block, bug: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
