@@ -2,6 +2,7 @@
 
 import signal
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -88,11 +89,11 @@ class Bench:
             found = api.get("/api/v1/alarms")["alarms"]
         return [one for one in found if one["kind"] == kind and one["level"] is not None]
 
-    def raised(self) -> set[str]:
-        """Kinds of all alarms that were ever raised."""
+    def raised(self) -> Counter[str]:
+        """How often alarms of a kind were raised."""
         with self.rig.api() as api:
             events = api.get("/api/v1/alarms/events?limit=1000")["events"]
-        return {event["kind"] for event in events if event["change"] == "raised"}
+        return Counter(event["kind"] for event in events if event["change"] == "raised")
 
     def gaps(self) -> list[dict[str, Any]]:
         """Recorded gaps of the first unit."""
