@@ -68,7 +68,7 @@ def checked(path: Path) -> Content:
             _require_ours(connection, path)
             _require_whole(connection, path)
             return content_of(connection)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise BackupError(f"{path}: {error}") from error
 
 

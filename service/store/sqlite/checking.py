@@ -69,7 +69,7 @@ def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iter
             if mark is not None:
                 for found in compared(said, mark, host_id()):
                     yield Finding("high_water", found.detail)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         yield Finding("structure", f"cannot be read any further: {error}")
 
 

@@ -129,3 +129,7 @@ class SqliteDatabase:
             yield
         except (OSError, sqlite3.Error) as error:
             raise StoreError(told(self._path, error)) from error
+        except UnicodeDecodeError as error:  # in words of SQLite's about what is damaged
+            raise StoreError(
+                f"{self._path}: the file is damaged: names in it are no text"
+            ) from error

@@ -15,6 +15,7 @@ from service.store.port import StoreError, TrendQuery, UnitGap
 from service.store.seals.damage import MAX_PLACES, DamageLog, Place
 from service.store.seals.seal import seal_of
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.checking import findings
 
 Build = Callable[..., Assessment]
 BuildGap = Callable[..., UnitGap]
@@ -183,6 +184,21 @@ def test_a_store_without_seals_serves_what_was_altered(
         damage(path, "UPDATE assessment SET reading_values = zeroblob(length(reading_values))")
 
         assert list(store.trend(query("speed_rpm")).series["speed_rpm"].mean) == [0.0]
+
+
+def test_a_schema_whose_names_are_no_text_is_refused_and_found(path: Path) -> None:
+    SqliteStore(path).close()
+    damage(path, "CREATE TABLE strange (x)")
+    with closing(sqlite3.connect(path)) as other, other:
+        other.execute("PRAGMA writable_schema = ON")
+        other.execute(
+            "UPDATE sqlite_master SET name = CAST(x'd4' AS TEXT), sql = 'nonsense'"
+            " WHERE name = 'strange'"
+        )
+
+    with pytest.raises(StoreError, match="is damaged: names in it are no text"):
+        SqliteStore(path)
+    assert [finding.kind for finding in findings(path)] == ["structure"]
 
 
 def test_damage_is_remembered_once_a_place_and_counted_beyond_the_limit() -> None:
