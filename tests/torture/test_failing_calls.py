@@ -85,8 +85,8 @@ def wrong(folder: Path, outcome: Outcome, seed: int, build: Build) -> Loss | str
 
 def require_all_or_nothing(
     calls: FailingCalls, base: Path, n: int | None, seed: int, build: Build
-) -> None:
-    """Let chosen calls fail, n of them or all, each on a copy of a folder."""
+) -> str:
+    """Let chosen calls fail, n of them or all, each on a copy of a folder; says what was done."""
     folder = base.with_name("case")
     shutil.copytree(base, folder)
     undisturbed = calls.run(folder)
@@ -102,7 +102,10 @@ def require_all_or_nothing(
         assert outcome.exit_code in ((0, GAVE_UP) if case.is_for_ever else (0,)), (case, outcome)
         assert wrong(folder, outcome, seed, build) is None, (case, outcome)
         n_failed += bool(outcome.errors)
-    print(f"{len(chosen)} of {len(cases)} calls failed, {n_failed} times the store said so")
+    return (
+        f"writes, syncs and changes of files that fail, once and for ever\n  {len(chosen)} of"
+        f" {len(cases)}; the store refused {n_failed} times, and lost nothing"
+    )
 
 
 @pytest.mark.timeout(7200)
@@ -112,9 +115,10 @@ def test_whatever_call_fails_a_transaction_is_whole_or_absent_and_the_store_goes
     torture_seed: int,
     assessment: Build,
     times: Callable[[int], int],
+    figure: Callable[[str], None],
 ) -> None:
     n = None if times(N_CASES) == N_CASES else times(N_CASES)
-    require_all_or_nothing(calls, empty, n, torture_seed, assessment)
+    figure(require_all_or_nothing(calls, empty, n, torture_seed, assessment))
 
 
 @pytest.mark.timeout(3600)
@@ -124,10 +128,12 @@ def test_whatever_call_fails_a_new_database_is_made_all_the_same(
     torture_seed: int,
     assessment: Build,
     times: Callable[[int], int],
+    figure: Callable[[str], None],
 ) -> None:
     nothing = tmp_path / "nothing"
     nothing.mkdir()
-    require_all_or_nothing(calls, nothing, times(N_CASES // 2), torture_seed, assessment)
+    n = times(N_CASES // 2)
+    figure(require_all_or_nothing(calls, nothing, n, torture_seed, assessment))
 
 
 def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") -> Outcome:
