@@ -29,7 +29,7 @@ OF_THE_PLANT = {"order1_shaft_x", "order1_shaft_y", "channel_not_ok", "samples_l
 """What the plant's own story raises, of which the ledger of alarms judges the first two."""
 
 OF_CLOCKS = {"clock_offset", "clock_drift"}
-"""A device's drift is judged by the host's clock, so that a step of this passes for one at first."""
+"""A device's drift is judged by the host's clock: a step of this passes for one at first."""
 
 OF_A_BUSY_HOST = {"questions_refused", "analysis_late", "blocks_waiting"}
 
