@@ -16,6 +16,9 @@ from service.store.port import StoreError
 STORED_WITHIN_S = 10.0
 """How long an operator waits for the disk at most."""
 
+ANSWERS_WITHIN_S = 10.0
+"""And how long before that, to see whether it takes anything."""
+
 
 class InProcess:
     """Asks the engine and the keeper of this process."""
@@ -43,7 +46,7 @@ class InProcess:
 
     async def _require_store(self, alarm: Alarm) -> None:
         try:
-            async with asyncio.timeout(STORED_WITHIN_S):
+            async with asyncio.timeout(ANSWERS_WITHIN_S):
                 await self._recorder.require_store()
         except (StoreError, TimeoutError) as error:
             raise NotCarriedOutError(

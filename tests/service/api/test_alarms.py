@@ -359,7 +359,7 @@ async def test_what_cannot_be_stored_is_said_and_kept(
     answer = await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})
 
     assert answer.status_code == 503
-    assert as_problem(answer)["title"] == "Nothing was done"
+    assert as_problem(answer)["title"] == "Not on the disk yet"
     assert not service.store.alarms()[0].is_acknowledged
     with sqlite3.connect(service.store._path) as connection:
         connection.execute("DROP TRIGGER no")
