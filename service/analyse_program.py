@@ -190,7 +190,7 @@ class Analysing:
         stored = usable(self._stored.get(unit), stream, newest)
         settings = next(its for its in ground.plant.unit if its.id == unit)
         identity = identity_of(self._plant, settings)
-        parts = (analysis.analyser, ground.live, analysis.recorder)
+        parts = (analysis.analyser, ground.live, analysis.recorder, ground.clock)
         return UnitProgress(identity, stream, stored, self._memories.get(unit), *parts)
 
     async def _watch(self, pulse: Pulse) -> None:

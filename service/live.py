@@ -112,23 +112,25 @@ class LiveView:
         self._status[unit] = replace(before, state=state, reason=reason, since_ns=since_ns)
         return before.state is not state
 
-    def set_received(self, block: SampleBlock, account: SampleAccount) -> None:
-        """Note the arrival of a block."""
+    def set_received(
+        self, block: SampleBlock, account: SampleAccount, behind_s: float = 0.0
+    ) -> None:
+        """Note the arrival of a block, that long ago."""
         self._hold(block)
         self._status[block.unit] = replace(
             self._status[block.unit],
             last_sample_ns=block.stop_ns,
-            received_s=self._clock.monotonic_s(),
+            received_s=self._clock.monotonic_s() - behind_s,
             account=account,
             clock=block.clock,
             stamp_fault=block.stamp_fault,
         )
 
-    def set_assessment(self, assessment: Assessment) -> None:
-        """Note a new result."""
+    def set_assessment(self, assessment: Assessment, behind_s: float = 0.0) -> None:
+        """Note a new result, of samples that arrived that long ago."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
-        self._assessments[key] = (self._clock.monotonic_s(), assessment)
+        self._assessments[key] = (self._clock.monotonic_s() - behind_s, assessment)
 
     def status(self, unit: str) -> UnitStatus:
         """How samples of a unit arrive."""

@@ -58,7 +58,7 @@ class Runner:
         pulse.rest()
         async for block in self._bus.blocks():
             pulse.beat()
-            await self._analyser.take(block)
+            await self._analyser.take(block, self._bus.oldest_wait_s)
             self._bus.done()
             await asyncio.sleep(0)  # more blocks may be waiting, but so may others
             pulse.rest()

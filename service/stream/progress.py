@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import structlog
 
-from core.blocks import SampleBlock
+from acquisition.clock import Clock
+from core.units import s_from_ns
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
 from service.roles.analysing import Analyser
@@ -15,7 +16,7 @@ from service.store.positions_port import StreamPosition
 from service.stream.identity import UnitIdentity
 from service.stream.memory import written
 from service.stream.window import Window
-from service.stream.wire import decoded
+from service.stream.wire import Taken, decoded
 from service.stream.wire_errors import WireError
 
 log = structlog.get_logger()
@@ -33,6 +34,9 @@ class UnitProgress:
         How far results reach that are stored, on the same stream; None where there are none.
     memory
         What was known of the unit then.
+    clock
+        Of this host; how far behind a block is can be told as well as it agrees with that of the
+        host that acquires.
     """
 
     def __init__(
@@ -44,12 +48,15 @@ class UnitProgress:
         analyser: Analyser,
         live: LiveView,
         recorder: Recorder,
+        clock: Clock,
     ) -> None:
+        self._clock = clock
         self.unit, self._identity, self._stream = identity.unit, identity, stream
         self._analyser, self._live, self._recorder = analyser, live, recorder
         self._window = Window()
         self._stored = stored
         self._memory = None if stored is None else memory
+        self._heard_s: float | None = None
         self.sequence = 0
         self.refused: Counter[str] = Counter()
         self.n_repeated = 0
@@ -76,6 +83,7 @@ class UnitProgress:
 
     async def take(self, sequence: int, payload: bytes) -> bool:
         """Take a message in; False if it is refused."""
+        self._heard_s = self._clock.monotonic_s()
         if sequence <= self.sequence:
             self.n_repeated += 1
             return True
@@ -105,19 +113,20 @@ class UnitProgress:
 
     def fall_silent(self, after_s: float) -> None:
         """Count the unit as lost where nothing has come of it for so long."""
-        age_s, status = self._live.data_age_s(self.unit), self._live.status(self.unit)
-        if status.state is LinkState.CONNECTED and age_s is not None and age_s > after_s:
+        if self._heard_s is None or self._clock.monotonic_s() - self._heard_s <= after_s:
+            return
+        if self._live.status(self.unit).state is LinkState.CONNECTED:
             reason = f"no block for {after_s:g} s: is `padwatch acquire` running?"
             self._hear(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
 
-    async def _relive(self, sequence: int, message: SampleBlock | LinkNews) -> None:
+    async def _relive(self, sequence: int, message: Taken | LinkNews) -> None:
         self.sequence = sequence
         if isinstance(message, LinkNews):
             self._live.set_link(self.unit, message.state, message.reason)
             return
         self._live.set_link(self.unit, LinkState.CONNECTED)
-        await self._analyser.relive(message)
-        self._window.note(sequence, message, self._analyser.state(self.unit))
+        await self._analyser.relive(message.block, self._behind_s(message))
+        self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _settle(self) -> None:
         """After the last message that was seen once more."""
@@ -125,18 +134,21 @@ class UnitProgress:
             self._analyser.settle(self.unit, self._memory)
         self._stored = self._memory = None
 
-    async def _live_on(self, sequence: int, message: SampleBlock | LinkNews) -> None:
+    async def _live_on(self, sequence: int, message: Taken | LinkNews) -> None:
         if isinstance(message, LinkNews):
             self._hear(message)
             self.sequence = sequence
             return
         if self._live.status(self.unit).state is not LinkState.CONNECTED:
             self._hear(LinkNews(self.unit, LinkState.CONNECTED))
-        findings = await self._analyser.learn(message)
+        findings = await self._analyser.learn(message.block, self._behind_s(message))
         self.sequence = sequence
-        self._window.note(sequence, message, self._analyser.state(self.unit))
+        self._window.note(sequence, message.block, self._analyser.state(self.unit))
         if findings != Findings():
             self._recorder.put(replace(findings, position=self.position()))
+
+    def _behind_s(self, message: Taken) -> float:
+        return max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
 
     def _hear(self, news: LinkNews) -> None:
         if self._live.set_link(news.unit, news.state, news.reason):

@@ -66,7 +66,8 @@ class Publisher:
     async def publish(self, block: SampleBlock) -> None:
         """Take a block, waiting while too much waits for the servers."""
         identity = self._identities[block.unit]
-        outgoing = Outgoing(message_id(identity, block), encoded_block(block, identity))
+        message = encoded_block(block, identity, self._clock.now_ns())
+        outgoing = Outgoing(message_id(identity, block), message)
         await self.waiting.put(block.unit, outgoing)
 
     def tell(self, news: LinkNews) -> None:

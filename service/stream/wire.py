@@ -41,6 +41,7 @@ class BlockHead:
     rejected: tuple[Rejection, ...]
     clock: DeviceClock | None
     stamp_fault: StampFault | None
+    taken_ns: Ns
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,21 @@ class LinkHead:
 _BLOCK, _LINK = TypeAdapter(BlockHead), TypeAdapter(LinkHead)
 
 
-def encoded_block(block: SampleBlock, identity: UnitIdentity) -> bytes:
+@dataclass(frozen=True)
+class Taken:
+    """A block with when it was taken from its device.
+
+    Parameters
+    ----------
+    taken_ns
+        By the clock of the host that acquires: how far behind the analysis is.
+    """
+
+    block: SampleBlock
+    taken_ns: int
+
+
+def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
     """A block as a message. Raises `ValueError` if it is longer than a reader takes."""
     head = BlockHead(
         unit=block.unit,
@@ -71,6 +86,7 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity) -> bytes:
         rejected=block.rejected,
         clock=block.clock,
         stamp_fault=block.stamp_fault,
+        taken_ns=taken_ns,
     )
     samples = np.ascontiguousarray(block.samples, dtype=SAMPLE).tobytes()
     return framed(Kind.BLOCK, identity, _BLOCK.dump_json(head), samples)
@@ -82,7 +98,7 @@ def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
-def decoded(message: bytes, identity: UnitIdentity) -> SampleBlock | LinkNews:
+def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
     """What a message says.
 
     Parameters
@@ -103,7 +119,7 @@ def decoded(message: bytes, identity: UnitIdentity) -> SampleBlock | LinkNews:
     return _block(frame, identity)
 
 
-def _block(frame: Frame, identity: UnitIdentity) -> SampleBlock:
+def _block(frame: Frame, identity: UnitIdentity) -> Taken:
     head = _read(_BLOCK, frame.head)
     _require_own(head.unit, identity)
     n_channels = len(head.channel_quality)
@@ -113,7 +129,7 @@ def _block(frame: Frame, identity: UnitIdentity) -> SampleBlock:
             f"{len(frame.samples)} bytes of samples for {n_channels} channels of {head.n_samples}",
         )
     samples = np.frombuffer(frame.samples, dtype=SAMPLE).reshape(n_channels, head.n_samples)
-    return SampleBlock(
+    block = SampleBlock(
         unit=head.unit,
         epoch=head.epoch,
         first_index=head.first_index,
@@ -126,6 +142,7 @@ def _block(frame: Frame, identity: UnitIdentity) -> SampleBlock:
         clock=head.clock,
         stamp_fault=head.stamp_fault,
     )
+    return Taken(block, head.taken_ns)
 
 
 def _read(adapter: TypeAdapter[T], head: bytes) -> T:

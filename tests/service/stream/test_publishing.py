@@ -21,7 +21,7 @@ from service.stream.errors import StreamError, StreamMisfitError
 from service.stream.names import identity_of, stream_name, subject
 from service.stream.publisher import Publisher
 from service.stream.session import session
-from service.stream.wire import decoded
+from service.stream.wire import Taken, decoded
 
 WAIT_S = 30.0
 
@@ -75,7 +75,8 @@ async def kept(plant: PlantFile, server: NatsServer) -> list[SampleBlock | LinkN
         for sequence in range(state.first_seq, state.last_seq + 1):
             message = await stream.get_msg(stream_name(plant), sequence)
             assert message.subject == subject(plant, unit.id)
-            found.append(decoded(message.data or b"", identity_of(plant, unit)))
+            told = decoded(message.data or b"", identity_of(plant, unit))
+            found.append(told.block if isinstance(told, Taken) else told)
         return found
 
 

@@ -13,10 +13,11 @@ from core.quality import GOOD
 from service.live import LinkState
 from service.roles.link_news import LinkNews
 from service.stream.identity import UnitIdentity, fingerprint
-from service.stream.wire import decoded, encoded_block, encoded_link
+from service.stream.wire import Taken, decoded, encoded_block, encoded_link
 from service.stream.wire_errors import WireError
 
 OWN = UnitIdentity("U1", fingerprint("Plant"), fingerprint("sx"))
+TAKEN_NS = 1_767_225_600_000_000_007
 
 
 def assert_same(found: object, sent: SampleBlock) -> None:
@@ -37,7 +38,10 @@ def test_a_block_comes_back_bit_for_bit(
     block: SampleBlock, bad_block: SampleBlock, identity: UnitIdentity
 ) -> None:
     for sent in (block, bad_block, block.from_sample(7, 9), block.from_sample(60)):
-        assert_same(decoded(encoded_block(sent, identity), identity), sent)
+        found = decoded(encoded_block(sent, identity, TAKEN_NS), identity)
+        assert isinstance(found, Taken)
+        assert found.taken_ns == TAKEN_NS
+        assert_same(found.block, sent)
 
 
 def test_news_of_a_link_come_back(identity: UnitIdentity) -> None:
@@ -49,7 +53,7 @@ def test_news_of_a_link_come_back(identity: UnitIdentity) -> None:
 
 
 def test_a_flipped_bit_anywhere_is_noticed(block: SampleBlock, identity: UnitIdentity) -> None:
-    message = encoded_block(block, identity)
+    message = encoded_block(block, identity, TAKEN_NS)
     for at in range(0, 8 * len(message), 5):
         hurt = bytearray(message)
         hurt[at // 8] ^= 1 << at % 8
@@ -60,7 +64,7 @@ def test_a_flipped_bit_anywhere_is_noticed(block: SampleBlock, identity: UnitIde
 def test_a_message_that_was_cut_or_grew_is_refused(
     block: SampleBlock, identity: UnitIdentity
 ) -> None:
-    message = encoded_block(block, identity)
+    message = encoded_block(block, identity, TAKEN_NS)
     for hurt in (b"", message[:3], message[:50], message[:-1], message + b"\0", message * 2):
         with pytest.raises(WireError) as refused:
             decoded(hurt, identity)
@@ -78,7 +82,7 @@ def test_a_message_that_was_cut_or_grew_is_refused(
 def test_a_message_of_somebody_else_is_refused_with_what_to_do(
     block: SampleBlock, identity: UnitIdentity, other: dict[str, bytes], kind: str, word: str
 ) -> None:
-    message = encoded_block(block, identity)
+    message = encoded_block(block, identity, TAKEN_NS)
     with pytest.raises(WireError, match=word) as refused:
         decoded(message, replace(identity, **other))
     assert refused.value.kind == kind
@@ -87,7 +91,7 @@ def test_a_message_of_somebody_else_is_refused_with_what_to_do(
 def test_a_message_of_a_later_version_asks_for_an_upgrade(
     block: SampleBlock, identity: UnitIdentity
 ) -> None:
-    message = bytearray(encoded_block(block, identity)[:-4])
+    message = bytearray(encoded_block(block, identity, TAKEN_NS)[:-4])
     message[4:6] = struct.pack("<H", 9)
     with pytest.raises(WireError, match=r"version 9.*upgrade `padwatch analyse`") as refused:
         decoded(with_crc(bytes(message)), identity)
@@ -95,7 +99,7 @@ def test_a_message_of_a_later_version_asks_for_an_upgrade(
 
 
 def test_an_unknown_kind_is_refused(block: SampleBlock, identity: UnitIdentity) -> None:
-    message = bytearray(encoded_block(block, identity)[:-4])
+    message = bytearray(encoded_block(block, identity, TAKEN_NS)[:-4])
     message[6:8] = struct.pack("<H", 77)
     with pytest.raises(WireError) as refused:
         decoded(with_crc(bytes(message)), identity)
@@ -126,7 +130,7 @@ def test_hostile_bytes_are_refused(message: bytes) -> None:
 
 
 def test_a_message_that_claims_much_takes_little_memory(block: SampleBlock) -> None:
-    whole = encoded_block(replace(block, channel_quality=(GOOD, GOOD)), OWN)
+    whole = encoded_block(replace(block, channel_quality=(GOOD, GOOD)), OWN, TAKEN_NS)
     (n_head,) = struct.unpack_from("<I", whole, 40)
     head = whole[48 : 48 + n_head].replace(b'"n_samples":60', b'"n_samples":9223372036854775807')
     deep = b"[" * 100_000
@@ -145,4 +149,4 @@ def test_samples_are_float32_little_endian_whatever_they_were(
     block: SampleBlock, identity: UnitIdentity
 ) -> None:
     turned = replace(block, samples=np.asfortranarray(block.samples))
-    assert encoded_block(turned, identity) == encoded_block(block, identity)
+    assert encoded_block(turned, identity, TAKEN_NS) == encoded_block(block, identity, TAKEN_NS)

@@ -26,7 +26,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
 from service.stream.names import identity_of, stream_name, subject
-from service.stream.wire import decoded
+from service.stream.wire import Taken, decoded
 from service.wiring.sources import monitor_of
 
 LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
@@ -91,7 +91,8 @@ async def on_the_stream(plant: PlantFile, server: NatsServer) -> list[Sent]:
         for sequence in range(state.first_seq, state.last_seq + 1):
             message = await stream.get_msg(stream_name(plant), sequence, direct=True)
             identity = identities[str(message.subject)]
-            found.append((identity.unit, decoded(message.data or b"", identity)))
+            told = decoded(message.data or b"", identity)
+            found.append((identity.unit, told.block if isinstance(told, Taken) else told))
         return found
     finally:
         await client.close()
@@ -112,7 +113,7 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
                 analysis.analyser.hear(message)
             else:
                 analysis.analyser.hear(LinkNews(unit, LinkState.CONNECTED))
-                await analysis.analyser.take(message)
+                await analysis.analyser.take(message, 0.0)
                 await analysis.recorder.flush()
     finally:
         await analysis.close()

@@ -1,0 +1,51 @@
+"""What is shown as current is as old as its samples, wherever they have waited."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from core.account import SampleAccount
+from core.assessment import Assessment
+from core.blocks import SampleBlock
+from core.quality import GOOD, Reason
+from service.live import LinkState, LiveView
+
+STALE_AFTER_S = 30.0
+BLOCK = SampleBlock(
+    unit="U1",
+    epoch=1,
+    first_index=0,
+    start_ns=0,
+    rate_hz=600.0,
+    samples=np.zeros((1, 60), dtype=np.float32),
+    channel_quality=(GOOD,),
+    slow={},
+)
+
+
+@pytest.fixture
+def live(stepped_clock) -> LiveView:
+    live = LiveView(["U1"], stepped_clock, STALE_AFTER_S)
+    live.set_link("U1", LinkState.CONNECTED)
+    return live
+
+
+@pytest.mark.parametrize(("behind_s", "is_current"), [(0.0, True), (29.0, True), (31.0, False)])
+def test_a_result_of_samples_that_have_waited_too_long_is_not_current(
+    live: LiveView, assessment: Callable[..., Assessment], behind_s: float, is_current: bool
+) -> None:
+    found = assessment()
+    live.set_assessment(found, behind_s)
+
+    shown = live.current(found.unit, found.bearing)
+
+    assert shown.is_current is is_current
+    assert shown.age_s == pytest.approx(behind_s)
+
+
+def test_samples_age_from_their_arrival_and_not_from_their_analysis(live: LiveView) -> None:
+    live.set_received(BLOCK, SampleAccount(), 31.0)
+
+    assert live.data_age_s("U1") == pytest.approx(31.0)
+    assert live.why_no_samples("U1") is Reason.STALE
