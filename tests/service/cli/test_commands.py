@@ -95,6 +95,7 @@ def test_the_schema_says_what_every_key_means() -> None:
     assert set(schema["properties"]) == {
         *("plant", "service", "analysis", "alarms", "films", "capture", "evidence"),
         *("access", "delivery", "spectra", "unit"),
+        *("store", "stream", "space", "retention", "recording"),
     }
     keys = list(_keys(schema))
     assert len(keys) > 60
