@@ -18,7 +18,7 @@ from service.origin import Origin
 from service.roles.analysis import Analysis, analysis_on
 from service.roles.ground import Ground, live_view
 from service.roles.reporting import reporting_loops
-from service.roles.serving import Serving, context_of, server_for
+from service.roles.serving import Serving, context_of, serving_of
 from service.roles.stopping import stop_on_signals
 from service.roles.watched_unit import WatchedUnit
 from service.runner import BUS_CAPACITY, Runner
@@ -107,7 +107,7 @@ async def _run(
     audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
     await audit.begin()
     context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
-    serving = Serving(ground, server_for(context, ground), listener, desk, announce)
+    serving = serving_of(context, ground, listener, desk, announce)
     supervision = Supervision(manager, ground.beats, ground.live, units, clock)
     try:
         await _perform(runner, analysis, serving, supervision, ends=performance.ends)

@@ -12,7 +12,7 @@ from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
 from service.roles.ground import Ground, live_view
 from service.roles.replica import Replica, replica_context, replica_on
-from service.roles.serving import Serving, server_for
+from service.roles.serving import Serving, serving_of
 from service.roles.stopping import stop_on_signals
 from service.settings.plant import PlantFile
 from service.store.port import Store
@@ -66,7 +66,7 @@ async def _run(
     audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
     await audit.begin()
     context = replica_context(replica, desk, audit.refusals, beats)
-    serving = Serving(ground, server_for(context, ground), listener, desk, announce)
+    serving = serving_of(context, ground, listener, desk, announce)
     supervision = Supervision(manager, beats, replica.live, [u.id for u in plant.unit], clock)
     try:
         await _perform(replica, serving, supervision, beats)

@@ -7,7 +7,6 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.acquire_program import run_acquire
 from service.cli.ending import leave, run_to_its_end
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
@@ -30,6 +29,8 @@ def acquire(
     ] = None,
 ) -> None:
     """Read devices and publish their blocks to the stream until Ctrl-C or SIGTERM."""
+    from service.acquire_program import run_acquire  # loads NATS, which other commands do not need
+
     plant = read_plant_file(plant_file)
     settings = stream_settings(plant)
     wanted = _wanted(plant, unit or [])

@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
-from service.analyse_program import run_analyse
 from service.cli.ending import leave, run_to_its_end
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
@@ -16,7 +15,7 @@ from service.notify import ServiceManager
 from service.roles.partition import Partition
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.stream.consumer import StreamAnewError
+from service.stream.errors import StreamAnewError
 from service.wiring.sources import monitor_of
 
 
@@ -35,6 +34,8 @@ def analyse(
 
     A second process for the same units stands by, and takes over when the first one ends.
     """
+    from service.analyse_program import run_analyse  # loads NATS, which other commands do not need
+
     plant = read_plant_file(plant_file)
     settings = stream_settings(plant)
     part, mine = _part(plant, partition)

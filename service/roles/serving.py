@@ -39,6 +39,8 @@ class Serving:
     announce
         Called with the URL once the server answers, and before with the token for setting up where
         everybody must log in and nobody can.
+    afterwards
+        What need not be there before the server answers; called once, in a thread.
     """
 
     ground: Ground
@@ -46,6 +48,7 @@ class Serving:
     listener: socket.socket
     desk: AccessDesk
     announce: Callable[[str], None]
+    afterwards: Callable[[], object]
 
     def start(self, tasks: asyncio.TaskGroup) -> asyncio.Task[None]:
         """Begin to serve; ends after `stop`."""
@@ -60,21 +63,28 @@ class Serving:
         """Announce the server as soon as it answers."""
         while not self.server.started:
             await asyncio.sleep(0.01)
-        gc.collect()
-        gc.freeze()  # what is there from the start stays: to look through it again takes 0.1 s
-        gc.set_threshold(*GC_THRESHOLDS)
         supervision.ready()
         if token := await self.desk.offer_set_up():
             self.announce(f"to make the first account, within one hour and once: {token}")
         self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
+        await asyncio.to_thread(self.afterwards)
+        gc.collect()
+        gc.freeze()  # what is there from the start stays: to look through it again takes 0.1 s
+        gc.set_threshold(*GC_THRESHOLDS)
 
 
-def server_for(context: Context, ground: Ground) -> GuardedServer:
-    """What serves a context."""
+def serving_of(
+    context: Context,
+    ground: Ground,
+    listener: socket.socket,
+    desk: AccessDesk,
+    announce: Callable[[str], None],
+) -> Serving:
+    """What serves a context. Its description is made once, before a client asks for it."""
     app = create_app(context)
-    app.openapi()  # kept from now on: no client waits for it, nor samples for a client
     asked = app if context.load is None else Shedding(app, context.load)
-    return server_of(asked, ground.plant, ground.clock)
+    server = server_of(asked, ground.plant, ground.clock)
+    return Serving(ground, server, listener, desk, announce, afterwards=app.openapi)
 
 
 def context_of(

@@ -18,7 +18,7 @@ from service.recorder import Findings, Recorder
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
 from service.stream.ensuring import require
-from service.stream.errors import StreamError, StreamMisfitError
+from service.stream.errors import StreamAnewError, StreamError, StreamMisfitError
 from service.stream.names import consumer_name, stream_name, subject
 from service.stream.progress import UnitProgress
 from service.stream.session import session
@@ -169,10 +169,6 @@ class Consumer:
         else:
             log.warning("blocks are not being read from the stream", reason=trouble)
         self.trouble = trouble
-
-
-class StreamAnewError(Exception):
-    """The stream is another one than before: what is known of it counts no more."""
 
 
 async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:

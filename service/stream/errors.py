@@ -4,6 +4,7 @@
 
     StreamError
     └─ StreamMisfitError   stays so until somebody changes servers or settings
+    StreamAnewError        another stream than before; what is known of it begins anew
 """
 
 
@@ -13,3 +14,7 @@ class StreamError(Exception):
 
 class StreamMisfitError(StreamError):
     """Servers, stream and plant file do not fit together; the message says what to do."""
+
+
+class StreamAnewError(Exception):
+    """The stream is another one than before: what is known of it counts no more."""

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 from service.roles.partition import Partition
 from service.settings.loading import load_plant_file
 

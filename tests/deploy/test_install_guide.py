@@ -5,7 +5,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from typing import Any
 import typer
 
 from padwatch_reference.words import code
-from service.cli.main import app
+from service.cli.commands import app
 
 OPTION_HEAD = "| Argument or option | Meaning |\n|---|---|"
 

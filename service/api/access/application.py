@@ -1,6 +1,7 @@
 """An application whose routes all say what they need, and that holds everybody to it."""
 
 from collections.abc import Mapping
+from threading import Lock
 from typing import Any
 
 from fastapi import Depends, FastAPI
@@ -24,6 +25,7 @@ class GuardedApi(FastAPI):
     def __init__(self, **options: Any) -> None:
         super().__init__(dependencies=[Depends(require_declared)], **options)
         self._declared: Mapping[str, Declared] = {}
+        self._describing = Lock()
 
     def stand_behind(self, desk: AccessDesk) -> None:
         """Put the gate before what has been added so far; later middleware stands before it."""
@@ -45,10 +47,14 @@ class GuardedApi(FastAPI):
         return self._declared
 
     def openapi(self) -> dict[str, Any]:
-        """The published description, made once: routes are no longer added."""
-        if self.openapi_schema is not None:
-            return self.openapi_schema
-        document: dict[str, Any] = super().openapi()
-        describe_access(document, self.declared)
-        describe_answers(document)
-        return document
+        """The published description, made once: routes are no longer added.
+
+        Whoever asks while it is being made waits, and gets no half of it.
+        """
+        with self._describing:
+            if self.openapi_schema is not None:
+                return self.openapi_schema
+            document: dict[str, Any] = super().openapi()
+            describe_access(document, self.declared)
+            describe_answers(document)
+            return document

@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from service.audit.entry import Deed
 from service.audit.head import head_path
-from service.cli.main import app
+from service.cli.commands import app
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000

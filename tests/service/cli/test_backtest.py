@@ -7,7 +7,7 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 
 HEADINGS = (
     "time,unit,bearing,direction,k_n_per_m,u_random,eccentricity_ratio,oil_temperature_c,quality"

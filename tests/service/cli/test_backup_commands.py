@@ -6,7 +6,7 @@ from typing import Any
 
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 from service.store.sqlite import SqliteStore
 
 ROOT = Path(__file__).parents[3]

@@ -6,7 +6,7 @@ import pytest
 from harness.places import PostgresPlace
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 
 
 @pytest.fixture

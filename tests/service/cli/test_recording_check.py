@@ -14,7 +14,7 @@ from acquisition.clock import SystemClock
 from acquisition.raw import RawBlock
 from acquisition.recording.manifest import RecordedUnit
 from acquisition.recording.writer import RecordingWriter
-from service.cli.main import app
+from service.cli.commands import app
 from service.settings.loading import load_plant_file
 from service.wiring.recorded_units import recorded_unit
 from service.wiring.stores import open_store

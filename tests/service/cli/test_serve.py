@@ -4,7 +4,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 from service.cli.serve import NEEDS_POSTGRESQL
 
 PLANT = Path(__file__).parents[3] / "deploy" / "plant.toml"

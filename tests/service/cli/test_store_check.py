@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from core.assessment import Assessment
-from service.cli.main import app
+from service.cli.commands import app
 from service.store.sqlite import SqliteStore
 
 Build = Callable[..., Assessment]

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from service.cli.main import app
+from service.cli.commands import app
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 
