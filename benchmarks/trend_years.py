@@ -26,6 +26,7 @@ from service.store.rollups.cells import Cells, Conditions
 from service.store.rollups.making import insert_cells
 from service.store.rollups.rolling import SET_MARK
 from service.store.rollups.widths import HOUR_NS, NS_PER_S, WIDTHS_NS
+from service.store.series import series_of
 from service.store.sqlite import SqliteStore
 from service.store.summaries import Summaries
 from service.store.value_range import ValueRange
@@ -67,7 +68,7 @@ def fill_rollups(store: SqliteStore, end_ns: int) -> dict[int, float]:
     for width_ns, length_ns in KEPT_NS.items():
         before = _n_bytes(store)
         with store._writing() as writer:  # noqa: SLF001  as the program does it
-            series = store._series_id("U1", "UJB")  # noqa: SLF001
+            series = series_of(writer, "U1", "UJB")
             insert_cells(writer, series, width_ns, simulated(random, end_ns, width_ns, length_ns))
             writer.execute(SET_MARK, (series, end_ns))
         found[width_ns] = (_n_bytes(store) - before) / (length_ns / width_ns)
@@ -88,7 +89,8 @@ def fill_rows(store: SqliteStore, start_ns: int) -> tuple[int, float]:
     random, before = np.random.default_rng(2), _n_bytes(store)
     times_ns = range(start_ns, start_ns + LIVE_NS, HOP_NS)
     with store._writing() as writer:  # noqa: SLF001
-        series, layout = store._series_id("U1", "UJB"), remember_layout(writer, Layout.of(COLUMNS))  # noqa: SLF001
+        series = series_of(writer, "U1", "UJB")
+        layout = remember_layout(writer, Layout.of(COLUMNS))
         quality = bytes(len(COLUMNS))
         values = random.normal(1e9, 1e7, (len(times_ns), len(COLUMNS)))
         e = values[:, COLUMNS.index("eccentricity_ratio")] = random.normal(0.35, 0.005, len(values))

@@ -8,6 +8,8 @@ SQL is written once. What both understand, and what is to be kept to:
   ``CAST(:low AS DOUBLE PRECISION) IS NULL``;
 - ``ON CONFLICT``, never ``INSERT OR REPLACE``; the old value is ``table.column`` in it;
 - no ``rowid``, ``typeof``, ``instr``, ``GLOB``, ``min`` or ``max`` of two values, ``LIMIT -1``;
+- rows that are computed with and written again are read from ``whole_`` and the table's name: in a
+  transaction that writes, too, that shows only what is as it was written;
 - a number that the database gave comes back by ``RETURNING`` or by a question of its own.
 """
 

@@ -91,7 +91,7 @@ def select_layouts(reader: Connection) -> dict[int, Layout]:
     """Every layout by its number."""
     return {
         id_: Layout.loads(quantities, reasons)
-        for id_, quantities, reasons in reader.execute("SELECT * FROM layout")
+        for id_, quantities, reasons in reader.execute("SELECT * FROM whole_layout")
     }
 
 

@@ -3,12 +3,15 @@
 import re
 from functools import lru_cache
 
-_PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%")
+_PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwhole_(?=[a-z])")
 
 
 @lru_cache(maxsize=1024)
 def translated(statement: str) -> bytes:
-    """Write ``?`` as ``%s`` and ``:name`` as ``%(name)s``; what is quoted stays as it is."""
+    """Write ``?`` as ``%s`` and ``:name`` as ``%(name)s``; what is quoted stays as it is.
+
+    ``whole_`` before a table is left out: the server sees to it that what it reads is whole.
+    """
     return _PIECE.sub(_piece, statement).encode()
 
 
@@ -18,4 +21,4 @@ def _piece(found: re.Match[str]) -> str:
         return quoted.replace("%", "%%")
     if name is not None:
         return f"%({name})s"
-    return "%s" if found[0] == "?" else "%%"
+    return {"?": "%s", "%": "%%"}.get(found[0], "")

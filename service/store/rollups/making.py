@@ -15,7 +15,7 @@ MINUTE_NS = WIDTHS_NS[0]
 SELECT_WHOLE = """
     SELECT time_ns, layout, reading_values, reading_qualities,
     operating_state, eccentricity_ratio, oil_temperature_c
-    FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ? ORDER BY time_ns
+    FROM whole_assessment WHERE series = ? AND time_ns >= ? AND time_ns < ? ORDER BY time_ns
 """
 INSERT_CELL = "INSERT INTO rollup_cell VALUES (?,?,?,?,?,?,?,?,?,?)"
 INSERT_NUMBERS = "INSERT INTO rollup_numbers VALUES (?,?,?,?,?,?)"

@@ -35,16 +35,16 @@ OVERLAPPING = f"""
 SELECT_CELLS = f"""
     SELECT start_ns, slot, operating_state, n_readings,
     eccentricity_low, eccentricity_high, oil_low_c, oil_high_c
-    FROM rollup_cell AS cell WHERE {OVERLAPPING} ORDER BY start_ns, slot
+    FROM whole_rollup_cell AS cell WHERE {OVERLAPPING} ORDER BY start_ns, slot
 """  # noqa: S608
 SELECT_ALL_NUMBERS = """
-    SELECT start_ns, slot, numbers FROM rollup_numbers
+    SELECT start_ns, slot, numbers FROM whole_rollup_numbers
     WHERE series = :series AND width_s = :width_s AND layout = :layout
     AND start_ns >= :start_ns AND start_ns < :end_ns ORDER BY start_ns, slot
 """
 SELECT_SOME_NUMBERS = f"""
     SELECT cell.start_ns, cell.slot, numbers
-    FROM rollup_cell AS cell CROSS JOIN rollup_numbers AS n ON n.series = cell.series
+    FROM whole_rollup_cell AS cell CROSS JOIN whole_rollup_numbers AS n ON n.series = cell.series
     AND n.width_s = cell.width_s AND n.layout = :layout
     AND n.start_ns = cell.start_ns AND n.slot = cell.slot
     WHERE {OVERLAPPING} ORDER BY cell.start_ns, cell.slot
@@ -114,8 +114,11 @@ def _put(
     if not rows:
         return
     start_ns, slot = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
-    where = np.searchsorted(places, start_ns // width_ns * MOST_SLOTS + slot)
-    part = decoded(layout.quantities, start_ns, [row[2] for row in rows])
+    wanted = start_ns // width_ns * MOST_SLOTS + slot
+    where = np.searchsorted(places, wanted)
+    has_cell = np.flatnonzero(np.take(places, where, mode="clip") == wanted)  # or it is damaged
+    where, start_ns = where[has_cell], start_ns[has_cell]
+    part = decoded(layout.quantities, start_ns, [rows[i][2] for i in has_cell])
     theirs = [column for column, name in enumerate(layout.quantities) if name in into.names]
     own = np.array([into.names.index(layout.quantities[column]) for column in theirs], np.int64)
     for name in ("count", "mean", "minimum", "maximum", "level"):

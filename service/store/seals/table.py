@@ -4,8 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-SEAL, IS_WHOLE = "padwatch_seal", "padwatch_is_whole"
-"""Functions that the connections of padwatch know."""
+SEAL, IS_WHOLE = "padwatch_seal_", "padwatch_is_whole_"
+"""Functions that the connections of padwatch know; each table has its own, for speed."""
+
+WHOLE = "whole_"
+"""Views that show only rows that are whole also to a connection that writes."""
 
 
 @dataclass(frozen=True)
@@ -62,26 +65,25 @@ class SealedTable:
             for deed, body in bodies.items()
         ]
 
-    @cached_property
-    def view(self) -> str:
-        """Let this connection see only rows that are whole."""
+    def view(self, before: str = "") -> str:
+        """Let this connection see only rows that are whole, by the table's name or another one."""
         listed = ", ".join(f"r.{column} AS {column}" for column in self.columns)
         return (
-            f"CREATE TEMP VIEW {self.name} AS SELECT {listed} FROM main.{self.name} AS r"  # noqa: S608
-            f" WHERE {self.is_whole('r.')}"
+            f"CREATE TEMP VIEW {before}{self.name} AS SELECT {listed}"  # noqa: S608
+            f" FROM main.{self.name} AS r WHERE {self.is_whole('r.')}"
         )
 
     def is_whole(self, of: str) -> str:
         """Whether a row fits its seal, as an expression."""
         seal = f"SELECT s.seal FROM main.{self.seals} AS s WHERE {self.matched(of, 's.')}"  # noqa: S608
-        return f"{IS_WHOLE}('{self.name}', ({seal}), {self._cells(of)})"
+        return f"{IS_WHOLE}{self.name}(({seal}), {self._cells(of)})"
 
     def matched(self, of: str, ours: str = "") -> str:
         """Whether a row has the key of a seal, as an expression."""
         return " AND ".join(f"{ours}{column} = {of}{column}" for column in self.key)
 
     def _seal(self, of: str) -> str:
-        return f"{SEAL}('{self.name}', {self._cells(of)})"
+        return f"{SEAL}{self.name}({self._cells(of)})"
 
     def _listed(self, of: str) -> str:
         return ", ".join(of + column for column in self.key)

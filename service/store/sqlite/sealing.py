@@ -1,11 +1,11 @@
 """Seals in SQLite: made by triggers of the writer, looked at by views of the readers."""
 
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from service.store.seals.damage import DamageLog, Place
-from service.store.seals.seal import seal_of
-from service.store.seals.table import IS_WHOLE, SEAL, SealedTable
+from service.store.seals.seal import FORMAT, Cell, begun, seal_of
+from service.store.seals.table import IS_WHOLE, SEAL, WHOLE, SealedTable
 
 OTHERWISE_KEPT = frozenset({"spectrum", "high_water", "rollup_redo"})
 """Tables whose rows have checksums of their own, and those that only say what is to be done."""
@@ -14,6 +14,8 @@ SCHEMA = "CREATE TABLE IF NOT EXISTS seal_schema (id INTEGER PRIMARY KEY, number
 SEALED_AT = "SELECT number FROM seal_schema WHERE id = 1"
 SET_SEALED_AT = "INSERT OR REPLACE INTO seal_schema VALUES (1, ?)"
 """An upgrade changes tables, perhaps rows: what was sealed before it is sealed anew."""
+PER_FORMAT = 1_000_000
+"""Of that number: the format of seals counts, too."""
 
 TABLES = """
     SELECT name FROM main.sqlite_master
@@ -36,15 +38,16 @@ class Seals:
 
     def begin(self, writer: sqlite3.Connection) -> None:
         """Seal what is not sealed yet, within a transaction, and all that is written later."""
-        self.teach(writer)
         self.tables = {table.name: table for table in _tables(writer)}
-        schema = writer.execute("PRAGMA main.user_version").fetchone()
+        self.teach(writer)
+        (schema,) = writer.execute("PRAGMA main.user_version").fetchone()
+        now = (FORMAT * PER_FORMAT + schema,)
         writer.execute(SCHEMA)
-        if writer.execute(SEALED_AT).fetchone() != schema:
+        if writer.execute(SEALED_AT).fetchone() != now:
             self._anew(writer)
-            writer.execute(SET_SEALED_AT, schema)
+            writer.execute(SET_SEALED_AT, now)
         for table in self.tables.values():
-            for statement in table.triggers:
+            for statement in (*table.triggers, table.view(WHOLE)):
                 writer.execute(statement)
 
     def _anew(self, writer: sqlite3.Connection) -> None:
@@ -55,24 +58,33 @@ class Seals:
 
     def know(self, reader: sqlite3.Connection) -> None:
         """Find out which tables have seals, of a database that somebody else may be writing to."""
-        self.teach(reader)
         there = {name for (name,) in reader.execute("SELECT name FROM main.sqlite_master")}
         self.tables = {t.name: t for t in _tables(reader) if t.seals in there}
+        self.teach(reader)
 
     def guard(self, reader: sqlite3.Connection) -> None:
         """Let a connection see only rows that are whole."""
         self.teach(reader)
         for table in self.tables.values():
-            reader.execute(table.view)
+            reader.execute(table.view())
+            reader.execute(table.view(WHOLE))
 
     def teach(self, connection: sqlite3.Connection) -> None:
         """Let a connection compute seals."""
-        connection.create_function(SEAL, -1, _sealed, deterministic=True)
-        connection.create_function(IS_WHOLE, -1, self._is_whole, deterministic=True)
+        for name in self.tables:
+            connection.create_function(SEAL + name, -1, _sealed(name), deterministic=True)
+            is_whole = self._is_whole(name)
+            connection.create_function(IS_WHOLE + name, -1, is_whole, deterministic=True)
 
-    def _is_whole(self, name: str, seal: int | None, *cells: int | float | bytes | None) -> bool:
-        if seal == seal_of(name, cells):
-            return True
+    def _is_whole(self, name: str) -> Callable[..., bool]:
+        begun_with = begun(name)
+
+        def is_whole(seal: int | None, *cells: Cell) -> bool:
+            return seal_of(begun_with, cells) == seal or self._noted(name, cells)
+
+        return is_whole
+
+    def _noted(self, name: str, cells: Sequence[Cell]) -> bool:
         self._damage.note(Place(name, self.key_of(name, cells)))
         return False
 
@@ -83,8 +95,9 @@ class Seals:
         return ", ".join(f"{column} {_words(cell_of[column])}" for column in table.key)
 
 
-def _sealed(name: str, *cells: int | float | bytes | None) -> int:
-    return seal_of(name, cells)
+def _sealed(name: str) -> Callable[..., int]:
+    begun_with = begun(name)
+    return lambda *cells: seal_of(begun_with, cells)
 
 
 def _words(cell: object) -> str:

@@ -13,7 +13,8 @@ from service.security.roles import Role
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError, TrendQuery, UnitGap
 from service.store.seals.damage import MAX_PLACES, DamageLog, Place
-from service.store.seals.seal import seal_of
+from service.store.seals.seal import begun, seal_of
+from service.store.seals.table import SealedTable
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import findings
 
@@ -49,9 +50,18 @@ def test_whatever_is_changed_in_a_row_changes_its_seal() -> None:
         (1, 2.5, b"text", b"\0\0", None),
     ]
 
-    assert len({seal_of("t", cells) for cells in (row, *others)}) == 1 + len(others)
-    assert seal_of("t", row) != seal_of("u", row)
-    assert seal_of("t", row) == 2_801_174_318  # as rows that were sealed before have it
+    assert len({seal_of(begun("t"), cells) for cells in (row, *others)}) == 1 + len(others)
+    assert seal_of(begun("t"), row) != seal_of(begun("u"), row)
+
+
+def test_equal_rows_have_equal_seals_wherever_their_values_come_from() -> None:
+    text = b"text"
+    row = (1, 2**40, -(2**63), 2.5, -0.0, text, None, b"", text)
+    same = (1, 2**40, -(2**63), 2.5, -0.0, bytes(bytearray(text)), None, b"", bytes([*text]))
+
+    assert seal_of(begun("t"), row) == seal_of(begun("t"), same)
+    # as rows that were sealed before have it
+    assert seal_of(begun("t"), row) == 1_750_905_859
 
 
 @pytest.mark.parametrize(
@@ -178,7 +188,7 @@ def test_a_store_without_seals_serves_what_was_altered(
     path: Path, assessment: Build, query: Ask, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The planted bug that all of the above would catch."""
-    monkeypatch.setattr("service.store.sqlite.sealing.Seals.guard", lambda *_: None)
+    monkeypatch.setattr(SealedTable, "is_whole", lambda *_: "1")
     with closing(SqliteStore(path, Origin.LIVE)) as store:
         store.append([assessment(speed_rpm=92.3)], [])
         damage(path, "UPDATE assessment SET reading_values = zeroblob(length(reading_values))")
