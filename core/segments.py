@@ -104,7 +104,12 @@ class SegmentTransform:
         self.segments.clear()
 
     def add(self, window: SampleBlock) -> Segment:
-        """Transform a window, keep it, and drop what has left the averaging time."""
+        """Transform a window, keep it, and drop what has left the averaging time.
+
+        Nothing older than the averaging time counts, also not for where its vortex is looked for:
+        behind a gap it may be of any time.
+        """
+        self._drop_before(window.first_index - self._span)
         finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
         quality = tuple(
             q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
@@ -136,13 +141,16 @@ class SegmentTransform:
             overall=self._overall.of(samples, lines),
             shaft_angle_rad=shaft_angle_rad(speed, key_phase),
         )
-        self._keep(segment)
+        self.segments.append(segment)
+        self._drop_before(window.first_index - self._span + 1)
         return segment
 
-    def _keep(self, segment: Segment) -> None:
-        self.segments.append(segment)
-        span = self._settings.n_segments * self._settings.hop_samples
-        while self.segments[0].first_index <= segment.first_index - span:
+    @property
+    def _span(self) -> int:
+        return self._settings.n_segments * self._settings.hop_samples
+
+    def _drop_before(self, first_index: int) -> None:
+        while self.segments and self.segments[0].first_index < first_index:
             self.segments.popleft()
 
     def _judged(

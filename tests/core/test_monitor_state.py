@@ -10,6 +10,7 @@ from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.monitor import UnitMonitor
+from core.monitor_state import MonitorState
 from core.quality import GOOD, Reading, Reason, uncertain
 from core.settings import AnalysisSettings
 
@@ -26,13 +27,13 @@ UNIT = Unit(
 )
 
 
-def stream(n_blocks: int) -> list[SampleBlock]:
+def stream(n_blocks: int, gap: int = 500) -> list[SampleBlock]:
     """A shaft with a wandering vortex, noise, two gaps and a restart of its device."""
     rng = np.random.default_rng(5)
     found, first, epoch = [], 0, 1
     for number in range(n_blocks):
         if number in (45, 160):
-            first += 500
+            first += gap
         if number == 100:
             epoch, first = 2, 0
         t = (number * BLOCK + np.arange(BLOCK)) / RATE_HZ
@@ -78,8 +79,7 @@ def _bytes(found: Assessment) -> bytes:
     ).encode()
 
 
-def rebuilt(blocks: Sequence[SampleBlock], before: UnitMonitor) -> UnitMonitor:
-    state = before.state
+def rebuilt(blocks: Sequence[SampleBlock], state: MonitorState) -> UnitMonitor:
     monitor = UnitMonitor(UNIT, SETTINGS)
     monitor.rewind(state)
     for block in blocks:
@@ -94,10 +94,25 @@ def test_a_monitor_that_goes_on_elsewhere_says_the_same(cut: int) -> None:
     blocks = stream(230)
     whole = UnitMonitor(UNIT, SETTINGS)
     said(whole, blocks[:cut])
-    moved = rebuilt(blocks[:cut], whole)
+    moved = rebuilt(blocks[:cut], whole.state)
     assert moved.account == whole.account
     assert moved.state == whole.state
     assert said(moved, blocks[cut:]) == said(whole, blocks[cut:])
+
+
+@pytest.mark.parametrize("gap", [1, 3 * 896, 4 * 896, 20 * 896, 10**7])
+def test_it_says_the_same_wherever_it_was_moved_behind_a_gap_however_long(gap: int) -> None:
+    blocks = stream(98, gap)
+    whole = UnitMonitor(UNIT, SETTINGS)
+    told: list[list[bytes]] = []
+    states: list[MonitorState] = []
+    for block in blocks:
+        states.append(whole.state)
+        told.append(said(whole, [block]))
+    for cut in range(46, 90, 4):
+        moved = rebuilt(blocks[:cut], states[cut])
+        assert moved.state == states[cut]
+        assert [said(moved, [block]) for block in blocks[cut:]] == told[cut:]
 
 
 def test_it_needs_no_more_than_twice_what_is_averaged() -> None:
