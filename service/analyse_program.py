@@ -11,6 +11,7 @@ from prometheus_client.process_collector import ProcessCollector
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor_port import Monitor
+from service.alarms.gone_alarms import SHARED
 from service.bus import Bus
 from service.delivery.facts import Around
 from service.health.page import Health
@@ -28,6 +29,7 @@ from service.roles.holding import Holds
 from service.roles.leadership import Leadership
 from service.roles.partition import Partition
 from service.roles.reporting import reporting_loops
+from service.roles.silent_units import SilentUnits
 from service.roles.stopping import stop_on_signals
 from service.roles.unit_memory import UnitMemory
 from service.runner import BUS_CAPACITY
@@ -114,6 +116,7 @@ class Analysing:
         self._memories: dict[str, UnitMemory] = {}
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
+        self._silent_units: SilentUnits | None = None
 
     async def run(
         self, listener: socket.socket, announce: Callable[[str], None], manager: ServiceManager
@@ -155,19 +158,21 @@ class Analysing:
         }
         self._memories = memories_of(self._stored.values())
         analysis = await analysis_on(
-            ground, monitors, bus, self._around, self._share, self._memories
+            ground, monitors, bus, self._around, self._share, self._memories, self._trouble
         )
         self._analysis = analysis
         consumer = Consumer(
             self._plant, self._settings, self._begin, analysis.recorder, ground.clock
         )
         self._consumer = consumer
+        everywhere = [unit.id for unit in self._plant.unit]
+        silent = SilentUnits(everywhere, analysis.alarms, ground.store, ground.clock)
+        self._silent_units = silent
         tend = ground.beats.tend
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)
-            leading = Leadership(
-                ground.store.hold, shared_work(analysis), ground.beats, ground.clock
-            )
+            shared = {**shared_work(analysis), "silent units": silent.run}
+            leading = Leadership(ground.store.hold, shared, ground.beats, ground.clock)
             tasks.create_task(tend("lead", leading.run), name="lead")
             tasks.create_task(tend("record", analysis.recorder.run), name="record")
             tasks.create_task(tend("stream", consumer.run), name="stream")
@@ -176,8 +181,14 @@ class Analysing:
                 tasks.create_task(tend(name, loop), name=name)
 
     def _held(self) -> list[str]:
-        """What this process tells of: its units, and who leads also of the service itself."""
-        return [*self._monitors, *([PLANT] if self._share.leads else [])]
+        """What this process tells of: its units, and what else is its own just now."""
+        is_watching = self._silent_units is not None and self._silent_units.is_watching
+        service = [PLANT] if self._share.leads else []
+        return [*self._monitors, *service, *([SHARED] if is_watching else [])]
+
+    def _trouble(self) -> str | None:
+        """Why no blocks come over the stream."""
+        return None if self._consumer is None else self._consumer.trouble
 
     async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
         """Where each unit goes on."""
@@ -200,7 +211,7 @@ class Analysing:
             await asyncio.to_thread(self._holds.require)
             units = self._consumer.units if self._consumer else {}
             for progress in units.values():
-                progress.fall_silent(self._settings.silent_after_s)
+                progress.fall_silent(self._settings.silent_after_s, self._trouble())
             await self._ground.clock.sleep(WATCH_EVERY_S)
 
     def _health(self) -> Health:
@@ -211,7 +222,7 @@ class Analysing:
             return {
                 "units": None if waits_for is None else f"standing by: {waits_for}",
                 "store": self._ground.live.store_error,
-                "stream": "not begun" if consumer is None else consumer.trouble,
+                "stream": "not begun" if consumer is None else self._trouble(),
                 **loops,
             }
 

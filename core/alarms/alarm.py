@@ -68,6 +68,9 @@ class AlarmKind(StrEnum):
     QUESTIONS_REFUSED = "questions_refused"
     DISK_NEARLY_FULL = "disk_nearly_full"
     STORED_DATA_DAMAGED = "stored_data_damaged"
+    MESSAGES_REFUSED = "messages_refused"
+    STREAM_AWAY = "stream_away"
+    ANALYSIS_GONE = "analysis_gone"
 
 
 PLANT = "plant"

@@ -19,6 +19,8 @@ from core.blocks import SampleBlock
 from service.alarms.count import AlarmCount, count_of
 from service.alarms.host_time import HostTime
 from service.alarms.service_alarms import ServiceAlarms
+from service.alarms.stream_alarms import refuse
+from service.alarms.told_alarms import ToldAlarms
 from service.audit.acting import acting
 from service.heartbeats import UNHEARD, Pulse
 from service.recorder import Findings
@@ -30,6 +32,11 @@ TICK_S = 0.5
 NO_MEMORIES: Mapping[str, AlarmMemory] = MappingProxyType({})
 
 NO_FILMS: Mapping[str, Condition] = MappingProxyType({})
+
+WITHOUT_LINK = (AlarmKind.LINK_LOST, AlarmKind.MESSAGES_REFUSED)
+"""Kinds that are judged also while no samples arrive."""
+
+Board = UnitAlarms | ServiceAlarms | ToldAlarms
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
@@ -49,6 +56,8 @@ class AlarmEngine:
         Alarms about the service itself.
     chatter
         What counts as chattering.
+    stream
+        Alarms about messages of units, where these come over a stream.
     """
 
     def __init__(
@@ -59,9 +68,12 @@ class AlarmEngine:
         listener: Callable[[SampleBlock, Sequence[AlarmNews]], None] | None = None,
         service: ServiceAlarms | None = None,
         chatter: ChatterRule | None = None,
+        stream: ToldAlarms | None = None,
     ) -> None:
         self._units, self._put, self._clock, self._listener = units, put, clock, listener
         self._service = service or ServiceAlarms()
+        self._stream = stream
+        self._kept: list[ToldAlarms] = [] if stream is None else [stream]
         self.chatter_rule = chatter or ChatterRule()
         self._chatter = ChatterWatch(self.chatter_rule)
         self._time = HostTime(clock)
@@ -84,11 +96,31 @@ class AlarmEngine:
             What was known besides, by unit.
         """
         now_ns, found = self._clock.now_ns(), list(alarms)
+        for board in self._kept:
+            theirs = [alarm for alarm in found if alarm.identity.id in board]
+            self._publish(board.restore(theirs, now_ns))
+            found = [alarm for alarm in found if alarm.identity.id not in board]
         for unit, own in self._units.items():
             mine = [alarm for alarm in found if alarm.identity.unit == unit]
             self._publish(own.restore(mine, now_ns, memories.get(unit)))
         others = [alarm for alarm in found if alarm.identity.unit not in self._units]
         self._publish(self._service.restore(others, now_ns))
+
+    def keep(self, board: ToldAlarms, stored: Iterable[Alarm]) -> None:
+        """Take over alarms that were another process's until now, as they were stored."""
+        self._kept.append(board)
+        self._publish(board.restore(stored, self._clock.now_ns()))
+        self.revision += 1
+
+    def drop(self, board: ToldAlarms) -> None:
+        """Leave alarms to another process."""
+        self._kept.remove(board)
+        self.revision += 1
+
+    def refuse(self, unit: str, reason: str) -> None:
+        """Note that a message of a unit cannot be used."""
+        if self._stream is not None:
+            refuse(self._stream, unit, reason)
 
     def memory(self, unit: str) -> AlarmMemory:
         """What must be known of the alarms of a unit, beside their events, to go on elsewhere."""
@@ -176,7 +208,7 @@ class AlarmEngine:
 
     def is_judged(self, alarm: Alarm) -> bool:
         """Whether what an alarm watches is known now; without a link nothing but the link is."""
-        if alarm.identity.kind is AlarmKind.LINK_LOST:
+        if alarm.identity.kind in WITHOUT_LINK:
             return True
         if alarm.identity.unit not in self._units:
             return alarm.condition.is_known
@@ -214,11 +246,14 @@ class AlarmEngine:
                 self._chatter.note(event, now_ns)
 
     @property
-    def _boards(self) -> list[UnitAlarms | ServiceAlarms]:
-        return [*self._units.values(), self._service]
+    def _boards(self) -> list[Board]:
+        return [*self._units.values(), self._service, *self._kept]
 
-    def _owner(self, id_: str) -> UnitAlarms | ServiceAlarms:
+    def _owner(self, id_: str) -> Board:
         """Who keeps an alarm, if there is one of that name."""
+        for board in self._kept:
+            if id_ in board:
+                return board
         return self._units.get(id_.partition(":")[0], self._service)
 
 

@@ -51,6 +51,8 @@ class ServiceHealth:
         Which questions are refused because the service is behind; None if none are.
     stored_trouble
         In what stored data are not what was stored; None as far as nothing is known to be wrong.
+    stream_trouble
+        Why blocks are not read from the stream just now; None if they are, or need not be.
     accounts
         Where samples went, by unit.
     disk
@@ -67,6 +69,7 @@ class ServiceHealth:
     n_recordings_damaged: int = 0
     refused: str | None = None
     stored_trouble: str | None = None
+    stream_trouble: str | None = None
     accounts: Mapping[str, SampleAccount] = field(default_factory=dict)
     disk: DiskJudge = enough_room
 
@@ -85,6 +88,7 @@ def health_of(
     tape: Tape | None = None,
     recordings: WaveformKeeper | None = None,
     soundness: Soundness | None = None,
+    stream: Callable[[], str | None] | None = None,
 ) -> LookAtHealth:
     """A look at the parts of the running service."""
     names = list(units)
@@ -101,6 +105,7 @@ def health_of(
             n_recordings_damaged=recordings.n_lost if recordings else 0,
             refused=load.words if load else None,
             stored_trouble=soundness.trouble if soundness else None,
+            stream_trouble=stream() if stream else None,
             accounts={unit: live.status(unit).account for unit in names},
             disk=enough_room if space is None else space.condition,
         )

@@ -119,6 +119,7 @@ class ServiceAlarms:
         self._find(AlarmKind.QUESTIONS_REFUSED, _refused(health), now_ns)
         self._find(AlarmKind.DISK_NEARLY_FULL, self._disk(health), now_ns)
         self._find(AlarmKind.STORED_DATA_DAMAGED, _stored(health), now_ns)
+        self._find(AlarmKind.STREAM_AWAY, _stream(health), now_ns)
         for unit, account in health.accounts.items():
             share = self._losses[unit].share(account, now_ns)
             self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)
@@ -163,6 +164,12 @@ def _stored(health: ServiceHealth) -> Condition:
     if health.stored_trouble is None:
         return WITHIN
     return Condition(AlarmLevel.DANGER, reason=health.stored_trouble)
+
+
+def _stream(health: ServiceHealth) -> Condition:
+    if health.stream_trouble is None:
+        return WITHIN
+    return Condition(AlarmLevel.DANGER, reason=health.stream_trouble)
 
 
 def _refused(health: ServiceHealth) -> Condition:

@@ -8,6 +8,7 @@ from core.alarms.limits import Limits
 from core.alarms.rules import rule_of
 from core.alarms.state_limits import StateLimits
 from core.alarms.watch import LimitWatch, Watch
+from service.alarms.stream_alarms import STREAM
 from service.settings.alarms import AlarmSettings
 
 STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
@@ -70,6 +71,7 @@ def service_watches(units: Iterable[str], rules: ServiceRules) -> dict[str, Watc
         Watch(_identity(SERVICE, AlarmKind.QUESTIONS_REFUSED), steady, SERVICE),
         Watch(_identity(DISK, AlarmKind.DISK_NEARLY_FULL), steady, DISK),
         Watch(_identity(STORE, AlarmKind.STORED_DATA_DAMAGED), soon, STORE),
+        Watch(_identity(STREAM, AlarmKind.STREAM_AWAY), steady, STREAM),
     ]
     found = {watch.identity.kind.value: watch for watch in watches}
     lost = {unit: _limit(unit, AlarmKind.SAMPLES_LOST, soon, rules.loss) for unit in units}

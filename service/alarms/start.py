@@ -14,10 +14,12 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
 from core.films.film_rules import FilmRules
 from service.alarms.engine import NO_MEMORIES, AlarmEngine
+from service.alarms.gone_alarms import is_shared
 from service.alarms.health import LookAtHealth
 from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.alarms.service_alarms import ServiceAlarms
 from service.alarms.service_rules import service_rules_of
+from service.alarms.stream_alarms import stream_alarms
 from service.capture.captures import Captures
 from service.conversion import machine_of
 from service.films.rules import film_rules_of
@@ -83,9 +85,15 @@ async def alarm_engine(
     service = ServiceAlarms(units, service_rules_of(plant.alarms), seen)
     chatter = chatter_rule_of(plant.alarms)
     listener = _listener(captures, tape)
-    engine = AlarmEngine(units, put, clock, listener, service, chatter)
+    is_alone = part == WHOLE
+    stream = None if is_alone else stream_alarms(units)
+    engine = AlarmEngine(units, put, clock, listener, service, chatter, stream)
     stored = await asyncio.to_thread(store.alarms)
-    ours = [alarm for alarm in stored if part.looks_after(alarm.identity.unit)]
+    ours = [
+        alarm
+        for alarm in stored
+        if part.looks_after(alarm.identity.unit) and (is_alone or not is_shared(alarm))
+    ]
     engine.restore(ours, memories)
     for held in await asyncio.to_thread(store.order1_references.in_force):
         engine.refer_to(held.reference)

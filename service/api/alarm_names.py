@@ -54,6 +54,9 @@ AlarmKindName = Literal[
     "questions_refused",
     "disk_nearly_full",
     "stored_data_damaged",
+    "messages_refused",
+    "stream_away",
+    "analysis_gone",
 ]
 
 AlarmChangeName = Literal[

@@ -23,6 +23,9 @@ WITHOUT_SAMPLES = (
     AlarmKind.DISK_NEARLY_FULL,
     AlarmKind.STORED_DATA_DAMAGED,
     AlarmKind.QUESTIONS_REFUSED,
+    AlarmKind.MESSAGES_REFUSED,
+    AlarmKind.STREAM_AWAY,
+    AlarmKind.ANALYSIS_GONE,
 )
 """Kinds of alarms that no sample can explain."""
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from core.alarms.alarm import PLANT, Alarm
 from core.alarms.chatter import ChatterRule
 from service.alarms.count import AlarmCount, count_of
+from service.alarms.gone_alarms import SHARED, is_shared
 from service.replica.unit_state import UnitState
 
 
@@ -75,7 +76,9 @@ class ReplicaAlarms:
         return self._owner(self.alarm(id_))
 
     def _owner(self, alarm: Alarm) -> str:
-        """Its unit, or the plant where it is of no unit that there is."""
+        """Its unit, or who else tells of it where it is of no unit that there is."""
+        if is_shared(alarm):
+            return SHARED
         return alarm.identity.unit if alarm.identity.unit in self._units else PLANT
 
     def count(self) -> AlarmCount:

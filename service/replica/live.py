@@ -12,6 +12,7 @@ from core.blocks import SampleBlock
 from core.cross_spectrum import CrossSpectrum
 from core.quality import Reason, bad, missing
 from core.quantities import CATALOGUE
+from service.alarms.gone_alarms import SHARED
 from service.api.elsewhere import NotHereError
 from service.live import CurrentBearing, LinkState, UnitStatus
 from service.replica.unit_state import BearingState, UnitSigns
@@ -67,14 +68,14 @@ class ReplicaLive:
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
         self._clock, self._stale_after_s = clock, stale_after_s
-        self._known = dict.fromkeys((*units, PLANT), NOTHING)
+        self._known = dict.fromkeys((*units, PLANT, SHARED), NOTHING)
         self.revision = 0
         self.read_error: str | None = None
         """Why reports cannot be read just now."""
 
     @property
     def units(self) -> Sequence[str]:
-        """All units, and `PLANT`."""
+        """All units, `PLANT` and `SHARED`."""
         return tuple(self._known)
 
     def hear(self, unit: str, process: str, n_beats: int, signs: UnitSigns) -> None:

@@ -8,6 +8,7 @@ import structlog
 
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
+from service.alarms.gone_alarms import SHARED, is_shared
 from service.films.keeper import FilmKeeper
 from service.heartbeats import UNHEARD, Pulse
 from service.live import LiveView
@@ -45,7 +46,7 @@ class Reporter:
     ----------
     held
         Which units are this process's just now; with `PLANT` where it also tells of alarms that
-        are of no unit.
+        are of no unit, and `SHARED` where it does the shared work.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class Reporter:
         self._process, self._held, self._store, self._clock = process, held, store, clock
         self._units = {unit.id: unit for unit in units}
         self._live, self._alarms, self._films = live, alarms, films
-        self._written: dict[str, tuple[int, UnitState]] = {}
+        self._written: dict[str, tuple[int, UnitState | None]] = {}
         self._n_beats = 0
         self._trouble: str | None = None
 
@@ -75,7 +76,9 @@ class Reporter:
 
     async def report(self) -> None:
         """Report once; where that fails, whoever reads will say that nothing is heard."""
-        seen = [self._look(unit) for unit in self._held()]
+        held = list(self._held())
+        self._forget_but(held)
+        seen = [self._look(unit) for unit in held]
         if not seen:
             return
         self._n_beats += 1
@@ -86,6 +89,11 @@ class Reporter:
             return
         self._note(None)
         self._written |= {s.unit: (s.revision, s.state) for s in seen if s.state is not None}
+
+    def _forget_but(self, held: Sequence[str]) -> None:
+        """Write anew, under further numbers, what others may write of meanwhile."""
+        for unit in self._written.keys() - set(held):
+            self._written[unit] = (self._written[unit][0], None)
 
     def _look(self, unit: str) -> Seen:
         state, signs = self._state_of(unit)
@@ -99,7 +107,11 @@ class Reporter:
         if settings is not None:
             state = unit_state(settings, self._live, self._alarms, self._films)
             return state, unit_signs(settings, self._live)
-        others = [a for a in self._alarms.alarms if a.identity.unit not in self._units]
+        others = [
+            alarm
+            for alarm in self._alarms.alarms
+            if alarm.identity.unit not in self._units and is_shared(alarm) == (unit == SHARED)
+        ]
         return alarm_state(others, self._alarms), plant_signs(self._live)
 
     def _write(self, seen: Sequence[Seen]) -> None:

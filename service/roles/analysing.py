@@ -82,6 +82,10 @@ class Analyser:
         """Let the monitor of a unit, after these samples, be as it was."""
         self._monitors[unit].settle(memory.monitor)
 
+    def refuse(self, unit: str, reason: str) -> None:
+        """Let alarms know that a message of a unit cannot be used."""
+        self._alarms.refuse(unit, reason)
+
     def hear(self, news: LinkNews) -> None:
         """Let alarms know whether samples of a unit arrive."""
         self._alarms.link(news.unit, news.is_connected, news.reason)

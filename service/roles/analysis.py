@@ -118,6 +118,7 @@ async def analysis_on(
     around: Around,
     part: PlantPart = WHOLE,
     memories: Mapping[str, UnitMemory] = NO_MEMORIES,
+    stream: Callable[[], str | None] | None = None,
 ) -> Analysis:
     """Put the parts together, and let them go on where the service stopped.
 
@@ -131,6 +132,8 @@ async def analysis_on(
         What of the plant this process looks after.
     memories
         What was known of units besides what is stored, where no sample is missing since.
+    stream
+        Why no blocks come over the stream, where they come that way.
 
     Raises
     ------
@@ -154,7 +157,7 @@ async def analysis_on(
     tape = tape_of(plant, origin, clock, pressure.look)
     space = space_watch(plant, clock)
     look = health_of(
-        monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness
+        monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness, stream
     )
     alarms = await alarm_engine(
         plant,

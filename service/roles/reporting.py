@@ -16,7 +16,7 @@ def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> 
     ----------
     held
         Units that are this process's just now; with `PLANT` where it also tells of alarms that are
-        of no unit.
+        of no unit, and `SHARED` where it does the shared work.
     """
     ground, process = analysis.ground, process_name()
     store, parts = ground.store, (analysis.alarms, analysis.films)

@@ -57,6 +57,7 @@ class UnitProgress:
         self._stored = stored
         self._memory = None if stored is None else memory
         self._heard_s: float | None = None
+        self._why_refused: str | None = None
         self.sequence = 0
         self.refused: Counter[str] = Counter()
         self.n_repeated = 0
@@ -83,16 +84,17 @@ class UnitProgress:
 
     async def take(self, sequence: int, payload: bytes) -> bool:
         """Take a message in; False if it is refused."""
-        self._heard_s = self._clock.monotonic_s()
         if sequence <= self.sequence:
+            self._heard_s = self._clock.monotonic_s()
             self.n_repeated += 1
             return True
         try:
             message = decoded(payload, self._identity)
         except WireError as error:
-            self._refuse(error)
+            self._refuse(sequence, error)
             self.sequence = sequence
             return False
+        self._heard_s, self._why_refused = self._clock.monotonic_s(), None
         if self._stored is not None and sequence <= self._stored.sequence:
             await self._relive(sequence, message)
         else:
@@ -111,12 +113,19 @@ class UnitProgress:
         """Whether what was taken in last is stored already."""
         return self._stored is not None and self.sequence <= self._stored.sequence
 
-    def fall_silent(self, after_s: float) -> None:
-        """Count the unit as lost where nothing has come of it for so long."""
+    def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
+        """Count the unit as lost where nothing of use has come of it for so long.
+
+        Parameters
+        ----------
+        trouble
+            Why nothing can come, where that is known.
+        """
         if self._heard_s is None or self._clock.monotonic_s() - self._heard_s <= after_s:
             return
         if self._live.status(self.unit).state is LinkState.CONNECTED:
-            reason = f"no block for {after_s:g} s: is `padwatch acquire` running?"
+            silence = f"no block for {after_s:g} s: is `padwatch acquire` running?"
+            reason = trouble or self._why_refused or silence
             self._hear(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
 
     async def _relive(self, sequence: int, message: Taken | LinkNews) -> None:
@@ -156,7 +165,10 @@ class UnitProgress:
             tell(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
         self._analyser.hear(news)
 
-    def _refuse(self, error: WireError) -> None:
+    def _refuse(self, sequence: int, error: WireError) -> None:
+        self._why_refused = str(error)
+        if self._stored is None or sequence > self._stored.sequence:  # else it was told then
+            self._analyser.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
             log.error("a message is refused", unit=self.unit, reason=str(error))
         self.refused[error.kind] += 1

@@ -44,6 +44,9 @@ const KINDS = {
   questions_refused: "Too busy to answer",
   disk_nearly_full: "Disk nearly full",
   stored_data_damaged: "Stored data damaged or missing",
+  messages_refused: "Messages on the stream refused",
+  stream_away: "Stream does not answer",
+  analysis_gone: "Nobody analyses this unit",
 };
 
 const STATES = {

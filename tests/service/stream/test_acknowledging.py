@@ -3,7 +3,7 @@
 import asyncio
 import sqlite3
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,7 @@ from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.stream import publisher as publishing
 from service.stream.consumer import Consumer
-from service.stream.names import consumer_name, identity_of, stream_name
+from service.stream.names import consumer_name, identity_of, stream_name, subject
 from service.stream.publisher import Publisher
 from service.wiring.sources import monitor_of
 from service.wiring.stores import open_store
@@ -165,6 +165,28 @@ async def test_a_block_is_acknowledged_after_its_results_are_stored(
     await check_acknowledging(plant, server)
 
 
+async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_why(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    await publish(plant)
+    client = await nats.connect(server.url)
+    await client.jetstream().publish(subject(plant, UNIT), b"no block of ours")
+    await client.close()
+    open_store(plant).close()  # so that the database is there before anybody looks
+    database = Path(plant.service.data_folder) / "padwatch.sqlite3"
+
+    def alarms() -> list[tuple[str, str]]:
+        with closing(sqlite3.connect(database)) as reader:
+            raised = "SELECT alarm, reason FROM alarm_event WHERE change = 'raised'"
+            return [(alarm, str(reason)) for alarm, reason in reader.execute(raised)]
+
+    async with analysing(plant):
+        await until(lambda: _is(any("messages_refused" in alarm for alarm, _ in alarms())))
+    (reason,) = (reason for alarm, reason in alarms() if alarm == f"{UNIT}:stream:messages_refused")
+    assert reason
+
+
+@pytest.mark.planted("acknowledged before the commit")
 async def test_who_acknowledges_before_the_commit_is_caught(
     plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -176,6 +198,7 @@ async def test_who_acknowledges_before_the_commit_is_caught(
         await check_acknowledging(plant, server)
 
 
+@pytest.mark.planted("blocks without an id")
 async def test_who_sends_blocks_without_an_id_is_caught(
     plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -214,7 +237,13 @@ def dying(append: Append, died: list[bool], *, position_apart: bool) -> Append:
     return planted
 
 
-@pytest.mark.parametrize("position_apart", [False, True], ids=["as it is", "planted bug"])
+BUG = pytest.mark.planted("position stored apart from its results")
+
+
+@pytest.mark.parametrize(
+    "position_apart",
+    [pytest.param(False, id="as it is"), pytest.param(True, marks=BUG, id="planted bug")],
+)
 async def test_a_position_that_is_not_stored_with_its_results_is_caught(
     plant: PlantFile,
     server: NatsServer,
