@@ -4,6 +4,7 @@ from collections import deque
 
 import numpy as np
 
+from acquisition.arrival import Arrival
 from core.device_clock import DeviceClock
 from core.units import NS_PER_S
 
@@ -13,24 +14,30 @@ _MAX_BINS = 360
 
 _MIN_BINS = 6
 
+_STEP_S = 0.5
+"""A host's clock that is kept right is slewed; one that moves so much at once has been set."""
+
 
 class ClockEstimate:
-    """Offset of a device's stamps and drift of its sampling, by the host's clock.
+    """Offset of stamps by the host's wall clock, and drift of sampling by its steady one.
 
     Samples can arrive late, never early. Therefore of every ten seconds only the block that came
     with the least delay counts; a line through these gives the drift, its scatter the uncertainty.
+    If the host's clock is set, both begin anew: the offset is another one, and a host that was
+    suspended has counted no time meanwhile.
     """
 
     def __init__(self) -> None:
         self._bins: deque[tuple[float, float]] = deque(maxlen=_MAX_BINS)
         self._offset_ns: deque[int] = deque(maxlen=_MAX_BINS)
         self._epoch: int | None = None
-        self._origin: tuple[int, int] = (0, 0)
+        self._origin: tuple[int, float] = (0, 0.0)
+        self._newest: Arrival | None = None
         self._bin = -1
         self._drift: tuple[float, float] | None = None
 
     def add(
-        self, epoch: int, stop_index: int, rate_hz: float, stop_ns: int | None, arrived_ns: int
+        self, epoch: int, stop_index: int, rate_hz: float, stop_ns: int | None, arrived: Arrival
     ) -> None:
         """Note that all samples up to an index had arrived.
 
@@ -38,15 +45,16 @@ class ClockEstimate:
         ----------
         stop_ns
             Time of that index by the device's stamps; None if it does not stamp.
-        arrived_ns
-            The host's clock.
+        arrived
+            The host's clocks.
         """
-        if epoch != self._epoch:
-            self._begin(epoch, stop_index, arrived_ns)
-        host_s = (arrived_ns - self._origin[1]) / NS_PER_S
+        if epoch != self._epoch or self._was_set(arrived):
+            self._begin(epoch, stop_index, arrived.steady_s)
+        self._newest = arrived
+        host_s = arrived.steady_s - self._origin[1]
         delay_s = host_s - (stop_index - self._origin[0]) / rate_hz
         number = int(host_s // _BIN_S)
-        offset_ns = None if stop_ns is None else stop_ns - arrived_ns
+        offset_ns = None if stop_ns is None else stop_ns - arrived.host_ns
         if number != self._bin:
             self._drift = _slope(self._bins)
             self._bin = number
@@ -69,8 +77,11 @@ class ClockEstimate:
             n_faults=n_faults,
         )
 
-    def _begin(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
-        self._epoch, self._origin, self._bin = epoch, (stop_index, arrived_ns), -1
+    def _was_set(self, arrived: Arrival) -> bool:
+        return self._newest is not None and abs(arrived.step_s_since(self._newest)) > _STEP_S
+
+    def _begin(self, epoch: int, stop_index: int, arrived_s: float) -> None:
+        self._epoch, self._origin, self._bin = epoch, (stop_index, arrived_s), -1
         self._bins.clear()
         self._offset_ns.clear()
         self._drift = None

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from acquisition.arrival import Arrival
 from acquisition.block_grid import BlockGrid
 from acquisition.calibration import UnitCalibration, calibrate
 from acquisition.clock_estimate import ClockEstimate
@@ -31,25 +32,25 @@ class Delivery:
         self._stamps = StampCheck()
         self._clock = ClockEstimate()
 
-    def take(self, raw: RawBlock, arrived_ns: int | None = None) -> list[SampleBlock]:
+    def take(self, raw: RawBlock, arrived: Arrival | None = None) -> list[SampleBlock]:
         """Take the next raw block; return the sample blocks that it completes.
 
         Parameters
         ----------
-        arrived_ns
-            Host's time at which its last sample had arrived; None where nothing arrives, as from
-            a recording, and the device's clock is not to be judged.
+        arrived
+            When its last sample had arrived; None where nothing arrives, as from a recording, and
+            the device's clock is not to be judged.
         """
         raw, fault = self._stamps.check(raw)
-        if arrived_ns is not None:
-            self._note_arrival(raw, fault, arrived_ns)
-        return [self._sample_block(r, fault, arrived_ns) for r in self._grid.put(raw)]
+        if arrived is not None:
+            self._note_arrival(raw, fault, arrived)
+        return [self._sample_block(r, fault, arrived) for r in self._grid.put(raw)]
 
     def flush(self) -> list[SampleBlock]:
         """What is left when nothing will follow, as at the end of a recording."""
         return [calibrate(raw, self._calibration) for raw in self._grid.flush()]
 
-    def _note_arrival(self, raw: RawBlock, fault: StampFault | None, arrived_ns: int) -> None:
+    def _note_arrival(self, raw: RawBlock, fault: StampFault | None, arrived: Arrival) -> None:
         stop_ns = raw.start_ns + ns_from_s(raw.n_samples / raw.rate_hz)
         own_stamp = self._stamped and fault is None
         self._clock.add(
@@ -57,14 +58,14 @@ class Delivery:
             raw.stop_index,
             raw.rate_hz,
             stop_ns if own_stamp else None,
-            arrived_ns,
+            arrived,
         )
 
     def _sample_block(
-        self, raw: RawBlock, fault: StampFault | None, arrived_ns: int | None
+        self, raw: RawBlock, fault: StampFault | None, arrived: Arrival | None
     ) -> SampleBlock:
         block = calibrate(raw, self._calibration)
-        if arrived_ns is None and fault is None:
+        if arrived is None and fault is None:
             return block
-        clock = None if arrived_ns is None else self._clock.reading(self._stamps.n_faults)
+        clock = None if arrived is None else self._clock.reading(self._stamps.n_faults)
         return replace(block, clock=clock, stamp_fault=fault)

@@ -110,7 +110,7 @@ async def _run(
     serving = serving_of(context, ground, listener, desk, announce)
     supervision = Supervision(manager, ground.beats, ground.live, units, clock)
     try:
-        await _perform(runner, analysis, serving, supervision, ends=performance.ends)
+        await _perform(runner, analysis, audit, serving, supervision, ends=performance.ends)
     finally:
         desk.close()
         await analysis.close()
@@ -143,13 +143,21 @@ def _runner(units: Mapping[str, WatchedUnit], analysis: Analysis, bus: Bus) -> R
 
 
 async def _perform(
-    runner: Runner, analysis: Analysis, serving: Serving, supervision: Supervision, *, ends: bool
+    runner: Runner,
+    analysis: Analysis,
+    audit: ServiceTrail,
+    serving: Serving,
+    supervision: Supervision,
+    *,
+    ends: bool,
 ) -> None:
     """Run all parts until the service is stopped, or what it runs has come to its end."""
     stopped = stop_on_signals()
+    watching = analysis.ground.beats.tend("clock", audit.watch_clock)
     async with asyncio.TaskGroup() as tasks:
         running = tasks.create_task(runner.run(), name="run")
         beside = [*analysis.start(tasks), *_reporting(analysis, tasks)]
+        beside.append(tasks.create_task(watching, name="clock"))
         server = serving.start(tasks)
         announcing = tasks.create_task(serving.tell(supervision), name="announce")
         supervising = tasks.create_task(supervision.run(), name="supervise")

@@ -10,6 +10,7 @@ from typing import Literal
 
 import can
 
+from acquisition.arrival import Arrival
 from acquisition.can.bus import foreign_errors_renamed
 from acquisition.can.error_frames import lost_in_controller, require_bus
 from acquisition.can.gate import Frame, FrameGate
@@ -36,12 +37,12 @@ class Batch:
 
     Parameters
     ----------
-    arrived_ns
-        By the host's clock, when the last of them had been read.
+    arrived
+        When the last of them had been read.
     """
 
     frames: list[Frame]
-    arrived_ns: int
+    arrived: Arrival
 
 
 class FrameReader:
@@ -85,7 +86,7 @@ class FrameReader:
         self._stopping = threading.Event()
         self._news = asyncio.Event()
         self._ended = asyncio.Event()
-        self._arrived_ns = 0
+        self._arrived = Arrival(0, 0.0)
         self._failure: BaseException | None = None
         self._opened: asyncio.Future[None]
         self._thread: threading.Thread
@@ -171,7 +172,7 @@ class FrameReader:
                 if isinstance(bus, SlcanBus):
                     self._refused[Refusal.MALFORMED] += bus.take_n_malformed()
                 if frames:
-                    self._hand_over(Batch(frames, self._arrived_ns))
+                    self._hand_over(Batch(frames, self._arrived))
             if not frames and bus.state is can.BusState.ERROR:
                 raise LinkError(f"{self._where}: the interface says that it is in error")
 
@@ -197,7 +198,7 @@ class FrameReader:
                     frames.append(frame)
         finally:
             if len(frames) > n_before:
-                self._arrived_ns = self._clock.now_ns()
+                self._arrived = Arrival.now(self._clock)
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
         """Next message, over what nobody can read; a bus that says nothing else is lost."""

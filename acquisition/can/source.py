@@ -103,9 +103,9 @@ class CanSource:
         fresh_at_s = self._clock.monotonic_s()
         while True:
             batch = await reader.next_batch(min(_LOOK_S, self._settings.stale_after_s))
-            raw_blocks = self._assembler.take(batch.frames, batch.arrived_ns) if batch else []
+            raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns) if batch else []
             for raw in raw_blocks:
-                for block in self._delivery.take(raw, batch.arrived_ns if batch else None):
+                for block in self._delivery.take(raw, batch.arrived if batch else None):
                     yield block
             if raw_blocks:
                 fresh_at_s = self._clock.monotonic_s()

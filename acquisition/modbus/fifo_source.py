@@ -4,6 +4,7 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
+from acquisition.arrival import Arrival
 from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
 from acquisition.delivery import Delivery
@@ -125,7 +126,8 @@ class FifoSource:
         while True:
             with wrong_replies_drop_the_link():
                 pieces = await self._read(link)
-                now_s, arrived_ns = self._clock.monotonic_s(), self._clock.now_ns()
+                arrived = Arrival.now(self._clock)
+                now_s = arrived.steady_s
                 waiting += self._place(pieces, now_s)
             if not self._is_drained(pieces):
                 self._require_in_time(deadline_s)
@@ -134,9 +136,9 @@ class FifoSource:
             if not self._layout.has_counter and self._uncounted.has_lost(now_s):
                 waiting.clear()  # nobody knows where among these the loss is
                 self._uncounted.begin()
-            raw_blocks = self._raw_blocks(waiting, arrived_ns)
+            raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
             waiting.clear()
-            for block in [b for raw in raw_blocks for b in self._delivery.take(raw, arrived_ns)]:
+            for block in [b for raw in raw_blocks for b in self._delivery.take(raw, arrived)]:
                 yield block
             self._freshness.note(repr(self._newest).encode(), now_s)
             await self._clock.sleep(self._settings.poll_period_s)

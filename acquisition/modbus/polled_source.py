@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition.arrival import Arrival
 from acquisition.calibration import ChannelCalibration, UnitCalibration
 from acquisition.clock import Clock
 from acquisition.delivery import Delivery
@@ -153,7 +154,7 @@ class PolledSource:
             if self._stamped and reading.time_ns is not None:
                 start_ns = reading.time_ns
             raw = self._assembly.block(reading, self._ticks.epoch, tick, start_ns)
-            for block in self._delivery.take(raw, self._clock.now_ns()):
+            for block in self._delivery.take(raw, Arrival.now(self._clock)):
                 yield block
 
 

@@ -4,6 +4,7 @@ from collections.abc import AsyncGenerator, AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 
+from acquisition.arrival import Arrival
 from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
 from acquisition.delivery import Delivery
@@ -113,9 +114,9 @@ class ModbusRingSource:
         while True:
             with _nonsense_drops_the_link():
                 raw_blocks = await self._follower.advance(reader)
-            arrived_ns = self._clock.now_ns()
+            arrived = Arrival.now(self._clock)
             for raw in raw_blocks:
-                for block in self._delivery.take(raw, arrived_ns):
+                for block in self._delivery.take(raw, arrived):
                     yield block
             if raw_blocks:
                 self._fresh_at_s = self._clock.monotonic_s()

@@ -1,12 +1,13 @@
-"""What padwatch tells of itself: that it starts and stops, and with which configuration."""
+"""What padwatch tells of itself: start, stop, configuration, and that its host's clock was set."""
 
 import json
 from dataclasses import dataclass
 
 from service.audit.entry import AuditEntry, Deed
 
-PADWATCH, SERVICE, CONFIGURATION = "padwatch", "service", "configuration"
+PADWATCH, SERVICE, CONFIGURATION, CLOCK = "padwatch", "service", "configuration", "clock"
 STARTED, STOPPED, CHANGED = "service.started", "service.stopped", "configuration.changed"
+STEPPED = "clock.stepped"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
     """
     after = {"n_refused_more": refusals} if refusals else None
     return Deed(now_ns, PADWATCH, STOPPED, SERVICE, before=vars(release), after=after)
+
+
+def step_deed(step_s: float, now_ns: int) -> Deed:
+    """That the clock of the host was set, forward or, below 0, back; `now_ns` is by the new one."""
+    return Deed(now_ns, PADWATCH, STEPPED, CLOCK, after={"by_s": round(step_s, 3)})
 
 
 def _configuration_of(start: AuditEntry | None) -> str | None:

@@ -2,14 +2,18 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 
 import structlog
 
+from acquisition.arrival import Arrival
 from acquisition.clock import Clock
-from service.audit.life import STARTED, Release, start_deeds, stop_deed
+from service.alarms.host_time import STEP_S
+from service.audit.life import STARTED, Release, start_deeds, step_deed, stop_deed
 from service.audit.refusals import Refusals
 from service.evidence.configuration import built_from, configuration_of
+from service.heartbeats import UNHEARD, Pulse
 from service.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.audit_port import AuditQuery, AuditStore
@@ -17,9 +21,11 @@ from service.store.port import StoreError
 
 log = structlog.get_logger()
 
+LOOK_S = 1.0
+
 
 class ServiceTrail:
-    """Tells when the service starts and stops; a plant is watched also where that fails.
+    """Tells of starts, stops and steps of the clock; a plant is watched also where that fails.
 
     Parameters
     ----------
@@ -41,6 +47,18 @@ class ServiceTrail:
     async def end(self) -> None:
         """Tell that it stops."""
         await asyncio.to_thread(self._tell, self._stop)
+
+    async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
+        """Tell, for ever, when the host's clock is set, after which times cannot be compared."""
+        seen = Arrival.now(self._clock)
+        while True:
+            pulse.beat(LOOK_S)
+            await self._clock.sleep(LOOK_S)
+            before, seen = seen, Arrival.now(self._clock)
+            step_s = seen.step_s_since(before)
+            if abs(step_s) > STEP_S:
+                deed = step_deed(step_s, seen.host_ns)
+                await asyncio.to_thread(self._tell, partial(self._audit.record, [deed]))
 
     def _start(self) -> None:
         last = self._audit.entries(AuditQuery(limit=1, action=STARTED))

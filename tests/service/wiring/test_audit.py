@@ -1,6 +1,10 @@
 """A service that starts and stops tells so, and goes on where it cannot."""
 
+import asyncio
+import json
 from pathlib import Path
+
+import pytest
 
 from acquisition.clock import SystemClock
 from service.audit.entry import AuditEntry
@@ -48,3 +52,45 @@ async def test_a_plant_is_watched_also_where_nothing_can_be_told(
     again = SqliteStore(path)
     assert told(again) == []
     again.close()
+
+
+class OverError(Exception):
+    """Ends a loop that has no end."""
+
+
+class SetClock:
+    """A host whose clock is set while somebody sleeps: by so much each time."""
+
+    def __init__(self, *steps_s: float) -> None:
+        self._steps_s, self._steady_s, self._wrong_s = list(steps_s), 0.0, 0.0
+
+    def now_ns(self) -> int:
+        return round((1.79e9 + self._steady_s + self._wrong_s) * 1e9)
+
+    def monotonic_s(self) -> float:
+        return self._steady_s
+
+    async def sleep(self, duration_s: float) -> None:
+        if not self._steps_s:
+            raise OverError
+        self._steady_s += duration_s
+        self._wrong_s += self._steps_s.pop(0)
+        await asyncio.sleep(0)
+
+
+async def test_a_clock_that_is_set_is_told_and_one_that_is_slewed_is_not(
+    tmp_path: Path, deploy: Path
+) -> None:
+    store = SqliteStore(tmp_path / "padwatch.sqlite3")
+    clock = SetClock(0.0, 7200.0, 0.01, 0.0, -3600.0, -0.3)
+    plant = load_plant_file(deploy / "demo.toml")
+    trail = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
+    with pytest.raises(OverError):
+        await trail.watch_clock()
+    entries = told(store)
+    store.close()
+    assert {(e.action, e.object, e.actor) for e in entries} == {
+        ("clock.stepped", "clock", "padwatch")
+    }
+    assert [json.loads(e.after or "") for e in entries] == [{"by_s": 7200.0}, {"by_s": -3600.0}]
+    assert entries[0].time_ns > entries[1].time_ns
