@@ -37,9 +37,14 @@ class Soundness:
         return self._store.integrity.n_damaged
 
     @property
+    def mark_error(self) -> str | None:
+        """Why the high-water mark could not be written last; None if it could."""
+        return self._store.integrity.mark_error
+
+    @property
     def trouble(self) -> str | None:
         """What there is to say in a line; None if nothing is known to be wrong."""
-        mark, n_damaged = self._store.integrity.mark_error, self.n_damaged
+        mark, n_damaged = self.mark_error, self.n_damaged
         said = [self.rolled_back, mark and f"the high-water mark cannot be written: {mark}"]
         if n_damaged:
             said.append(f"{n_damaged} stored rows are damaged, and left out")
@@ -77,5 +82,7 @@ class Soundness:
             actor="padwatch",
             action="store.row_damaged",
             object=f"{place.table}: {place.key}",
-            reason="the row does not fit its seal and is left out",
+            reason="the row is gone"
+            if place.is_missing
+            else "the row does not fit its seal and is left out",
         )

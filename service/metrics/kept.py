@@ -6,6 +6,7 @@ from prometheus_client.metrics_core import Metric
 
 from service.metrics.families import counter, gauge, plain_histogram
 from service.metrics.watched import Watched
+from service.soundness import Soundness
 from service.space.growth import S_PER_DAY
 
 
@@ -40,6 +41,27 @@ def store_metrics(watched: Watched) -> Iterator[Metric]:
         "Findings given up because the store did not take them.",
         (),
         [((), live.n_unstored)],
+    )
+
+
+def soundness_metrics(found: Soundness | None) -> Iterator[Metric]:
+    """Whether what is stored is what was stored; nothing where nobody looks."""
+    if found is None:
+        return
+    yield _one(
+        "store_damaged_rows",
+        "Stored rows that were found damaged or missing since the start.",
+        found.n_damaged,
+    )
+    yield _one(
+        "store_rolled_back",
+        "1 if the database was not the one that was here last when the service started.",
+        found.rolled_back is not None,
+    )
+    yield _one(
+        "store_mark_failing",
+        "1 while it cannot be noted beside the database what the newest transaction is.",
+        found.mark_error is not None,
     )
 
 

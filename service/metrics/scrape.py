@@ -15,7 +15,13 @@ from service.delivery.deliveries import ReceiverView
 from service.metrics.acquired import link_metrics, sample_metrics
 from service.metrics.families import gauge
 from service.metrics.judged import alarm_metrics, film_metrics, result_metrics
-from service.metrics.kept import evidence_metrics, queue_metrics, space_metrics, store_metrics
+from service.metrics.kept import (
+    evidence_metrics,
+    queue_metrics,
+    soundness_metrics,
+    space_metrics,
+    store_metrics,
+)
 from service.metrics.recorded import recording_metrics
 from service.metrics.refused import load_metrics
 from service.metrics.told import delivery_metrics
@@ -54,6 +60,7 @@ class Scrape:
             recording_metrics,
         ):
             yield from metrics(watched)
+        yield from soundness_metrics(watched.soundness)
         yield from alarm_metrics(watched.alarms, watched.bearings)
         yield from film_metrics(watched.films.newest, watched.bearings)
         yield from delivery_metrics(self.receivers, watched.clock.now_ns())

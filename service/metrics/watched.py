@@ -16,6 +16,7 @@ from service.load.watch import LoadWatch
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.recorder import Recorder
+from service.soundness import Soundness
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
 
@@ -36,6 +37,8 @@ class Watched:
         Knows which questions are refused now; None where none ever are.
     tape, recordings
         Continuous recording, and what looks after recordings; None where nothing does.
+    soundness
+        Knows what of the stored data is damaged; None where nobody looks.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -54,3 +57,4 @@ class Watched:
     load: LoadWatch | None = None
     tape: Tape | None = None
     recordings: WaveformKeeper | None = None
+    soundness: Soundness | None = None

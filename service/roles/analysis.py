@@ -29,6 +29,7 @@ from service.roles.ground import Ground
 from service.roles.plant_part import WHOLE, PlantPart
 from service.roles.unit_memory import NO_MEMORIES, UnitMemory
 from service.rolling import Rolling
+from service.scrubbing import Scrubbing
 from service.soundness import Soundness
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
@@ -100,6 +101,7 @@ class Analysis:
         loops: dict[str, Loop] = {"gather": self.rolling.run}
         if self.ground.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
+            loops["scrub"] = Scrubbing(self.ground.store.integrity, self.ground.clock).run
         return loops
 
     async def close(self) -> None:

@@ -147,4 +147,5 @@ def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource])
         load=analysis.load,
         tape=analysis.tape,
         recordings=analysis.recordings,
+        soundness=analysis.soundness,
     )

@@ -24,6 +24,8 @@ class Marked:
         Is told.
     damage
         Of its rows.
+    look_on
+        Looks at some more of them; whether that was once around.
     """
 
     def __init__(
@@ -32,9 +34,10 @@ class Marked:
         writing: Callable[[], AbstractContextManager[Connection]],
         chain: AuditChain,
         damage: DamageLog,
+        look_on: Callable[[], bool],
     ) -> None:
         self._marks, self._writing, self._chain = marks, writing, chain
-        self._damage = damage
+        self._damage, self.look_on = damage, look_on
 
     @property
     def found(self) -> Sequence[MarkFinding]:

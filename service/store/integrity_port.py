@@ -34,6 +34,10 @@ class Integrity(Protocol):
         """Go on with the database as it is, and tell the audit trail; what was wrong with it."""
         ...
 
+    def look_on(self) -> bool:
+        """Look at some rows behind those of the last time; whether that was once around."""
+        ...
+
 
 class Unmarked:
     """A store that looks after itself: a server's database, which has no file beside it."""
@@ -46,3 +50,7 @@ class Unmarked:
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:  # noqa: ARG002
         """Nothing is to be adopted."""
         return ()
+
+    def look_on(self) -> bool:
+        """Nothing is to be looked at."""
+        return True

@@ -13,6 +13,7 @@ from core.alarms.alarm import AlarmKind, AlarmLevel
 from core.assessment import Assessment
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms
+from service.metrics.kept import soundness_metrics
 from service.soundness import Soundness
 from service.store.audit_port import AuditQuery
 from service.store.port import TrendQuery
@@ -32,12 +33,21 @@ def path(tmp_path: Path, assessment: Build) -> Path:
     return made
 
 
+def told_to_prometheus(soundness: Soundness) -> dict[str, float]:
+    return {s.name: s.value for metric in soundness_metrics(soundness) for s in metric.samples}
+
+
 async def test_of_what_is_sound_nothing_is_said(path: Path, stepped_clock: Any) -> None:
     with closing(SqliteStore(path)) as store:
         soundness = Soundness(store, stepped_clock)
         await soundness.look()
 
         assert soundness.trouble is None
+        assert told_to_prometheus(soundness) == {
+            "padwatch_store_damaged_rows": 0.0,
+            "padwatch_store_rolled_back": 0.0,
+            "padwatch_store_mark_failing": 0.0,
+        }
         assert store.audit.entries(AuditQuery()) == []
 
 
@@ -57,6 +67,7 @@ async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_ru
         assert soundness.trouble is not None
         assert "rolled back: 2 transactions" in soundness.trouble
         assert len(store.audit.entries(AuditQuery(action="store.rolled_back"))) == 1
+        assert told_to_prometheus(soundness)["padwatch_store_rolled_back"] == 1.0
 
 
 async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_clock: Any) -> None:
@@ -70,6 +81,7 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
         told = store.audit.entries(AuditQuery(action="store.row_damaged"))
 
         assert soundness.trouble == "3 stored rows are damaged, and left out"
+        assert told_to_prometheus(soundness)["padwatch_store_damaged_rows"] == 3.0
         assert sorted(entry.object for entry in told) == [
             f"assessment: series 1, time_ns {T0 + n}" for n in range(3)
         ]

@@ -26,16 +26,23 @@ class Place:
 
 
 class DamageLog:
-    """Places that were found damaged since the start, each once; used from several threads."""
+    """Places that were found damaged since the start, each once; used from several threads.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    most
+        How many places are remembered.
+    """
+
+    def __init__(self, most: int = MAX_PLACES) -> None:
+        self._most = most
         self._lock = Lock()
         self._places: dict[Place, None] = {}
         self._n_more = 0
 
     @property
     def n_damaged(self) -> int:
-        """How many there are; beyond `MAX_PLACES` one that is met again may count again."""
+        """How many there are; beyond `most` one that is met again may count again."""
         return len(self._places) + self._n_more
 
     @property
@@ -49,7 +56,7 @@ class DamageLog:
         with self._lock:
             if place in self._places:
                 return
-            if len(self._places) < MAX_PLACES:
+            if len(self._places) < self._most:
                 self._places[place] = None
             else:
                 self._n_more += 1

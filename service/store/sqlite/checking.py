@@ -13,12 +13,9 @@ from service.store.highwater.host import host_id
 from service.store.highwater.mark import Mark
 from service.store.port import StoreError
 from service.store.seals.damage import DamageLog
-from service.store.seals.table import SealedTable
 from service.store.sqlite.readers import BUSY_TIMEOUT_S
 from service.store.sqlite.sealing import Seals
-
-ROWS_AT_ONCE = 2000
-"""Read in one look at the database: a short one does not make its log grow."""
+from service.store.sqlite.walking import Key, walks
 
 EVERY = 1_000_000
 NULL_QUIRK = "NULL value in "
@@ -55,7 +52,7 @@ def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iter
     if not path.exists():
         raise StoreError(f"{path.absolute()}: there is no database")
     said = _mark_beside(path)  # first: it may lag, but not lead
-    log = DamageLog()
+    log = DamageLog(EVERY)
     seals = Seals(log)
     uri = f"{path.absolute().as_uri()}?mode=ro"
     try:
@@ -64,13 +61,14 @@ def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iter
         ) as reader:
             yield from _structure(reader)
             seals.know(reader)
-            yield from _rows(reader, seals, log, told)
+            _look_at_rows(reader, seals, log, told)
             mark = select_mark(reader)
             if mark is not None:
                 for found in compared(said, mark, host_id()):
                     yield Finding("high_water", found.detail)
     except (sqlite3.Error, UnicodeDecodeError) as error:
         yield Finding("structure", f"cannot be read any further: {error}")
+    yield from _said(log)
 
 
 def _mark_beside(path: Path) -> Mark | str:
@@ -86,48 +84,21 @@ def _structure(reader: sqlite3.Connection) -> Iterator[Finding]:
             yield Finding("structure", line)
 
 
-def _rows(
+def _look_at_rows(
     reader: sqlite3.Connection, seals: Seals, log: DamageLog, told: Callable[[float], None]
-) -> Iterator[Finding]:
+) -> None:
     tables = list(seals.tables.values())
     for done, table in enumerate(tables):
         told(done / len(tables))
-        for _ in _whole(reader, table):
-            pass
-        yield from _gone(reader, table)
+        for walk in walks(table):
+            after: Key | None = None
+            while (after := walk.page(reader, log, after)) is not None:
+                pass
     told(1.0)
-    for place in log.places:
-        yield Finding("altered", f"{place.table}: {place.key}")
 
 
-def _whole(reader: sqlite3.Connection, table: SealedTable) -> Iterator[None]:
-    """Look at every row, some at a time; those that do not fit are noted by the function."""
-    source = f"SELECT {_keys(table, 'r.')}, {table.is_whole('r.')} FROM main.{table.name} AS r"  # noqa: S608
-    for _ in _paged(reader, table, source, "r."):
-        yield
-
-
-def _gone(reader: sqlite3.Connection, table: SealedTable) -> Iterator[Finding]:
-    row = f"SELECT 1 FROM main.{table.name} AS r WHERE {table.matched('s.', 'r.')}"  # noqa: S608
-    source = f"SELECT {_keys(table, 's.')}, EXISTS ({row}) FROM main.{table.seals} AS s"  # noqa: S608
-    for *key, is_there in _paged(reader, table, source, "s."):
-        if not is_there:
-            words = ", ".join(f"{c} {v}" for c, v in zip(table.key, key, strict=True))
-            yield Finding("missing", f"{table.name}: {words}")
-
-
-def _paged(
-    reader: sqlite3.Connection, table: SealedTable, source: str, of: str
-) -> Iterator[tuple[object, ...]]:
-    """Rows in the order of their keys, some at a time."""
-    keys, marks = _keys(table, of), ", ".join("?" * len(table.key))
-    ordered = f" ORDER BY {keys} LIMIT {ROWS_AT_ONCE}"
-    rows = reader.execute(source + ordered).fetchall()
-    while rows:
-        yield from rows
-        last = rows[-1][: len(table.key)]
-        rows = reader.execute(f"{source} WHERE ({keys}) > ({marks}){ordered}", last).fetchall()
-
-
-def _keys(table: SealedTable, of: str) -> str:
-    return ", ".join(of + column for column in table.key)
+def _said(log: DamageLog) -> Iterator[Finding]:
+    for is_missing, kind in ((True, "missing"), (False, "altered")):
+        for place in log.places:
+            if place.is_missing == is_missing:
+                yield Finding(kind, f"{place.table}: {place.key}")

@@ -17,6 +17,9 @@ SET_SEALED_AT = "INSERT OR REPLACE INTO seal_schema VALUES (1, ?)"
 PER_FORMAT = 1_000_000
 """Of that number: the format of seals counts, too."""
 
+WALK = "CREATE TABLE IF NOT EXISTS seal_walk (id INTEGER PRIMARY KEY, place TEXT)"
+"""How far somebody has come who looks at all rows in turn."""
+
 TABLES = """
     SELECT name FROM main.sqlite_master
     WHERE type = 'table' AND name NOT GLOB 'sqlite_*' AND name NOT GLOB 'seal_*' ORDER BY name
@@ -43,6 +46,7 @@ class Seals:
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()
         now = (FORMAT * PER_FORMAT + schema,)
         writer.execute(SCHEMA)
+        writer.execute(WALK)
         if writer.execute(SEALED_AT).fetchone() != now:
             self._anew(writer)
             writer.execute(SET_SEALED_AT, now)

@@ -14,6 +14,7 @@ from service.store.retention.sql import SqlRetention
 from service.store.spectra_port import SpectraLimits
 from service.store.sql_store import SqlStore
 from service.store.sqlite.database import SqliteDatabase
+from service.store.sqlite.scrubbing import Scrubber
 
 
 class SqliteStore(SqlStore):
@@ -51,7 +52,10 @@ class SqliteStore(SqlStore):
                 begin_head(head_path(path))
             super().__init__(database, head_path(path), address, spectra)
             self.retention = SqlRetention(self._writing, self._reader, database.give_back)
-            self.integrity = Marked(database.marks, self._writing, self._chain, database.damage)
+            scrubber = Scrubber(database, database.seals, database.damage)
+            self.integrity = Marked(
+                database.marks, self._writing, self._chain, database.damage, scrubber.look_on
+            )
         except OSError as error:
             database.close()
             raise StoreError(f"{path}: {error}") from error

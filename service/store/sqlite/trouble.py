@@ -1,10 +1,14 @@
 """What an error of the disk means, and what to do about it."""
 
 import resource
+import sqlite3
 from pathlib import Path
 
 IOERR = 10
 """Primary code of all errors of reading, writing and syncing (``SQLITE_IOERR``)."""
+
+UNREADABLE = frozenset({IOERR, 11, 26})
+"""And of pages that are no pages of a database (``SQLITE_CORRUPT``, ``SQLITE_NOTADB``)."""
 
 PAGE_ROOM = 65_536
 """So near its limit a file cannot grow by a transaction any more."""
@@ -17,6 +21,14 @@ def leaves_in_doubt(error: BaseException) -> bool:
     """
     code = getattr(error, "sqlite_errorcode", None)
     return code is not None and code & 0xFF == IOERR
+
+
+def is_of_the_data(error: BaseException | None) -> bool:
+    """Whether what is stored cannot be read, and reading it again will not help."""
+    code = getattr(error, "sqlite_errorcode", None)
+    if code is None:  # of Python's own: text that is none
+        return isinstance(error, UnicodeError | sqlite3.OperationalError)
+    return code & 0xFF in UNREADABLE
 
 
 def told(path: Path, error: BaseException) -> str:

@@ -1,0 +1,101 @@
+"""`Scrubber`: looks at every row in turn, a few at a time, for damage that nobody has met."""
+
+import json
+from typing import Any
+
+from service.store.database import Connection, Database
+from service.store.port import StoreError
+from service.store.seals.damage import DamageLog, Place
+from service.store.sqlite.sealing import Seals
+from service.store.sqlite.trouble import is_of_the_data
+from service.store.sqlite.walking import Key, Walk, walks
+
+ROWS_AT_ONCE = 500
+"""A few milliseconds, after which the log beside the file may be brought into it."""
+
+REMEMBER_EVERY = 300
+"""Looks, after which it is written down how far it has come."""
+
+RECALL = "SELECT place FROM main.seal_walk WHERE id = 1"
+REMEMBER = """
+    INSERT INTO seal_walk VALUES (1, ?) ON CONFLICT (id) DO UPDATE SET place = excluded.place
+"""
+
+
+class Scrubber:
+    """Goes on, also after a restart, where it has been last; used by one thread at a time.
+
+    Parameters
+    ----------
+    damage
+        Is told of rows that are altered or gone.
+    """
+
+    def __init__(self, database: Database, seals: Seals, damage: DamageLog) -> None:
+        self._database, self._damage = database, damage
+        self._walks = [walk for table in seals.tables.values() for walk in walks(table)]
+        self._number = -1
+        self._after: Key | None = None
+        self._n_looks = 0
+
+    def look_on(self) -> bool:
+        """Look at some rows; whether that was once around.
+
+        Raises
+        ------
+        StoreError
+            If the database cannot be used now.
+        """
+        if self._number < 0:
+            self._recall()
+        if not self._walks:
+            return True
+        self._after = self._looked(self._walks[self._number])
+        if self._after is None:
+            self._number = (self._number + 1) % len(self._walks)
+        is_around = self._after is None and self._number == 0
+        self._n_looks += 1
+        if is_around or self._n_looks % REMEMBER_EVERY == 0:
+            self._remember()
+        return is_around
+
+    def _looked(self, walk: Walk) -> Key | None:
+        try:
+            with self._database.reading("surrogateescape") as reader:
+                return walk.page(reader, self._damage, self._after, ROWS_AT_ONCE)
+        except (StoreError, UnicodeEncodeError) as error:
+            if isinstance(error, StoreError) and not is_of_the_data(error.__cause__):
+                raise
+            what = repr(str(error.__cause__ or error)[:80])
+            self._damage.note(Place(walk.table.name, f"cannot be read any further: {what}"))
+            return None
+
+    def _recall(self) -> None:
+        with self._database.reading() as reader:
+            self._number, self._after = _place(self._walks, reader)
+
+    def _remember(self) -> None:
+        walk = self._walks[self._number]
+        written = json.dumps([walk.table.name, walk.is_of_seals, self._after])
+        with self._database.writing() as writer:
+            writer.execute(REMEMBER, (written,))
+
+
+def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
+    """Where to go on; at the beginning if nobody knows, for nothing depends on it."""
+    row = reader.execute(RECALL).fetchone()
+    try:
+        name, is_of_seals, after = json.loads(row[0]) if row else (None, False, None)
+    except (TypeError, ValueError):
+        return 0, None
+    for number, walk in enumerate(ways):
+        if (walk.table.name, walk.is_of_seals) == (name, is_of_seals) and _is_key(walk, after):
+            return number, None if after is None else tuple(after)
+    return 0, None
+
+
+def _is_key(walk: Walk, after: Any) -> bool:
+    if after is None:
+        return True
+    fits = isinstance(after, list) and len(after) == len(walk.table.key)
+    return fits and all(isinstance(cell, int | float | str) for cell in after)

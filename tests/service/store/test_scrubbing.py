@@ -1,0 +1,142 @@
+"""Damage that nobody meets is found by looking at every row in turn."""
+
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.assessment import Assessment
+from service.scrubbing import Scrubbing
+from service.soundness import Soundness
+from service.store.audit_port import AuditQuery
+from service.store.seals.damage import Place
+from service.store.sqlite import SqliteStore, scrubbing
+from service.store.sqlite.checking import findings
+from service.store.sqlite.walking import walks
+
+Build = Callable[..., Assessment]
+At = Callable[[int], int]
+N = 40
+
+
+@pytest.fixture(autouse=True)
+def _few_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scrubbing, "ROWS_AT_ONCE", 7)
+
+
+@pytest.fixture(autouse=True)
+def _filled(path: Path, assessment: Build, at: At) -> None:
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(at(n), speed_rpm=float(n)) for n in range(N)], [])
+
+
+def damage(path: Path, *statements: str) -> None:
+    """Change the file behind padwatch's back, which seals nothing."""
+    with closing(sqlite3.connect(path)) as other, other:
+        for statement in statements:
+            other.execute(statement)
+
+
+def once_around(store: SqliteStore) -> int:
+    """How many looks it takes."""
+    n_looks = 1
+    while not store.integrity.look_on():
+        n_looks += 1
+    return n_looks
+
+
+def test_altered_and_missing_rows_are_found_and_are_those_that_the_command_finds(
+    path: Path, at: At
+) -> None:
+    damage(
+        path,
+        f"UPDATE assessment SET coverage = 0.5 WHERE time_ns = {at(20)}",  # noqa: S608
+        f"DELETE FROM assessment WHERE time_ns = {at(33)}",  # noqa: S608
+        "UPDATE series SET bearing = 'LJB'",
+    )
+    with closing(SqliteStore(path)) as store:
+        once_around(store)
+        found = store.integrity.damaged
+
+    assert set(found) == {
+        Place("assessment", f"series 1, time_ns {at(20)}"),
+        Place("assessment", f"series 1, time_ns {at(33)}", is_missing=True),
+        Place("series", "id 1"),
+    }
+    assert {f"{place.table}: {place.key}" for place in found} == {
+        finding.detail for finding in findings(path)
+    }
+
+
+def test_of_what_is_whole_nothing_is_said_however_often_it_is_looked_at(path: Path) -> None:
+    with closing(SqliteStore(path)) as store:
+        assert once_around(store) == once_around(store) > 2 * N / 7
+        assert store.integrity.n_damaged == 0
+
+
+def test_after_a_restart_it_goes_on_where_it_was(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scrubbing, "REMEMBER_EVERY", 1)
+    with closing(SqliteStore(path)) as store:
+        n_looks = once_around(store)
+        for _ in range(n_looks - 2):
+            store.integrity.look_on()
+    with closing(SqliteStore(path)) as store:
+        assert once_around(store) == 2
+
+
+@pytest.mark.parametrize(
+    "place", ["nonsense", "[1]", '["gone", false, null]', '["gap", true, [{}]]']
+)
+def test_a_damaged_place_makes_it_begin_anew(path: Path, place: str) -> None:
+    with closing(SqliteStore(path)) as store:
+        n_looks = once_around(store)
+    damage(path, f"UPDATE seal_walk SET place = '{place}'")  # noqa: S608
+    with closing(SqliteStore(path)) as store:
+        assert once_around(store) == n_looks
+
+
+def test_keys_that_are_no_text_stop_nothing(path: Path) -> None:
+    with closing(SqliteStore(path)) as store:
+        for name in ("a", "b"):
+            with store.database.writing() as writer:
+                writer.execute(
+                    "INSERT INTO shaft_response (unit, created_ns, document) VALUES (?, 1, '')",
+                    (name,),
+                )
+    damage(path, "UPDATE shaft_response SET unit = CAST(x'ff80' AS TEXT) WHERE unit = 'b'")
+    with closing(SqliteStore(path)) as store:
+        once_around(store)
+        assert {place.table for place in store.integrity.damaged} == {"shaft_response"}
+
+
+async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
+    path: Path, stepped_clock: Any, at: At
+) -> None:
+    damage(path, f"DELETE FROM assessment WHERE time_ns = {at(3)}")  # noqa: S608
+    with closing(SqliteStore(path)) as store:
+        soundness = Soundness(store, stepped_clock)
+        loop = Scrubbing(store.integrity, stepped_clock)
+        while not await loop.look():
+            pass
+        await soundness.look()
+        (told,) = store.audit.entries(AuditQuery(action="store.row_damaged"))
+
+    assert soundness.trouble is not None
+    assert told.reason == "the row is gone"
+
+
+@pytest.mark.planted("a scrubber that looks at rows only, not for those that are gone")
+def test_a_scrubber_that_looks_at_rows_only_misses_those_that_are_gone(
+    path: Path, at: At, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The planted bug that the first of the above would catch."""
+    monkeypatch.setattr(scrubbing, "walks", lambda table: walks(table)[:1])
+    damage(path, f"DELETE FROM assessment WHERE time_ns = {at(33)}")  # noqa: S608
+    with closing(SqliteStore(path)) as store:
+        once_around(store)
+        assert store.integrity.n_damaged == 0
