@@ -40,6 +40,17 @@ def insert_baseline(writer: Connection, baseline: BearingBaseline) -> None:
     )
 
 
+def is_kept(reader: Connection, baseline: BearingBaseline) -> bool:
+    """Whether just this baseline is written already."""
+    origin = baseline.origin
+    return select_document(reader, origin.unit, origin.bearing, origin.version) == to_json(baseline)
+
+
+def are_kept(reader: Connection, steps: Iterable[StoredStep]) -> bool:
+    """Whether all of this is written already: nobody does the same twice at the same moment."""
+    return all(step in select_steps(reader, step.unit, step.bearing) for step in steps)
+
+
 def insert_steps(writer: Connection, steps: Iterable[StoredStep]) -> None:
     """Add what was done to baselines."""
     writer.executemany(
@@ -74,15 +85,21 @@ def select_baseline(
     StoreError
         If what is stored is no baseline.
     """
+    found = select_document(reader, unit, bearing, version)
+    try:
+        return None if found is None else from_json(found)
+    except ValueError as error:
+        name = f"baseline {version} of unit {unit} bearing {bearing}"
+        raise StoreError(f"{name}: {error}") from error
+
+
+def select_document(reader: Connection, unit: str, bearing: str, version: int) -> str | None:
+    """One baseline as it is stored."""
     found = reader.execute(
         "SELECT document FROM baseline WHERE unit = ? AND bearing = ? AND version = ?",
         (unit, bearing, version),
     ).fetchone()
-    try:
-        return None if found is None else from_json(found[0])
-    except ValueError as error:
-        name = f"baseline {version} of unit {unit} bearing {bearing}"
-        raise StoreError(f"{name}: {error}") from error
+    return None if found is None else str(found[0])
 
 
 def select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredStep]:

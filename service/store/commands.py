@@ -32,7 +32,11 @@ MAX_OPEN = 200
 """Most that are read at once."""
 
 COLUMNS = "id, unit, kind, document, actor, peer, asked_ns, expires_ns"
-INSERT = f"INSERT INTO operator_command ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"  # noqa: S608
+INSERT = (
+    f"INSERT INTO operator_command ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"  # noqa: S608
+    " ON CONFLICT (id) DO NOTHING"
+)
+"""Asked again where nobody could tell whether it was written, it is there once."""
 FORGET = "DELETE FROM operator_command WHERE asked_ns < ?"
 SELECT_OPEN = f"""
     SELECT {COLUMNS}, taken_by FROM operator_command

@@ -10,8 +10,10 @@ from core.films.film_judge import FilmNews
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import step_deeds
 from service.store.baselines import (
+    are_kept,
     insert_baseline,
     insert_steps,
+    is_kept,
     select_baseline,
     select_baselines,
     select_responses,
@@ -99,8 +101,13 @@ class SqlFilms:
             return select_decisions(reader, unit, bearing)
 
     def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
-        """Write a learned baseline with what is done with it at once."""
+        """Write a learned baseline with what is done with it at once; called again, it is nothing.
+
+        That is for a call whose end nobody could tell.
+        """
         with self._writing() as writer:
+            if is_kept(writer, baseline) and are_kept(writer, steps):
+                return
             insert_baseline(writer, baseline)
             self._add_steps(writer, steps)
 
@@ -115,8 +122,10 @@ class SqlFilms:
             return select_baseline(reader, unit, bearing, version)
 
     def add_steps(self, steps: Sequence[StoredStep]) -> None:
-        """Write what was done to baselines."""
+        """Write what was done to baselines; called again, it is nothing."""
         with self._writing() as writer:
+            if are_kept(writer, steps):
+                return
             self._add_steps(writer, steps)
 
     def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:

@@ -18,6 +18,7 @@ HISTORY = (
     f"SELECT {COLUMNS} FROM gap_reference"  # noqa: S608
     " WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
 )
+SET_THEN = f"SELECT {COLUMNS} FROM gap_reference WHERE unit = ? AND bearing = ? AND set_ns = ?"  # noqa: S608
 
 Row = tuple[str, str, int, str, float, float, float | None, float | None, str, str]
 
@@ -38,6 +39,12 @@ def insert_reference(writer: Connection, reference: GapReference) -> None:
             reference.note,
         ),
     )
+
+
+def is_set(reader: Connection, reference: GapReference) -> bool:
+    """Whether it is written already: by a call whose end nobody could tell."""
+    where = (reference.unit, reference.bearing, reference.set_ns)
+    return any(_reference(row) == reference for row in reader.execute(SET_THEN, where))
 
 
 def select_in_force(reader: Connection) -> list[GapReference]:

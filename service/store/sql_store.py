@@ -38,7 +38,7 @@ from service.store.port import (
 from service.store.positions import select_position, write_positions
 from service.store.positions_port import StreamPosition
 from service.store.reach import gap_of, select_reach
-from service.store.references import insert_reference, select_history, select_in_force
+from service.store.references import insert_reference, is_set, select_history, select_in_force
 from service.store.retention.sql import SqlRetention
 from service.store.rollups.gathering import SqlRollups
 from service.store.rollups.reading import read_trend
@@ -168,14 +168,16 @@ class SqlStore:
             return select_newest(reader, unit, bearing)
 
     def add_reference(self, reference: GapReference) -> None:
-        """Write a reference; durable when this returns.
+        """Write a reference; durable when this returns, and there once if it is called again.
 
         Raises
         ------
         StoreError
-            If it was not written; the message is the database's.
+            If it was not written, or nobody can tell; the message is the database's.
         """
         with self._writing() as writer:
+            if is_set(writer, reference):
+                return
             self._chain.add(writer, [reference_deed(writer, reference)])
             insert_reference(writer, reference)
 

@@ -41,6 +41,10 @@ RULING = (
     f"SELECT {COLUMNS} FROM vector_reference"  # noqa: S608
     " WHERE unit = ? AND bearing = ? AND state = ? ORDER BY id DESC LIMIT 1"
 )
+SET_THEN = (
+    f"SELECT {COLUMNS} FROM vector_reference"  # noqa: S608
+    " WHERE unit = ? AND bearing = ? AND state = ? AND set_ns = ?"
+)
 HISTORY = (
     f"SELECT {COLUMNS} FROM vector_reference"  # noqa: S608
     " WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
@@ -72,6 +76,8 @@ class SqlVectorReferences:
         vectors = {p: (v.amplitude_um_pk, v.phase_deg) for p, v in found.vectors.items()}
         row = (found.unit, found.bearing, int(found.state), reference.set_ns)
         with self._writing() as writer:
+            if any(_reference(each) == reference for each in writer.execute(SET_THEN, row)):
+                return  # by a call whose end nobody could tell
             before = writer.execute(RULING, row[:3]).fetchone()
             deed = vector_deed(_reference(before) if before else None, reference)
             self._audit.add(writer, [deed])

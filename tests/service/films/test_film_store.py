@@ -166,6 +166,16 @@ def test_baselines_and_what_was_done_to_them_are_read_back(
     assert store.films.steps("U1", "LJB") == []
 
 
+def test_a_baseline_that_is_written_again_because_nobody_could_tell_counts_once(
+    store: SqliteStore, baseline: BearingBaseline
+) -> None:
+    step = StoredStep("U1", "UJB", 1, BaselineStep.ACCEPTED, 78, "Ada", "looks right")
+    for _ in range(2):
+        store.films.add_baseline(baseline, [step])
+    assert len(store.films.baselines("U1", "UJB")) == 1
+    assert store.films.steps("U1", "UJB") == [step]
+
+
 def test_a_version_is_written_once(store: SqliteStore, baseline: BearingBaseline) -> None:
     step = StoredStep("U1", "UJB", 1, BaselineStep.LEARNED, 78, "Ada", "")
     store.films.add_baseline(baseline, [])

@@ -2,14 +2,20 @@
 
 import pytest
 
+from core.alarms.vector_change import OrderVector, VectorReference
+from core.condition.operating_state import OperatingState
 from service.security.keys import ApiKey
 from service.security.roles import Role
 from service.security.sessions import Session
 from service.store.access_port import AccessRefusedError
 from service.store.audit_port import AuditQuery
+from service.store.commands_port import Command, OpenCommand
+from service.store.film_port import BaselineStep, StoredStep
+from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.outbox_port import LetterState
 from service.store.port import StoreError
 from service.store.sql_store import SqlStore
+from service.store.vector_reference_port import SetVectorReference
 
 TOKEN, OTHER = b"t" * 32, b"o" * 32
 LATER = 10**18
@@ -27,6 +33,30 @@ def test_the_first_account_takes_the_token_that_was_offered_last(store: SqlStore
     assert not set_up.take(TOKEN, "berta", "hash", 1)
     assert not set_up.offer(TOKEN, LATER)
     assert [account.name for account in store.access.accounts.all()] == ["anna"]
+
+
+def test_what_is_written_again_because_nobody_could_tell_counts_once(store: SqlStore) -> None:
+    gap = GapReference("U1", "UJB", 5, "A", (1.0, 2.0), None, ReferenceSource.GIVEN)
+    vector = SetVectorReference(
+        VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0)}),
+        *(6, "A", ""),
+    )
+    step = StoredStep("U1", "UJB", None, BaselineStep.RENEWED, 7, "A", "overhaul", 7)
+    key = ApiKey("k1", "wall", TOKEN, Role.VIEWER, ("U1",), 8, LATER)
+    command = Command("c1", "U1", "alarm", "{}", "A", None, 9, LATER)
+    for _ in range(2):
+        store.add_reference(gap)
+        store.order1_references.add(vector)
+        store.films.add_steps([step])
+        store.access.accounts.add("anna", Role.ADMIN, "hash", 10)
+        store.access.keys.add(key)
+        store.commands.ask(command)
+
+    assert store.reference_history("U1", "UJB") == [gap]
+    assert store.order1_references.history("U1", "UJB") == [vector]
+    assert store.films.steps("U1", "UJB") == [step]
+    assert store.commands.open(["U1"]) == [OpenCommand(command, None)]
+    assert len(store.audit.entries(AuditQuery())) == 5
 
 
 def test_the_only_admin_stays_and_a_new_password_ends_sessions(store: SqlStore) -> None:
