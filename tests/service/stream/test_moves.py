@@ -1,0 +1,143 @@
+"""Wherever the analysis of a unit is cut off, and however often: to the last bit the same results.
+
+What is on the stream is as bad as it comes: gaps of all lengths, devices that count anew, lost
+links, blocks that overlap or come twice, messages that nobody understands.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.ledger_plant import LedgerPlant
+from harness.moving_unit import Message, MovingUnit
+from harness.stream_rig import found_in
+
+from core.arrays import FloatArray, SampleArray
+from core.blocks import SampleBlock
+from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
+from core.units import NS_PER_S
+from service.live import LinkState
+from service.roles.link_news import LinkNews
+from service.settings.units import UnitSettings
+from service.stream.wire import encoded_block, encoded_link
+
+LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
+SPAN = LEDGER.n_segments * LEDGER.hop_samples
+T0 = 1_767_225_600 * NS_PER_S
+N_SAMPLES = 240
+N_MESSAGES = 100
+TURN_HZ = 10.0
+
+
+class Device:
+    """A shaft whose speed and vortex drift, with spells beyond the limit and all that goes wrong.
+
+    Parameters
+    ----------
+    unit
+        Gives its channels.
+    """
+
+    def __init__(self, unit: UnitSettings, seed: int) -> None:
+        self._unit, self._rng = unit, np.random.default_rng(seed)
+        self._shaft = np.array(["shaft" in channel.id for channel in unit.channel])
+        self._epoch, self._next, self._begin_ns = 3, 0, T0
+
+    def block(self) -> SampleBlock:
+        """The next one."""
+        self._stumble()
+        index = self._next + np.arange(N_SAMPLES)
+        self._next += N_SAMPLES
+        t_s = index / self._unit.sampling_hz
+        seconds = t_s[0] + (self._begin_ns - T0) / NS_PER_S
+        turn_hz = TURN_HZ * (1.0 + 0.01 * np.sin(seconds / 9.0))
+        vortex_hz = turn_hz * (0.29 + 0.05 * np.sin(seconds / 7.0))
+        return SampleBlock(
+            unit=self._unit.id,
+            epoch=self._epoch,
+            first_index=int(index[0]),
+            start_ns=self._begin_ns + round(float(t_s[0]) * NS_PER_S),
+            rate_hz=self._unit.sampling_hz,
+            samples=self._samples(t_s, turn_hz, vortex_hz, 160.0 if seconds % 31 > 20 else 40.0),
+            channel_quality=tuple(self._quality() for _ in self._shaft),
+            slow={
+                channel.id: Reading(60.0 * turn_hz if channel.id == "speed" else 45.0)
+                for channel in self._unit.slow_channel
+            },
+        )
+
+    def _stumble(self) -> None:
+        kind = self._rng.random()
+        if kind < 0.04:
+            self._next += int(self._rng.choice([1, 100, 2000, SPAN - 1, SPAN, SPAN + 1]))
+        elif kind < 0.06:
+            self._next += int(self._rng.choice([2 * SPAN, 2 * SPAN + 100, 10 * SPAN]))
+        elif kind < 0.08:
+            self._next = max(0, self._next - int(self._rng.choice([1, 100, N_SAMPLES])))
+        elif kind < 0.09:
+            self._begin_ns += round((self._next / self._unit.sampling_hz + 3.0) * NS_PER_S)
+            self._epoch, self._next = self._epoch + 1, int(self._rng.choice([0, 7]))
+
+    def _samples(
+        self, t_s: FloatArray, turn_hz: float, vortex_hz: float, size_um: float
+    ) -> SampleArray:
+        phase = np.arange(self._shaft.size)[:, np.newaxis] * np.pi / 2
+        size = np.where(self._shaft, size_um, 2.0)[:, np.newaxis]
+        turning = size * np.cos(2 * np.pi * turn_hz * t_s - phase)
+        vortex = 0.3 * size * np.cos(2 * np.pi * vortex_hz * t_s - phase)
+        noise = self._rng.normal(0.0, 0.5, turning.shape)
+        mean = np.where(self._shaft, 2000.0, 0.0)[:, np.newaxis]
+        found: SampleArray = (turning + vortex + noise + mean).astype(np.float32)
+        return found
+
+    def _quality(self) -> Quality:
+        kind = self._rng.random()
+        if kind < 0.002:
+            return bad(Reason.SENSOR_FAILURE)
+        return uncertain(Reason.CLIPPED) if kind < 0.004 else GOOD
+
+
+def messages(unit: MovingUnit, seed: int) -> Iterator[Message]:
+    """All that is on the stream of a unit; numbers in between are other units'."""
+    rng, device = np.random.default_rng(seed + 1000), Device(unit.plant.unit[0], seed)
+    sequence = int(rng.integers(1, 9))
+    for _ in range(N_MESSAGES):
+        sequence += int(rng.integers(1, 4))
+        kind = rng.random()
+        if kind < 0.02:
+            yield sequence, b"nothing that anybody understands"
+        elif kind < 0.06:
+            state = LinkState.NOT_CONNECTED if kind < 0.04 else LinkState.CONNECTED
+            yield sequence, encoded_link(LinkNews("U1", state, "as it happens"), unit.identity)
+        else:
+            payload = encoded_block(device.block(), unit.identity, T0)
+            yield sequence, payload
+            if kind > 0.97:
+                sequence += 1
+                yield sequence, payload
+
+
+def moving_unit(folder: Path) -> MovingUnit:
+    ports = dict.fromkeys(LEDGER.units, 9)
+    folder.mkdir()
+    return MovingUnit(LEDGER.write(folder / "plant.toml", folder / "data", ports))
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("seed", [1, 2])
+async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(
+    tmp_path: Path, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    whole, moved = moving_unit(tmp_path / "whole"), moving_unit(tmp_path / "moved")
+    sent = list(messages(whole, seed))
+    await whole.live(sent, None, rng)
+    for _ in range(8):
+        await moved.live(sent, int(rng.integers(1, 50)), rng)
+    await moved.live(sent, None, rng)
+    found, wanted = found_in(moved.database), found_in(whole.database)
+    for name, rows in wanted.items():
+        assert found[name] == rows, name
+    assert len(wanted["assessment"]) > 30
+    assert wanted["gap"]

@@ -1,0 +1,110 @@
+"""A unit's analysis as `padwatch analyse` does it, moved as often as wanted, without a server."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.clock import SystemClock
+from service.bus import Bus
+from service.delivery.facts import Around
+from service.heartbeats import Heartbeats
+from service.metrics.timings import Timings
+from service.origin import Origin
+from service.recorder import Findings
+from service.roles.analysis import Analysis, analysis_on
+from service.roles.ground import Ground, live_view
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.store.sqlite import SqliteStore
+from service.stream.names import identity_of
+from service.stream.progress import UnitProgress
+from service.stream.stored import memories_of, usable
+from service.wiring.sources import monitor_of
+
+STREAM = "born once"
+
+Message = tuple[int, bytes]
+"""Its number on the stream, and its bytes."""
+
+
+@dataclass
+class Life:
+    """An analysis from its start to its end."""
+
+    analysis: Analysis
+    progress: UnitProgress
+
+    async def take(self, messages: Sequence[Message], rng: np.random.Generator) -> None:
+        """Take messages in, in batches as the consumer does; the store may be faster than that."""
+        end = rng.integers(1, 9)
+        for number, (sequence, payload) in enumerate(messages):
+            await self.progress.take(sequence, payload)
+            if number == end:
+                end += rng.integers(1, 9)
+                await self.store()
+            elif rng.random() < 0.3:
+                await self.analysis.recorder.flush()
+
+    async def store(self) -> None:
+        """Store everything, with how far it is."""
+        if not self.progress.is_reliving:
+            self.analysis.recorder.put(Findings(position=self.progress.position()))
+        await self.analysis.recorder.flush()
+
+
+class MovingUnit:
+    """The only unit of a plant.
+
+    Parameters
+    ----------
+    plant_file
+        Its data folder holds the database.
+    """
+
+    def __init__(self, plant_file: Path) -> None:
+        self.plant: PlantFile = load_plant_file(plant_file)
+        self.database = Path(self.plant.service.data_folder) / "padwatch.sqlite3"
+        self.identity = identity_of(self.plant, self.plant.unit[0])
+
+    async def live(
+        self, messages: Sequence[Message], n: int | None, rng: np.random.Generator
+    ) -> None:
+        """Start anew where the database says, take messages in, and be killed after `n` of them.
+
+        Parameters
+        ----------
+        n
+            All of them, and an end in good order, where it is None.
+        """
+        with ExitStack() as stack:
+            life = await self._begun(messages[-1][0], stack)
+            life.progress.reaches_back(messages[0][0])
+            wanted = [each for each in messages if each[0] >= life.progress.first_needed]
+            await life.take(wanted[:n], rng)
+            if n is None:
+                await life.store()
+            analysis = life.analysis
+            await analysis.captures.close()
+            await analysis.evidence.close()
+            await analysis.tape.close()
+            analysis.recordings.close()
+
+    async def _begun(self, newest: int, stack: ExitStack) -> Life:
+        plant, clock = self.plant, SystemClock()
+        unit = plant.unit[0]
+        store, live = SqliteStore(self.database), live_view(plant, clock)
+        stack.callback(store.close)
+        monitors = {unit.id: monitor_of(unit, plant.analysis)}
+        beats, timings = Heartbeats(clock), Timings(monitors, clock)
+        ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
+        found = store.position(unit.id)
+        memories = memories_of([found] if found else [])
+        analysis = await analysis_on(
+            ground, monitors, Bus(512, clock), Around(live), memories=memories
+        )
+        parts = (analysis.analyser, live, analysis.recorder, clock)
+        stored, memory = usable(found, STREAM, newest), memories.get(unit.id)
+        return Life(analysis, UnitProgress(self.identity, STREAM, stored, memory, *parts))
