@@ -10,6 +10,7 @@ import structlog
 
 from service.store.file_system import FileSystem, file_system_of
 from service.store.port import StoreError
+from service.store.usable import why_unusable
 
 log = structlog.get_logger()
 
@@ -50,7 +51,7 @@ def only_one(database: Path, look: Callable[[Path], FileSystem] = file_system_of
         path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError as error:
-        raise StoreError(f"{path}: {error.strerror}") from error
+        raise StoreError(why_unusable(database) or f"{path}: {error.strerror}") from error
     try:
         _take(descriptor, database)
         yield

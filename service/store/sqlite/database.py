@@ -19,6 +19,7 @@ from service.store.sqlite.readers import Readers
 from service.store.sqlite.sealing import Seals
 from service.store.sqlite.trouble import told
 from service.store.sqlite.writer import Writer, opened
+from service.store.usable import why_unusable
 
 PAGE_BYTES = 8192
 """In pages of half that size, a result of all quantities would need a page of its own."""
@@ -61,7 +62,8 @@ class SqliteDatabase:
         self._readers = Readers(path, prepare=self.seals.guard)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._renamed_errors():
-            path.parent.mkdir(parents=True, exist_ok=True)
+            if (unusable := why_unusable(path)) is not None:
+                raise StoreError(unusable)
             if (cut := why_cut(path)) is not None:
                 raise StoreError(f"{path}: {cut}")
             connection = opened(path)
