@@ -19,6 +19,7 @@ from service.health.serving import HealthServer
 from service.heartbeats import Heartbeats, Pulse
 from service.http.listening import url_of
 from service.instance import only_one
+from service.metrics.kept import store_info
 from service.metrics.timed import timed_monitors
 from service.metrics.timings import Timings
 from service.notify import NOBODY, ServiceManager
@@ -227,11 +228,14 @@ class Analysing:
             }
 
         def shown() -> dict[str, str]:
-            return {f"unit {u}": self._ground.live.status(u).state.value for u in self._monitors}
+            units = {u: self._ground.live.status(u).state.value for u in self._monitors}
+            shown = {f"unit {unit}": state for unit, state in units.items()}
+            return {**shown, "database": self._ground.store.kind}
 
         def metrics() -> Iterator[Metric]:
             if self._consumer is not None:
                 yield from consumer_metrics(self._consumer)
+            yield store_info(self._ground.store.kind)
             yield from ProcessCollector(registry=None).collect()
 
         return Health(checks, shown, metrics)

@@ -28,6 +28,7 @@ def health_router(context: Context) -> APIRouter:
         """
         checks = {f"unit {unit}": context.live.status(unit).state.value for unit in context.units}
         checks["store"] = context.live.store_error or "ok"
+        checks["database"] = context.store.kind
         if context.space is not None:
             checks["disk"] = str(context.space)
         checks["stored data"] = context.stored_trouble() or "ok"

@@ -28,6 +28,8 @@ def store_metrics(watched: Watched) -> Iterator[Metric]:
         "What it took to write findings to the disk.",
         watched.timings.commits,
     )
+    if watched.store_kind is not None:
+        yield store_info(watched.store_kind)
     failing = live.store_error is not None
     yield _one("store_failing", "1 while the store refuses what is written.", failing)
     yield _one("store_waiting_findings", "Findings that wait for the store.", recorder.n_waiting)
@@ -42,6 +44,11 @@ def store_metrics(watched: Watched) -> Iterator[Metric]:
         (),
         [((), live.n_unstored)],
     )
+
+
+def store_info(kind: str) -> Metric:
+    """Which database it is."""
+    return gauge("store_info", "1; the database that results are in.", ("kind",), [((kind,), 1)])
 
 
 def soundness_metrics(found: Soundness | None) -> Iterator[Metric]:

@@ -39,6 +39,8 @@ class Watched:
         Continuous recording, and what looks after recordings; None where nothing does.
     soundness
         Knows what of the stored data is damaged; None where nobody looks.
+    store_kind
+        Which database results are in, as `Store.kind` says it; None if that is not told.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -58,3 +60,4 @@ class Watched:
     tape: Tape | None = None
     recordings: WaveformKeeper | None = None
     soundness: Soundness | None = None
+    store_kind: str | None = None

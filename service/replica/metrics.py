@@ -15,6 +15,7 @@ from service.delivery.deliveries import ReceiverView
 from service.live import LinkState
 from service.metrics.families import gauge
 from service.metrics.judged import alarm_metrics, film_metrics
+from service.metrics.kept import store_info
 from service.metrics.told import delivery_metrics
 from service.replica.alarms import ReplicaAlarms
 from service.replica.deliveries import ReplicaDeliveries
@@ -41,6 +42,7 @@ class ReplicaMetrics:
     films: ReplicaFilms
     deliveries: ReplicaDeliveries
     clock: Clock
+    store_kind: str
 
     async def scrape(self) -> "ReplicaScrape":
         """Look at all of it; an outbox that cannot be read is a metric, no error."""
@@ -73,6 +75,7 @@ class ReplicaScrape:
             ("version", "python"),
             [which],
         )
+        yield store_info(of.store_kind)
         yield from _unit_metrics(of)
         yield _bearing_metric(of)
         yield from alarm_metrics(of.alarms, of.bearings)

@@ -99,7 +99,7 @@ def replica_context(
         operators=Asking(replica.store, replica.alarms, replica.clock),
         captures=NoCaptures(),
         deliveries=replica.deliveries,
-        metrics=ReplicaMetrics(bearings, *seen).scrape,
+        metrics=ReplicaMetrics(bearings, *seen, replica.store.kind).scrape,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         loops=beats.look,
         checks=replica.checks,

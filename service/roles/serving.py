@@ -148,4 +148,5 @@ def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource])
         tape=analysis.tape,
         recordings=analysis.recordings,
         soundness=analysis.soundness,
+        store_kind=ground.store.kind,
     )

@@ -201,6 +201,11 @@ class Store(Protocol):
         ...
 
     @property
+    def kind(self) -> str:
+        """``sqlite`` or ``postgresql``: the database that it is in."""
+        ...
+
+    @property
     def unit_states(self) -> UnitStates:
         """What processes that analyse say of their units."""
         ...

@@ -106,6 +106,11 @@ class SqlStore:
         with database.writing() as writer:
             self._layout_id = remember_layout(writer, self._layout)
 
+    @property
+    def kind(self) -> str:
+        """``sqlite`` or ``postgresql``."""
+        return self.database.kind
+
     def hold(self, name: str) -> AbstractContextManager[Hold]:
         """Take a name among all processes that use the database; see `Database.hold`."""
         return self.database.hold(name)

@@ -15,6 +15,7 @@ async def test_a_service_that_works_is_alive_and_ready(running: Any) -> None:
             "unit U1": "connected",
             "unit U2": "not_connected",
             "store": "ok",
+            "database": "sqlite",
             "stored data": "ok",
         },
     }

@@ -142,6 +142,7 @@ async def test_metrics_say_who_analyses(pair: Any) -> None:
     text = (await pair.client.get("/metrics")).text
 
     assert 'padwatch_unit_analysed{unit="U1"} 1.0' in text
+    assert 'padwatch_store_info{kind="' in text
     assert 'padwatch_bearings{quality="good",unit="U1"}' in text
 
 
