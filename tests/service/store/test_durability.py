@@ -244,14 +244,14 @@ def test_a_truncated_database_is_refused(path: Path, assessment: Build, at: At) 
 
 
 def test_a_folder_in_the_place_of_the_database_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="unable to open"):
+    with pytest.raises(StoreError, match="is a folder: move it away"):
         SqliteStore(tmp_path)
 
 
 def test_a_file_in_the_place_of_the_data_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "data").write_text("")
 
-    with pytest.raises(StoreError, match="File exists"):
+    with pytest.raises(StoreError, match="a file is in its place"):
         SqliteStore(tmp_path / "data" / "padwatch.sqlite3")
 
 
