@@ -147,7 +147,8 @@ async def _download(
 
 def _desk(context: Context) -> EvidenceDesk:
     if context.evidence is None:
-        raise ProblemError(404, "No recordings", "no recordings are kept here")
+        words = "no recordings are kept here: those of units are where these are analysed"
+        raise ProblemError(404, "No recordings", words)
     return context.evidence
 
 

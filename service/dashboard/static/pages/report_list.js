@@ -19,10 +19,10 @@ const STATES = {
   waiting: "being written",
   lost: "lost: the disk did not take it",
   removed: "removed to make room",
-  not_kept: "not kept for this alarm",
+  not_kept: "not kept here",
 };
 
-const SAMPLES = { complete: "kept", being_made: "being written", lost: "lost", removed: "removed to make room", none: "none for this alarm" };
+const SAMPLES = { complete: "kept", being_made: "being written", lost: "lost", removed: "removed to make room", none: "none here" };
 
 /** Returns `{ node, close() }`. */
 export function reportList() {
