@@ -20,7 +20,7 @@ async def rows_of(service: Any, path: str, **asked: object) -> list[dict[str, st
 async def unanswered(service: Any) -> str:
     """Let an alarm be raised by a link that is lost, and shelved by somebody."""
     service.alarms.link("U1", False, "no route")
-    service.clock.ns += HOUR_NS
+    service.clock.step(HOUR_NS)
     service.alarms.tick()
     [alarm] = [a.identity.id for a in service.alarms.alarms if a.level is not None]
     path = f"/api/v1/alarms/{alarm}/comment"
