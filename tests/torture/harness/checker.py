@@ -154,7 +154,9 @@ def _check_shown(
         found.n_shown += len(values)
         for stop, value in values.items():
             key = there.get((bearing, stop))
-            if key is None:
+            if key is None and value is None:
+                found.n_shown -= 1  # where a trend breaks off: no result
+            elif key is None:
                 found.lost.append(f"{unit} {bearing} to sample {stop}")
             elif rows[key]["order1_shaft_x_um_pk"][0] != value:
                 found.altered.append(f"{unit} {bearing} to sample {stop}: shown as {value}")
