@@ -72,15 +72,13 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
 
 
 @pytest.mark.timeout(3600)
+@pytest.mark.long
 def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
     plant: LedgerPlant,
     tmp_path: Path,
-    is_whole: bool,
     torture_seed: int,
     figure: Callable[[str], None],
 ) -> None:
-    if not is_whole:
-        pytest.skip("takes minutes: part of make torture")
     lines = ["SIGSTOP and SIGCONT of the service"]
     with bench_of(plant, tmp_path, torture_seed) as bench:
         before = bench.raised()  # as where the host is busy with the start
@@ -106,18 +104,16 @@ def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
         pytest.param(0.0, (), "America/Sao_Paulo", id="another time zone"),
     ],
 )
+@pytest.mark.long
 def test_a_host_whose_clock_is_wrong_loses_and_doubles_nothing_and_says_so(
     plant: LedgerPlant,
     tmp_path: Path,
-    is_whole: bool,
     torture_seed: int,
     at_start_s: float,
     steps_s: tuple[float, ...],
     time_zone: str,
     figure: Callable[[str], None],
 ) -> None:
-    if not is_whole:
-        pytest.skip("takes minutes: part of make torture")
     with bench_of(plant, tmp_path, torture_seed, "", at_start_s, time_zone) as bench:
         before = bench.raised()
         if at_start_s:

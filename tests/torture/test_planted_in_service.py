@@ -49,17 +49,15 @@ def _planted(bug: str, kind: str) -> object:
         _planted("letter_forgotten", "alarms"),
     ],
 )
+@pytest.mark.long
 def test_a_bug_in_the_service_is_found_out(
     plant: LedgerPlant,
     daq: LedgerDaq,
     tmp_path: Path,
     torture_seed: int,
-    is_whole: bool,
     bug: str,
     kind: str,
 ) -> None:
-    if not is_whole:
-        pytest.skip("takes half a minute: part of make torture")
     plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
 
     def trouble(number: int) -> None:

@@ -98,17 +98,15 @@ def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
         )
     ],
 )
+@pytest.mark.long
 def test_a_bug_in_recording_is_found_out(
     plant: LedgerPlant,
     daq: LedgerDaq,
     tmp_path: Path,
     torture_seed: int,
-    is_whole: bool,
     bug: str,
     kind: str,
 ) -> None:
-    if not is_whole:
-        pytest.skip("takes half a minute: part of make torture")
     plant_file = write_plant(plant, daq, tmp_path)
     with ServiceRig(plant_file, "harness.planted_recording", environment={"PLANTED": bug}) as rig:
         root = tmp_path / "data" / "recordings"

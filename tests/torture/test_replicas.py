@@ -17,7 +17,10 @@ from harness.watch import silent_healthy_s
 N_KILLS = 50
 LIFE_S, LONGEST_S = 2.0, 8.0
 
-pytestmark = pytest.mark.skipif(why_not() is not None, reason=str(why_not()))
+pytestmark = [
+    pytest.mark.long,  # programs and servers that are started again so often
+    pytest.mark.skipif(why_not() is not None, reason=str(why_not())),
+]
 
 
 @pytest.fixture
@@ -55,13 +58,6 @@ def kills(kinds: list[str], n: int, rng: np.random.Generator) -> list[str]:
     """Which is killed, in what order."""
     wanted = kinds * n
     return [wanted[at] for at in rng.permutation(len(wanted))]
-
-
-@pytest.fixture(autouse=True)
-def _only_whole(is_whole: bool) -> None:
-    """Programs and servers that are started again so often take too long for every test run."""
-    if not is_whole:
-        pytest.skip("part of the whole torture only")
 
 
 @pytest.mark.timeout(2 * 3600)

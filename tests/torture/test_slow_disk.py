@@ -26,11 +26,12 @@ pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="strace i
 
 
 @pytest.mark.timeout(900)
+@pytest.mark.long
 def test_a_slow_disk_holds_up_nothing_but_itself(
-    torture_seed: int, tmp_path: Path, figure: Callable[[str], None], is_whole: bool
+    torture_seed: int,
+    tmp_path: Path,
+    figure: Callable[[str], None],
 ) -> None:
-    if not is_whole:
-        pytest.skip("takes minutes: part of make torture")
     plant, plant_file = LedgerPlant(torture_seed, n_units=1, load=1.0), tmp_path / "plant.toml"
     with (
         ledger_daq(plant, tmp_path) as daq,

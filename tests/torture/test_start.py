@@ -45,11 +45,10 @@ def fill(database: Path, n_bytes: int) -> int:
 
 
 @pytest.mark.timeout(3600)
+@pytest.mark.long
 def test_a_killed_service_with_a_gigabyte_is_ready_again(
-    tmp_path: Path, torture_seed: int, is_whole: bool, figure: Callable[[str], None]
+    tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
 ) -> None:
-    if not is_whole:
-        pytest.skip("writes a gigabyte: part of make torture")
     plant = LedgerPlant(seed=torture_seed, load=1.0)
     ready_s, costs_s = [], []
     with ledger_daq(plant, tmp_path) as daq:

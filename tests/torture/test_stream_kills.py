@@ -21,16 +21,14 @@ PLANT = LedgerPlant(n_units=2, load=1.0, segment_samples=2048, n_segments=2)
 
 
 @pytest.mark.timeout(3600)
+@pytest.mark.long
 def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_process(
     tmp_path: Path,
-    is_whole: bool,
     torture_seed: int,
     figure: Callable[[str], None],
 ) -> None:
     if nats_server_command() is None:
         pytest.skip("no nats-server is installed")
-    if not is_whole:
-        pytest.skip("takes minutes: part of make torture")
     rng = np.random.default_rng(torture_seed)
     with nats_server(tmp_path / "nats") as server, ledger_daq(PLANT, tmp_path) as daq:
         stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 2.0\n'
