@@ -2,21 +2,15 @@
 
 import asyncio
 
-import structlog
-
 from acquisition.clock import Clock
+from service.background import LOOK_S, TroubleLog, rest
 from service.heartbeats import UNHEARD, Pulse
 from service.store.port import StoreError
 from service.store.retention.limits import RetentionLimits
 from service.store.retention.port import RetentionStore
 
-log = structlog.get_logger()
-
 PERIOD_S = 600.0
 """Between looks, when nothing is old any more."""
-
-LOOK_S = 20.0
-"""Between heartbeats meanwhile."""
 
 REST_SHARE = 9.0
 """How much longer to rest than to work: it takes a tenth of one core, and lets others write."""
@@ -27,13 +21,15 @@ class Retaining:
 
     def __init__(self, store: RetentionStore, limits: RetentionLimits, clock: Clock) -> None:
         self._store, self._limits, self._clock = store, limits, clock
-        self._trouble: str | None = None
+        self._trouble = TroubleLog(
+            "what is old is not being deleted", "what is old is being deleted again"
+        )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Delete for ever."""
         while True:
             if not await self.round(pulse):
-                await self._wait(pulse)
+                await rest(PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
         """Delete once of each bearing; whether there was anything to delete."""
@@ -45,9 +41,9 @@ class Retaining:
             found |= await asyncio.to_thread(self._store.prune, self._limits, now_ns)
             found |= await asyncio.to_thread(self._store.give_back)
         except StoreError as error:
-            self._note(str(error))
+            self._trouble.note(str(error))
             return False
-        self._note(None)
+        self._trouble.note(None)
         return found
 
     async def _rested(self, series: int, now_ns: int) -> bool:
@@ -55,17 +51,3 @@ class Retaining:
         found = await asyncio.to_thread(self._store.delete, series, self._limits, now_ns)
         await self._clock.sleep(REST_SHARE * (self._clock.monotonic_s() - begun_s))
         return found
-
-    async def _wait(self, pulse: Pulse) -> None:
-        until_s = self._clock.monotonic_s() + PERIOD_S
-        while self._clock.monotonic_s() < until_s:
-            pulse.beat(LOOK_S)
-            await self._clock.sleep(LOOK_S)
-
-    def _note(self, trouble: str | None) -> None:
-        """Log when deleting begins or ceases to fail."""
-        if trouble is not None and self._trouble is None:
-            log.error("what is old is not being deleted", reason=trouble)
-        if trouble is None and self._trouble is not None:
-            log.info("what is old is being deleted again")
-        self._trouble = trouble

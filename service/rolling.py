@@ -2,14 +2,11 @@
 
 import asyncio
 
-import structlog
-
 from acquisition.clock import Clock
+from service.background import TroubleLog
 from service.heartbeats import UNHEARD, Pulse
 from service.store.port import StoreError
 from service.store.rollups.port import RollupStore
-
-log = structlog.get_logger()
 
 PERIOD_S = 20.0
 """Between looks, when all is gathered."""
@@ -23,7 +20,9 @@ class Rolling:
 
     def __init__(self, rollups: RollupStore, clock: Clock) -> None:
         self._rollups, self._clock = rollups, clock
-        self._trouble: str | None = None
+        self._trouble = TroubleLog(
+            "trends are not being gathered", "trends are being gathered again"
+        )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Gather for ever."""
@@ -43,15 +42,7 @@ class Rolling:
                 await asyncio.to_thread(self._rollups.gather, series, now_ns)
                 await self._clock.sleep(REST_SHARE * (self._clock.monotonic_s() - begun_s))
         except StoreError as error:
-            self._note(str(error))
+            self._trouble.note(str(error))
             return False
-        self._note(None)
+        self._trouble.note(None)
         return bool(due)
-
-    def _note(self, trouble: str | None) -> None:
-        """Log when gathering begins or ceases to fail; trends are right all the same, but slow."""
-        if trouble is not None and self._trouble is None:
-            log.error("trends are not being gathered", reason=trouble)
-        if trouble is None and self._trouble is not None:
-            log.info("trends are being gathered again")
-        self._trouble = trouble

@@ -3,13 +3,12 @@
 import asyncio
 from collections.abc import Callable, Collection
 
-import structlog
-
 from acquisition.clock import Clock
 from core.alarms.operation import ActionRefusedError
 from service.alarms.engine import AlarmEngine
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import Source
+from service.background import TroubleLog
 from service.films.actions import BaselineRefusedError
 from service.films.keeper import FilmKeeper
 from service.heartbeats import UNHEARD, Pulse
@@ -24,8 +23,6 @@ from service.replica.commands import (
 )
 from service.store.commands_port import DONE, Answer, Command, CommandState, OpenCommand
 from service.store.port import Store, StoreError
-
-log = structlog.get_logger()
 
 EVERY_S = 0.25
 
@@ -60,7 +57,7 @@ class CarryingOut:
     ) -> None:
         self._process, self._held, self._store, self._clock = process, held, store, clock
         self._alarms, self._films, self._recorder = alarms, films, recorder
-        self._trouble: str | None = None
+        self._trouble = TroubleLog("commands are not carried out", "commands are carried out again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Look for commands for ever."""
@@ -76,9 +73,9 @@ class CarryingOut:
             for found in await asyncio.to_thread(self._store.commands.open, self._held()):
                 await self._take_up(found)
         except StoreError as error:
-            self._note(str(error))
+            self._trouble.note(str(error))
         else:
-            self._note(None)
+            self._trouble.note(None)
 
     async def _take_up(self, found: OpenCommand) -> None:
         command, commands = found.command, self._store.commands
@@ -123,11 +120,3 @@ class CarryingOut:
             for found in in_force:
                 if found.reference.unit == task.unit:
                     self._alarms.refer_to(found.reference)
-
-    def _note(self, trouble: str | None) -> None:
-        """Log when it begins or ceases to fail."""
-        if trouble is not None and self._trouble is None:
-            log.error("commands are not carried out", reason=trouble)
-        if trouble is None and self._trouble is not None:
-            log.info("commands are carried out again")
-        self._trouble = trouble

@@ -4,11 +4,10 @@ import asyncio
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-import structlog
-
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.alarms.gone_alarms import SHARED, is_shared
+from service.background import TroubleLog
 from service.films.keeper import FilmKeeper
 from service.heartbeats import UNHEARD, Pulse
 from service.live import LiveView
@@ -17,8 +16,6 @@ from service.replica.unit_state import UnitSigns, UnitState, packed_state, writt
 from service.settings.units import UnitSettings
 from service.store.port import StoreError
 from service.store.unit_states_port import UnitReport, UnitStates
-
-log = structlog.get_logger()
 
 EVERY_S = 1.0
 
@@ -65,7 +62,7 @@ class Reporter:
         self._live, self._alarms, self._films = live, alarms, films
         self._written: dict[str, tuple[int, UnitState | None]] = {}
         self._n_beats = 0
-        self._trouble: str | None = None
+        self._trouble = TroubleLog("units are not reported on", "units are reported on again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Report for ever."""
@@ -85,9 +82,9 @@ class Reporter:
         try:
             await asyncio.to_thread(self._write, seen)
         except StoreError as error:
-            self._note(str(error))
+            self._trouble.note(str(error))
             return
-        self._note(None)
+        self._trouble.note(None)
         self._written |= {s.unit: (s.revision, s.state) for s in seen if s.state is not None}
 
     def _forget_but(self, held: Sequence[str]) -> None:
@@ -130,11 +127,3 @@ class Reporter:
             revision=seen.revision,
             state=None if seen.state is None else packed_state(seen.state),
         )
-
-    def _note(self, trouble: str | None) -> None:
-        """Log when it begins or ceases to fail."""
-        if trouble is not None and self._trouble is None:
-            log.error("units are not reported on", reason=trouble)
-        if trouble is None and self._trouble is not None:
-            log.info("units are reported on again")
-        self._trouble = trouble
