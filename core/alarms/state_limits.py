@@ -6,8 +6,9 @@ from typing import Self
 
 from core.alarms.alarm import AlarmLevel, Condition, unknown
 from core.alarms.limits import Limits, judge
+from core.assessment import Assessment
 from core.condition.operating_state import STEADY, OperatingState
-from core.quality import Reading
+from core.quality import Reading, Reason, missing
 
 AT_SPEED = STEADY
 """Where limits of vibration count unless said otherwise."""
@@ -78,3 +79,12 @@ def outside(state: OperatingState | None) -> Condition:
     """
     word = (state or OperatingState.UNKNOWN).name.lower()
     return unknown(word, word)
+
+
+def state_of(assessment: Assessment) -> OperatingState | None:
+    """The operating state of a result; where nobody has told it, a standstill at least is known."""
+    condition = assessment.condition
+    if condition is not None and condition.state is not OperatingState.UNKNOWN:
+        return condition.state
+    speed = assessment.readings.get("speed_rpm", missing(Reason.NOT_MEASURED))
+    return OperatingState.STANDSTILL if speed.quality.reason is Reason.STANDSTILL else None

@@ -17,7 +17,7 @@ from core.alarms.event import AlarmNews
 from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
 from core.alarms.rules import UnitRules
-from core.alarms.state_limits import outside
+from core.alarms.state_limits import outside, state_of
 from core.alarms.vector_change import VectorReference, vector_condition
 from core.alarms.watch import LimitWatch
 from core.alarms.watch_list import watch_list
@@ -220,7 +220,7 @@ class UnitAlarms:
         bearing, readings, now_ns = assessment.bearing, assessment.readings, assessment.time_ns
         for channel, place in zip(self._channels_of[bearing], AMPLITUDES, strict=True):
             self._note_segment(channel, readings[f"order1_{place}_um_pk"])
-        state = _state_of(assessment)
+        state = state_of(assessment)
         self._state = (state, now_ns)
         for watch in self._watched.readings[bearing]:
             held = self._board.alarm(watch.id).condition.level
@@ -292,12 +292,3 @@ class UnitAlarms:
             return  # as nearly always
         condition = watch.limits.judge(reading, state, alarm.condition.level)
         self._board.find(watch, condition, now_ns)
-
-
-def _state_of(assessment: Assessment) -> OperatingState | None:
-    """The operating state of a result; where nobody has told it, a standstill at least is known."""
-    condition = assessment.condition
-    if condition is not None and condition.state is not OperatingState.UNKNOWN:
-        return condition.state
-    speed = assessment.readings.get("speed_rpm", NOT_THERE)
-    return OperatingState.STANDSTILL if speed.quality.reason is Reason.STANDSTILL else None

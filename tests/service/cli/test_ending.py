@@ -38,14 +38,14 @@ def test_a_thread_without_end_does_not_hold_the_end_up() -> None:
 
 ENDS_WITH = """
 import atexit
-from service.cli import main
+from service.cli import commands, main
 
 def app():
     atexit.register(print, "taken down")
     print("said", end="")
     raise SystemExit({code!r})
 
-main.app = app
+commands.app = app
 main.main()
 """
 
