@@ -31,7 +31,7 @@ axe:
 	else echo 'npm is not installed: pages are not tested with axe-core'; fi
 
 test: install axe
-	$(BIN)/python -m pytest -n 3 --dist worksteal
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 check: install
 	$(BIN)/ruff format --check .
