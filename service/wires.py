@@ -9,6 +9,10 @@ from service.settings.sources import ModbusRingSettings, SourceSettings
 _LOOPBACK = "127.0.0.1"
 
 
+STALE_AFTER_S = 5.0
+"""Silence that ends a run that is over; one that is busy with its start is not."""
+
+
 class Wire(StrEnum):
     """A protocol and what carries it."""
 
@@ -33,10 +37,10 @@ def _source(wire: Wire) -> SourceSettings:
             channel=f"socket://{_LOOPBACK}:0",
             fd=wire is Wire.CAN_FD,
             profile="padwatch_int16",
-            stale_after_s=1.0,
+            stale_after_s=STALE_AFTER_S,
             when_full="wait",
         )
     where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
     return ModbusRingSettings(
-        kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=1.0
+        kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=STALE_AFTER_S
     )
