@@ -113,13 +113,29 @@ class ServiceAlarms:
             (AlarmKind.ANALYSIS_LATE, health.analysis_delay_s),
         ):
             self._find(kind, self._compared(kind, value), now_ns)
-        self._find(AlarmKind.CAPTURES_NOT_KEPT, _captures(health), now_ns)
-        self._find(AlarmKind.SAMPLES_NOT_RECORDED, _recording(health), now_ns)
+        self._find(
+            AlarmKind.CAPTURES_NOT_KEPT,
+            _unless_well(health.captures_error, AlarmLevel.ALERT),
+            now_ns,
+        )
+        self._find(
+            AlarmKind.SAMPLES_NOT_RECORDED,
+            _unless_well(health.recording_error, AlarmLevel.ALERT),
+            now_ns,
+        )
         self._find(AlarmKind.RECORDINGS_DAMAGED, self._damaged(health), now_ns)
-        self._find(AlarmKind.QUESTIONS_REFUSED, _refused(health), now_ns)
+        self._find(
+            AlarmKind.QUESTIONS_REFUSED, _unless_well(health.refused, AlarmLevel.ALERT), now_ns
+        )
         self._find(AlarmKind.DISK_NEARLY_FULL, self._disk(health), now_ns)
-        self._find(AlarmKind.STORED_DATA_DAMAGED, _stored(health), now_ns)
-        self._find(AlarmKind.STREAM_AWAY, _stream(health), now_ns)
+        self._find(
+            AlarmKind.STORED_DATA_DAMAGED,
+            _unless_well(health.stored_trouble, AlarmLevel.DANGER),
+            now_ns,
+        )
+        self._find(
+            AlarmKind.STREAM_AWAY, _unless_well(health.stream_trouble, AlarmLevel.DANGER), now_ns
+        )
         for unit, account in health.accounts.items():
             share = self._losses[unit].share(account, now_ns)
             self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)
@@ -160,31 +176,5 @@ class ServiceAlarms:
         self._board.find(self._watches[key], condition, now_ns)
 
 
-def _stored(health: ServiceHealth) -> Condition:
-    if health.stored_trouble is None:
-        return WITHIN
-    return Condition(AlarmLevel.DANGER, reason=health.stored_trouble)
-
-
-def _stream(health: ServiceHealth) -> Condition:
-    if health.stream_trouble is None:
-        return WITHIN
-    return Condition(AlarmLevel.DANGER, reason=health.stream_trouble)
-
-
-def _refused(health: ServiceHealth) -> Condition:
-    if health.refused is None:
-        return WITHIN
-    return Condition(AlarmLevel.ALERT, reason=health.refused)
-
-
-def _recording(health: ServiceHealth) -> Condition:
-    if health.recording_error is None:
-        return WITHIN
-    return Condition(AlarmLevel.ALERT, reason=health.recording_error)
-
-
-def _captures(health: ServiceHealth) -> Condition:
-    if health.captures_error is None:
-        return WITHIN
-    return Condition(AlarmLevel.ALERT, reason=health.captures_error)
+def _unless_well(trouble: str | None, level: AlarmLevel) -> Condition:
+    return WITHIN if trouble is None else Condition(level, reason=trouble)
