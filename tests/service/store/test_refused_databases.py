@@ -1,0 +1,96 @@
+"""A database that is not ours, newer, cut or of the other origin is refused and left as it is."""
+
+import itertools
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from core.assessment import Assessment
+from service.origin import Origin
+from service.store.port import StoreError
+from service.store.schema import MIGRATIONS
+from service.store.sqlite import SqliteStore
+
+Build = Callable[..., Assessment]
+
+
+At = Callable[[int], int]
+
+
+def run_sql(path: Path, script: str) -> None:
+    connection = sqlite3.connect(path)
+    connection.executescript(script)
+    connection.close()
+
+
+def test_a_database_of_another_program_is_refused_and_left_as_it_is(path: Path) -> None:
+    path.parent.mkdir()
+    run_sql(path, "CREATE TABLE historian (x); INSERT INTO historian VALUES (1);")
+    before = path.read_bytes()
+
+    with pytest.raises(StoreError, match="is not a padwatch database"):
+        SqliteStore(path)
+
+    assert path.read_bytes() == before
+
+
+def test_a_database_marked_by_another_program_is_refused(path: Path) -> None:
+    path.parent.mkdir()
+    run_sql(path, "PRAGMA application_id = 1234; CREATE TABLE historian (x);")
+
+    with pytest.raises(StoreError, match="is not a padwatch database"):
+        SqliteStore(path)
+
+
+def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(path: Path) -> None:
+    SqliteStore(path).close()
+    run_sql(path, f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
+
+    said = f"schema {len(MIGRATIONS) + 1}, this padwatch knows up to {len(MIGRATIONS)}"
+    with pytest.raises(StoreError, match=said):
+        SqliteStore(path)
+
+
+def test_a_file_that_is_no_database_is_refused(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_bytes(b"speed;power\n92.3;700\n" * 100)
+
+    with pytest.raises(StoreError, match="file is not a database"):
+        SqliteStore(path)
+
+
+def test_a_truncated_database_is_refused(path: Path, assessment: Build, at: At) -> None:
+    store = SqliteStore(path)
+    store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
+    store.close()
+    whole = path.read_bytes()
+
+    for n_bytes in (len(whole) - 4096, len(whole) // 2, 4096, 100, 50):
+        path.write_bytes(whole[:n_bytes])
+        with pytest.raises(StoreError, match=f"{path}: "):
+            SqliteStore(path)
+
+
+def test_a_folder_in_the_place_of_the_database_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="is a folder: move it away"):
+        SqliteStore(tmp_path)
+
+
+def test_a_file_in_the_place_of_the_data_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("")
+
+    with pytest.raises(StoreError, match="a file is in its place"):
+        SqliteStore(tmp_path / "data" / "padwatch.sqlite3")
+
+
+@pytest.mark.parametrize(("first", "then"), list(itertools.permutations(Origin)))
+def test_live_and_replayed_results_never_share_a_database(
+    tmp_path: Path, first: Origin, then: Origin
+) -> None:
+    path = tmp_path / "padwatch.sqlite3"
+    SqliteStore(path, first).close()
+    SqliteStore(path, first).close()
+    with pytest.raises(StoreError, match=f"holds {first} results and is not opened for {then}"):
+        SqliteStore(path, then)
