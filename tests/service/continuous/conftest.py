@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.standing_clock import StandingClock
 
 from acquisition.recording.manifest import RecordedChannel, RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
@@ -20,22 +21,6 @@ RATE_HZ = 50.0
 BLOCK = 10
 T0 = 1_767_225_600_000_000_000
 SETTINGS = TapeSettings(stretch_s=10.0, part_s=2.0)
-
-
-class StandingClock:
-    """Time passes only when a test says so; who waits gives others their turn."""
-
-    def __init__(self) -> None:
-        self.s = 0.0
-
-    def now_ns(self) -> int:
-        return T0 + round(self.s * 1e9)
-
-    def monotonic_s(self) -> float:
-        return self.s
-
-    async def sleep(self, duration_s: float) -> None:  # noqa: ARG002  time stands still
-        await asyncio.sleep(0)
 
 
 def recorded_unit(unit: str) -> RecordedUnit:
