@@ -10,13 +10,16 @@ _TOLERANCE_NS = NS_PER_S
 _DRIFT = 1e-3
 """A device's clock may be corrected by a second and run a permille wrong; the index is exact."""
 
+_POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
+"""From 2000 to 2100: a clock that leaves it (1904, 1970, 2106) was not set but has failed."""
+
 
 class StampCheck:
     """Compares each block's stamp with what the sample index says; the index rules.
 
     A stamp that does not fit is replaced by the one that follows from the last good stamp, and the
     block says what was wrong. Two in a row that agree with each other show that the device's clock
-    was set: from then on they are believed.
+    was set: from then on they are believed, unless they have left the years of 2000 to 2100.
 
     Attributes
     ----------
@@ -35,7 +38,10 @@ class StampCheck:
         if good is None or raw.epoch != good.epoch:
             return self._believe(raw), None
         fault = _fault(good, raw)
-        if fault is None or (doubted is not None and _fault(doubted, raw) is None):
+        was_set = (
+            doubted is not None and _fault(doubted, raw) is None and not _has_failed(good, raw)
+        )
+        if fault is None or was_set:
             return self._believe(raw), None
         self._doubted = raw
         self.n_faults += 1
@@ -48,6 +54,10 @@ class StampCheck:
 
 def _expected_ns(before: RawBlock, after: RawBlock) -> int:
     return ns_from_s((after.first_index - before.first_index) / after.rate_hz)
+
+
+def _has_failed(before: RawBlock, after: RawBlock) -> bool:
+    return before.start_ns in _POSSIBLE_NS and after.start_ns not in _POSSIBLE_NS
 
 
 def _fault(before: RawBlock, after: RawBlock) -> StampFault | None:

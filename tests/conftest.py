@@ -1,11 +1,12 @@
 """What tests of every package share: a plant of numbers, a clock, results, readings of films."""
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import pytest
 import structlog
+import uvloop
 from scipy.signal import lfilter
 
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
@@ -20,6 +21,11 @@ from core.stiffness_history import StiffnessHistory
 
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
+
+
+def pytest_asyncio_loop_factories() -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
+    """Run every test on the event loop of the program: others fail in other ways."""
+    return {"uvloop": uvloop.new_event_loop}
 
 
 @pytest.fixture(autouse=True)

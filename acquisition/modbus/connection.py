@@ -130,6 +130,11 @@ class Connection:
             raise FrameError(f"{self._where}: {self._framer.unasked}")
         try:
             reply: Reply = await self._client.execute(False, request)
+        except RuntimeError as exc:
+            transport = self._client.ctx.transport
+            if transport is None or transport.is_closing():  # uvloop will not write there
+                raise LinkError(f"{self._where}: {_CLOSED}") from exc
+            raise
         except ModbusIOException:
             if self._framer.awaiting:
                 raise LinkError(f"{self._where}: {self._no_answer()}") from None

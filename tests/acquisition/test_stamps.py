@@ -56,6 +56,28 @@ def test_a_clock_that_was_set_is_believed_from_the_second_stamp_on() -> None:
     assert checked.start_ns == block(2, 3600.0).start_ns
 
 
+@pytest.mark.parametrize("off_s", [-3.8e9, -1.767e9, 2.5e9], ids=["1904", "1970", "2106"])
+def test_a_clock_that_has_left_all_possible_years_is_never_believed(off_s: float) -> None:
+    check = StampCheck()
+    check.check(block(0))
+    for n in range(1, 10):
+        checked, fault = check.check(block(n, off_s))
+        assert fault is not None
+        assert checked.start_ns == block(n).start_ns
+    checked, fault = check.check(block(10, 0.25))
+    assert fault is None
+    assert checked.start_ns == block(10, 0.25).start_ns
+
+
+def test_a_clock_that_began_in_1970_may_be_set_and_drift() -> None:
+    check = StampCheck()
+    assert check.check(block(0, -1.767e9))[1] is None
+    assert check.check(block(1, -1.767e9 + 100.0))[1] is StampFault.JUMPED
+    assert check.check(block(2, -1.767e9 + 100.0))[1] is None
+    assert check.check(block(3))[1] is StampFault.JUMPED
+    assert check.check(block(4))[1] is None
+
+
 def test_a_restarted_device_may_have_any_time() -> None:
     check = StampCheck()
     check.check(block(5))

@@ -1,4 +1,4 @@
-"""Links that are cut, silent, late, sliced, doubled and flipped; frozen services; wrong clocks.
+"""Links that are cut, silent, late, sliced, doubled, flipped or taken by others; wrong host clocks.
 
 The whole service behind them, with a client that looks on: nothing false is stored or shown, what
 is missing is recorded, alarms come and go as they should.
@@ -20,7 +20,7 @@ LONGEST_S = 12.0
 """Longer than the ring of a device holds: then there is a gap."""
 
 FROZEN_S = (1.0, 3.0, 10.0, 20.0, 40.0, 60.0)
-CUTTING = (Link.REFUSED, Link.SWALLOWED)
+CUTTING = (Link.REFUSED, Link.SWALLOWED, Link.TAKEN, Link.ANOTHER)
 HARMLESS = (Link.LATE, Link.SLICED)
 STATES = tuple(state for state in Link if state is not Link.WELL)
 FEW = (Link.SWALLOWED, Link.FLIPPED)
@@ -65,6 +65,7 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
                 until(lambda: not bench.active("link_lost"))
         if not is_whole:
             bench.freeze(1.0)
+            bench.daq.tell("U1 wrong_time 3")
             bench.step(TWO_H)
             until(lambda: bench.active("clock_offset"))
         figure("\n".join(["bad links", *(its.line(state) for state, its in seen.items())]))

@@ -12,7 +12,7 @@ from harness.nats_cluster import nats_cluster
 from harness.nats_server import nats_server_command
 from harness.postgres_server import PostgresServer, why_not
 from harness.replicas import Replicas, chain, chance, replicas, until_answered
-from harness.watch import silent_healthy_s
+from harness.watch import silent_healthy, silent_healthy_s
 
 N_ROUNDS, N_KILLS = 5, 10
 """Fifty of each kind, looked at after every ten: what is wrong is found where it happened."""
@@ -118,6 +118,9 @@ def kill_in_turn(
     watch, offered = running.whole_watch(), running.daq.offered()
     found = check(running.plant, running.plant_file, offered, running.lives, watch)
     silent_s = sum(silent_healthy_s(running.plant, offered, w.looks) for w in running.watches)
+    for watch_of_one in running.watches:
+        for line in silent_healthy(running.plant, offered, watch_of_one.looks):
+            print(line)
     rows = "".join(f"\n  {name:<32}{value}" for name, value in found.counts.items())
     figure(
         f"killed or restarted, {N_KILLS} times each: {', '.join(does)}{rows}"

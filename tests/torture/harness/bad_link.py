@@ -27,6 +27,11 @@ class Link(StrEnum):
     SLICED = "one byte at a time"
     DOUBLED = "every reply twice"
     FLIPPED = "bits flipped"
+    TAKEN = "another master has its only place"
+    ANOTHER = "another device has its address"
+
+
+ELSEWHERE = (Link.TAKEN, Link.ANOTHER)
 
 
 class BadLink:
@@ -36,10 +41,12 @@ class BadLink:
     ----------
     port
         Of the device.
+    other_port
+        Of another one, which may have its address for a while.
     """
 
-    def __init__(self, port: int, seed: int) -> None:
-        self._device_port = port
+    def __init__(self, port: int, seed: int, other_port: int) -> None:
+        self._device_port, self._other_port = port, other_port
         self._random = random.Random(seed)  # noqa: S311  not a secret
         self._state = Link.WELL
         self._server: asyncio.Server | None = None
@@ -48,10 +55,13 @@ class BadLink:
 
     async def become(self, state: Link) -> None:
         """Be so from now on; open connections feel it, too."""
-        self._state = state
+        before, self._state = self._state, state
         if state is Link.REFUSED:
             await self._close()
-        elif self._server is None:
+            return
+        if state in ELSEWHERE or before in ELSEWHERE:
+            self._cut()
+        if self._server is None:
             await self.listen()
 
     async def listen(self) -> None:
@@ -63,11 +73,18 @@ class BadLink:
         if self._server is not None:
             self._server.close()
             self._server = None
+        self._cut()
+
+    def _cut(self) -> None:
         for writer in list(self._writers):
             _reset(writer)
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        device_reader, device_writer = await asyncio.open_connection("127.0.0.1", self._device_port)
+        if self._state is Link.TAKEN:
+            writer.close()
+            return
+        port = self._other_port if self._state is Link.ANOTHER else self._device_port
+        device_reader, device_writer = await asyncio.open_connection("127.0.0.1", port)
         ends = (writer, device_writer)
         self._writers.update(ends)
         ways = [
@@ -153,7 +170,12 @@ def bad_links(ports: Mapping[str, int], seed: int) -> Iterator[BadLinks]:
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever, name="bad links")
     thread.start()
-    links = {unit: BadLink(port, seed + n) for n, (unit, port) in enumerate(ports.items())}
+    first, *rest = ports.values()
+    others = [*rest, first]
+    links = {
+        unit: BadLink(port, seed + n, other)
+        for n, ((unit, port), other) in enumerate(zip(ports.items(), others, strict=True))
+    }
     try:
         for link in links.values():
             asyncio.run_coroutine_threadsafe(link.listen(), loop).result(10)

@@ -21,7 +21,7 @@ from typing import IO
 
 import uvloop
 
-from acquisition.clock import SystemClock
+from acquisition.clock import FastClock, SystemClock
 from acquisition.daq.ledger import Ledger
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
@@ -52,7 +52,7 @@ class OfferedLog(Ledger):
 def main() -> None:
     """Serve until the standard input ends."""
     plant = LedgerPlant(**json.loads(sys.argv[2]))
-    clock = SystemClock()
+    clock = FastClock(SystemClock(), 1.0 + 1e-6 * plant.drift_ppm)
     with Path(sys.argv[1]).open("w", encoding="ascii") as file:
         ledger = OfferedLog(file)
         t0_ns = time.time_ns() // 1_000_000 * 1_000_000
@@ -63,6 +63,7 @@ def main() -> None:
                 samples_per_slot=plant.slot_samples, n_slots=plant.n_slots
             )
             device = RingDevice(LedgerFeed(plant, number, t0_ns), unit, settings, ledger)
+            device.identification = {0: b"Ledger", 1: unit.encode("ascii"), 2: b"1"}
             servers[unit] = ModbusRingServer(device, clock)
         uvloop.run(run_daq(servers, lambda line: print(line, flush=True), controlled=True))
 

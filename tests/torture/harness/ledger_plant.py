@@ -24,6 +24,8 @@ class LedgerPlant:
     ----------
     load
         Sampling rate as a multiple of 600 Hz; all units have twelve channels.
+    drift_ppm
+        How much faster than they say the devices sample.
     segment_samples, n_segments
         Of the analysis. Short ones give many results, and so many transactions, in short time.
     """
@@ -33,6 +35,7 @@ class LedgerPlant:
     load: float = 2.0
     segment_samples: int = 1024
     n_segments: int = 2
+    drift_ppm: float = 0.0
 
     @property
     def rate_hz(self) -> float:
@@ -157,6 +160,10 @@ power_channel = "active_power"
 kind = "modbus_ring"
 host = "127.0.0.1"
 port = {port}
+
+[unit.source.identity]
+kind = "identification"
+product_code = "{id}"
 """
 
 SHAFT = """

@@ -150,8 +150,27 @@ def silent_healthy_s(plant: LedgerPlant, offered: Offered, looks: list[Look]) ->
     return total_s
 
 
+def silent_healthy(plant: LedgerPlant, offered: Offered, looks: list[Look]) -> list[str]:
+    """What was shown as current and good and was not, one line each; for who looks for the cause."""
+    lines = []
+    for look in sorted(looks, key=lambda one: one.at_ns):
+        if _is_wrong(plant, offered, look):
+            age_s = (
+                look.at_ns - offered.offered_ns(look.unit, _stop(plant, offered, look))
+            ) / NS_PER_S
+            lines.append(
+                f"{look.at_ns} {look.unit} {look.bearing} good={look.is_good}:"
+                f" samples {age_s:.2f} s old, at most {detect_s(plant):.2f}"
+            )
+    return lines
+
+
+def _stop(plant: LedgerPlant, offered: Offered, look: Look) -> int:
+    return round((look.result_ns - offered.t0_ns) * plant.rate_hz / NS_PER_S)
+
+
 def _is_wrong(plant: LedgerPlant, offered: Offered, look: Look) -> bool:
-    stop = round((look.result_ns - offered.t0_ns) * plant.rate_hz / NS_PER_S)
+    stop = _stop(plant, offered, look)
     # by when it was offered: a DAQ that had no time is not the service's fault
     if (look.at_ns - offered.offered_ns(look.unit, stop)) / NS_PER_S > detect_s(plant):
         return True
