@@ -1,5 +1,6 @@
 """`Delivery`: the last stage of every adapter, from raw blocks to sample blocks."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from acquisition.arrival import Arrival
@@ -32,7 +33,9 @@ class Delivery:
         self._stamps = StampCheck()
         self._clock = ClockEstimate()
 
-    def take(self, raw: RawBlock, arrived: Arrival | None = None) -> list[SampleBlock]:
+    def take(
+        self, raw: RawBlock, arrived: Arrival | None = None, held_s: float = 0.0
+    ) -> list[SampleBlock]:
         """Take the next raw block; return the sample blocks that it completes.
 
         Parameters
@@ -40,11 +43,37 @@ class Delivery:
         arrived
             When its last sample had arrived; None where nothing arrives, as from a recording, and
             the device's clock is not to be judged.
+        held_s
+            For how long the device had had that sample by then.
         """
         raw, fault = self._stamps.check(raw)
-        if arrived is not None:
-            self._note_arrival(raw, fault, arrived)
-        return [self._sample_block(r, fault, arrived) for r in self._grid.put(raw)]
+        blocks = self._grid.put(raw)
+        if arrived is None:
+            return [self._sample_block(block, fault) for block in blocks]
+        self._note_arrival(raw, fault, arrived)
+        clock = self._clock.reading(self._stamps.n_faults)
+        sampled_s = arrived.steady_s - held_s
+        return [
+            replace(self._sample_block(block, fault), clock=clock, sampled_s=sampled_s)
+            for block in blocks
+        ]
+
+    def take_together(
+        self, raws: Sequence[RawBlock], arrived: Arrival, read_for_s: float = 0.0
+    ) -> list[SampleBlock]:
+        """Take raw blocks that have come together: the device had had all but the last for longer.
+
+        Parameters
+        ----------
+        read_for_s
+            How long it took to read them, since the device said which is the newest.
+        """
+        blocks: list[SampleBlock] = []
+        n_after = sum(raw.n_samples for raw in raws)
+        for raw in raws:
+            n_after -= raw.n_samples
+            blocks += self.take(raw, arrived, read_for_s + n_after / raw.rate_hz)
+        return blocks
 
     def flush(self) -> list[SampleBlock]:
         """What is left when nothing will follow, as at the end of a recording."""
@@ -61,11 +90,6 @@ class Delivery:
             arrived,
         )
 
-    def _sample_block(
-        self, raw: RawBlock, fault: StampFault | None, arrived: Arrival | None
-    ) -> SampleBlock:
+    def _sample_block(self, raw: RawBlock, fault: StampFault | None) -> SampleBlock:
         block = calibrate(raw, self._calibration)
-        if arrived is None and fault is None:
-            return block
-        clock = None if arrived is None else self._clock.reading(self._stamps.n_faults)
-        return replace(block, clock=clock, stamp_fault=fault)
+        return block if fault is None else replace(block, stamp_fault=fault)

@@ -54,6 +54,10 @@ class SampleBlock:
         How the device's clock stands against the host's; None if there is no such clock.
     stamp_fault
         Why the device's own time stamp was not used: ``start_ns`` then follows from the index.
+    sampled_s
+        When the device had its last sample, by the steady clock of the host that has read it, as
+        far as that can be told; None if it comes from no device. Ages are counted from here: what
+        a device, a link or a queue has held back is not new when it comes.
     """
 
     unit: str
@@ -67,6 +71,7 @@ class SampleBlock:
     rejected: tuple[Rejection, ...] = ()
     clock: DeviceClock | None = None
     stamp_fault: StampFault | None = None
+    sampled_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.samples.ndim != 2 or len(self.channel_quality) != self.samples.shape[0]:

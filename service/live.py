@@ -113,24 +113,25 @@ class LiveView:
         return before.state is not state
 
     def set_received(
-        self, block: SampleBlock, account: SampleAccount, behind_s: float = 0.0
+        self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Note the arrival of a block, that long ago."""
+        """Note the arrival of a block whose samples were there then; just now if none is given."""
         self._hold(block)
         self._status[block.unit] = replace(
             self._status[block.unit],
             last_sample_ns=block.stop_ns,
-            received_s=self._clock.monotonic_s() - behind_s,
+            received_s=self._clock.monotonic_s() if sampled_s is None else sampled_s,
             account=account,
             clock=block.clock,
             stamp_fault=block.stamp_fault,
         )
 
-    def set_assessment(self, assessment: Assessment, behind_s: float = 0.0) -> None:
-        """Note a new result, of samples that arrived that long ago."""
+    def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
+        """Note a new result, of samples that were there then; just now if none is given."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
-        self._assessments[key] = (self._clock.monotonic_s() - behind_s, assessment)
+        since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
+        self._assessments[key] = (since_s, assessment)
 
     def status(self, unit: str) -> UnitStatus:
         """How samples of a unit arrive."""

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Mapping
 
 from acquisition.clock import Clock
+from core.blocks import SampleBlock
 from service.alarms.engine import AlarmEngine
 from service.bus import Bus
 from service.films.keeper import FilmKeeper
@@ -32,7 +33,7 @@ class Runner:
         beats: Heartbeats | None = None,
     ) -> None:
         monitors = {unit: watched.monitor for unit, watched in units.items()}
-        self._recorder = recorder
+        self._recorder, self._clock = recorder, clock
         self._bus = bus or Bus(BUS_CAPACITY, clock)
         self._beats = beats or Heartbeats(clock)
         self._analyser = Analyser(monitors, live, recorder, alarms, films)
@@ -58,7 +59,12 @@ class Runner:
         pulse.rest()
         async for block in self._bus.blocks():
             pulse.beat()
-            await self._analyser.take(block, self._bus.oldest_wait_s)
+            await self._analyser.take(block, self._sampled_s(block))
             self._bus.done()
             await asyncio.sleep(0)  # more blocks may be waiting, but so may others
             pulse.rest()
+
+    def _sampled_s(self, block: SampleBlock) -> float:
+        if block.sampled_s is not None:
+            return block.sampled_s
+        return self._clock.monotonic_s() - self._bus.oldest_wait_s

@@ -17,6 +17,7 @@ from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.clock import Clock
 from acquisition.delivery import Delivery
 from acquisition.errors import LinkError
+from acquisition.raw import RawBlock
 from core.blocks import SampleBlock
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
@@ -103,9 +104,10 @@ class CanSource:
         fresh_at_s = self._clock.monotonic_s()
         while True:
             batch = await reader.next_batch(min(_LOOK_S, self._settings.stale_after_s))
-            raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns) if batch else []
-            for raw in raw_blocks:
-                for block in self._delivery.take(raw, batch.arrived if batch else None):
+            raw_blocks: list[RawBlock] = []
+            if batch:
+                raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns)
+                for block in self._delivery.take_together(raw_blocks, batch.arrived):
                     yield block
             if raw_blocks:
                 fresh_at_s = self._clock.monotonic_s()

@@ -138,7 +138,7 @@ class FifoSource:
                 self._uncounted.begin()
             raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
             waiting.clear()
-            for block in [b for raw in raw_blocks for b in self._delivery.take(raw, arrived)]:
+            for block in self._delivery.take_together(raw_blocks, arrived):
                 yield block
             self._freshness.note(repr(self._newest).encode(), now_s)
             await self._clock.sleep(self._settings.poll_period_s)

@@ -112,12 +112,13 @@ class ModbusRingSource:
     async def _blocks(self, reader: RingReader) -> AsyncGenerator[SampleBlock, None]:
         due_s = self._clock.monotonic_s()
         while True:
+            begun_s = self._clock.monotonic_s()
             with _nonsense_drops_the_link():
                 raw_blocks = await self._follower.advance(reader)
             arrived = Arrival.now(self._clock)
-            for raw in raw_blocks:
-                for block in self._delivery.take(raw, arrived):
-                    yield block
+            read_for_s = arrived.steady_s - begun_s
+            for block in self._delivery.take_together(raw_blocks, arrived, read_for_s):
+                yield block
             if raw_blocks:
                 self._fresh_at_s = self._clock.monotonic_s()
             else:

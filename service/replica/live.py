@@ -15,6 +15,7 @@ from core.quantities import CATALOGUE
 from service.alarms.gone_alarms import SHARED
 from service.api.elsewhere import NotHereError
 from service.live import CurrentBearing, LinkState, UnitStatus
+from service.replica.delays import Delays
 from service.replica.unit_state import BearingState, UnitSigns
 
 SILENT_AFTER_S = 5.0
@@ -37,8 +38,9 @@ class Known:
     beat
         Process and number of the report.
     heard_s
-        When it was first seen to be another one than before, on the steady clock; None if it was
-        there already when this process began to look: nobody knows how old it is.
+        When it was said, on this process's steady clock: when it was first seen to be another one
+        than before, less what it was held up on its way. None if it is the first one of a process:
+        nobody knows how old it is.
     shown, silent
         Status while there are signs of life, and when there are none.
     """
@@ -57,8 +59,9 @@ NOTHING = Known(None, None, UnitSigns(UnitStatus(), None, {}), UnitStatus(), Uni
 class ReplicaLive:
     """The newest of everything, by the newest reports; nothing old passes for current.
 
-    Ages are measured by this process's steady clock from the moment at which it saw a report, so
-    that hosts' clocks need not agree.
+    Ages are measured by this process's steady clock from the moment at which it saw a report, less
+    the report's delay, so that hosts' clocks need not agree and a database that has kept a report
+    back makes nothing younger.
 
     Parameters
     ----------
@@ -68,6 +71,7 @@ class ReplicaLive:
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
         self._clock, self._stale_after_s = clock, stale_after_s
+        self._delays = Delays()
         self._known = dict.fromkeys((*units, PLANT, SHARED), NOTHING)
         self.revision = 0
         self.read_error: str | None = None
@@ -84,7 +88,10 @@ class ReplicaLive:
         if known.beat == beat:
             return
         self.revision += 1
-        heard_s = None if known.beat is None else self._clock.monotonic_s()
+        now_s = self._clock.monotonic_s()
+        delay_s = self._delays.delay_s(process, signs.said_s, now_s)
+        is_first = known.beat is None or known.beat[0] != process
+        heard_s = None if is_first else now_s - delay_s
         received_s = None
         if heard_s is not None and signs.data_age_s is not None:
             received_s = heard_s - signs.data_age_s

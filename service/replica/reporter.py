@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
@@ -93,7 +93,9 @@ class Reporter:
             self._written[unit] = (self._written[unit][0], None)
 
     def _look(self, unit: str) -> Seen:
+        said_s = self._clock.monotonic_s()
         state, signs = self._state_of(unit)
+        signs = replace(signs, said_s=said_s)
         revision, written = self._written.get(unit, (0, None))
         if state == written:
             return Seen(unit, signs, revision, None)

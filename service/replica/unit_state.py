@@ -85,6 +85,9 @@ class UnitSigns:
         Findings that the process has given up.
     store_error
         Why it cannot store just now.
+    said_s
+        When this was so, by the steady clock of the process that says it; None from those that do
+        not say it yet.
     """
 
     status: UnitStatus
@@ -92,6 +95,7 @@ class UnitSigns:
     result_ages_s: Mapping[str, float]
     n_unstored: int = 0
     store_error: str | None = None
+    said_s: float | None = None
 
 
 # within a tuple, so that NaN is written as such wherever it stands

@@ -34,14 +34,20 @@ class Analyser:
         self._monitors, self._live, self._recorder = monitors, live, recorder
         self._alarms, self._films = alarms, films
 
-    async def take(self, block: SampleBlock, behind_s: float) -> None:
-        """Take a block in that arrived that long ago, and hand over what it has taught."""
-        findings = await self.learn(block, behind_s)
+    async def take(self, block: SampleBlock, sampled_s: float) -> None:
+        """Take a block in, and hand over what it has taught.
+
+        Parameters
+        ----------
+        sampled_s
+            When its samples were there, by this process's steady clock.
+        """
+        findings = await self.learn(block, sampled_s)
         if findings != NOTHING:
             self._recorder.put(findings)
 
-    async def learn(self, block: SampleBlock, behind_s: float) -> Findings:
-        """Take a block in that arrived that long ago, and return what it has taught."""
+    async def learn(self, block: SampleBlock, sampled_s: float) -> Findings:
+        """Take a block in, as `take` does, and return what it has taught."""
         monitor = self._monitors[block.unit]
         found = []
         for assessment in monitor.steps(block):
@@ -50,20 +56,20 @@ class Analyser:
         assessments, films = self._films.take(block.unit, found)
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
-            self._live.set_assessment(assessment, behind_s)
-        self._live.set_received(block, monitor.account, behind_s)
+            self._live.set_assessment(assessment, sampled_s)
+        self._live.set_received(block, monitor.account, sampled_s)
         news = self._alarms.take(block, assessments, self._films.conditions(films))
         if assessments or gaps or news:
             return Findings(assessments, gaps, news, films)
         return NOTHING
 
-    async def relive(self, block: SampleBlock, behind_s: float) -> None:
+    async def relive(self, block: SampleBlock, sampled_s: float) -> None:
         """Take a block in whose findings are stored already; nobody is told again."""
         monitor = self._monitors[block.unit]
         for _ in monitor.steps(block):
             await _others()
         monitor.drain_gaps()
-        self._live.set_received(block, monitor.account, behind_s)
+        self._live.set_received(block, monitor.account, sampled_s)
 
     def state(self, unit: str) -> MonitorState:
         """What must be known of a monitor beside its newest samples."""

@@ -134,7 +134,7 @@ class UnitProgress:
             self._live.set_link(self.unit, message.state, message.reason)
             return
         self._live.set_link(self.unit, LinkState.CONNECTED)
-        await self._analyser.relive(message.block, self._behind_s(message))
+        await self._analyser.relive(message.block, self._sampled_s(message))
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _settle(self) -> None:
@@ -150,14 +150,16 @@ class UnitProgress:
             return
         if self._live.status(self.unit).state is not LinkState.CONNECTED:
             self._hear(LinkNews(self.unit, LinkState.CONNECTED))
-        findings = await self._analyser.learn(message.block, self._behind_s(message))
+        findings = await self._analyser.learn(message.block, self._sampled_s(message))
         self.sequence = sequence
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
         if findings != Findings():
             self._recorder.put(replace(findings, position=self.position()))
 
-    def _behind_s(self, message: Taken) -> float:
-        return max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
+    def _sampled_s(self, message: Taken) -> float:
+        """By this process's steady clock, where the clocks of both hosts agree."""
+        behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
+        return self._clock.monotonic_s() - behind_s
 
     def _hear(self, news: LinkNews) -> None:
         if self._live.set_link(news.unit, news.state, news.reason):

@@ -12,6 +12,7 @@ from nats.js.errors import APIError, NoStreamResponseError
 
 from acquisition.clock import Clock
 from core.blocks import SampleBlock
+from core.units import ns_from_s
 from service.heartbeats import UNHEARD, Pulse
 from service.roles.link_news import LinkNews
 from service.settings.plant import PlantFile
@@ -66,9 +67,15 @@ class Publisher:
     async def publish(self, block: SampleBlock) -> None:
         """Take a block, waiting while too much waits for the servers."""
         identity = self._identities[block.unit]
-        message = encoded_block(block, identity, self._clock.now_ns())
+        message = encoded_block(block, identity, self._taken_ns(block))
         outgoing = Outgoing(message_id(identity, block), message)
         await self.waiting.put(block.unit, outgoing)
+
+    def _taken_ns(self, block: SampleBlock) -> int:
+        now_ns = self._clock.now_ns()
+        if block.sampled_s is None:
+            return now_ns
+        return now_ns - ns_from_s(self._clock.monotonic_s() - block.sampled_s)
 
     def tell(self, news: LinkNews) -> None:
         """Take news of a link; what was said last is not said again."""

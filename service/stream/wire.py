@@ -65,7 +65,8 @@ class Taken:
     Parameters
     ----------
     taken_ns
-        By the clock of the host that acquires: how far behind the analysis is.
+        When its device had its last sample, by the clock of the host that acquires: how far behind
+        the analysis is.
     """
 
     block: SampleBlock

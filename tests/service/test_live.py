@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from acquisition.clock import Clock
 from core.account import SampleAccount
 from core.assessment import Assessment
 from core.blocks import SampleBlock
@@ -33,10 +34,14 @@ def live(stepped_clock) -> LiveView:
 
 @pytest.mark.parametrize(("behind_s", "is_current"), [(0.0, True), (29.0, True), (31.0, False)])
 def test_a_result_of_samples_that_have_waited_too_long_is_not_current(
-    live: LiveView, assessment: Callable[..., Assessment], behind_s: float, is_current: bool
+    live: LiveView,
+    stepped_clock: Clock,
+    assessment: Callable[..., Assessment],
+    behind_s: float,
+    is_current: bool,
 ) -> None:
     found = assessment()
-    live.set_assessment(found, behind_s)
+    live.set_assessment(found, stepped_clock.monotonic_s() - behind_s)
 
     shown = live.current(found.unit, found.bearing)
 
@@ -44,8 +49,10 @@ def test_a_result_of_samples_that_have_waited_too_long_is_not_current(
     assert shown.age_s == pytest.approx(behind_s)
 
 
-def test_samples_age_from_their_arrival_and_not_from_their_analysis(live: LiveView) -> None:
-    live.set_received(BLOCK, SampleAccount(), 31.0)
+def test_samples_age_from_when_the_device_had_them_and_not_from_their_analysis(
+    live: LiveView, stepped_clock: Clock
+) -> None:
+    live.set_received(BLOCK, SampleAccount(), stepped_clock.monotonic_s() - 31.0)
 
     assert live.data_age_s("U1") == pytest.approx(31.0)
     assert live.why_no_samples("U1") is Reason.STALE

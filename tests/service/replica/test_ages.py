@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pytest
@@ -12,16 +13,23 @@ from core.account import SampleAccount
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.quality import GOOD, Reason
-from service.live import LinkState, LiveView
+from service.live import LinkState, LiveView, UnitStatus
 from service.replica.describing import bearing_state, unit_signs
-from service.replica.live import ReplicaLive
-from service.replica.unit_state import read_signs, written_signs
+from service.replica.live import SILENT_AFTER_S, ReplicaLive
+from service.replica.unit_state import UnitSigns, read_signs, written_signs
 from service.settings.loading import load_plant_file
 
 STALE_AFTER_S = 30.0
 UNIT = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml").unit[0]
 BEARING = UNIT.bearing[0].id
 BLOCK = SampleBlock(UNIT.id, 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,), {})
+
+
+class Stepped(Clock, Protocol):
+    """A clock that goes on when it is told."""
+
+    def step(self, duration_s: float) -> None:
+        """Let time pass."""
 
 
 @pytest.mark.parametrize(("behind_s", "is_current"), [(0.0, True), (29.0, True), (31.0, False)])
@@ -37,8 +45,9 @@ def test_what_has_waited_for_the_analysis_is_as_old_in_a_replica(
     live.set_link(UNIT.id, LinkState.CONNECTED)
     replica.hear(UNIT.id, "one", 1, unit_signs(UNIT, live))
 
-    live.set_received(BLOCK, SampleAccount(), behind_s)
-    live.set_assessment(found, behind_s)
+    sampled_s = stepped_clock.monotonic_s() - behind_s
+    live.set_received(BLOCK, SampleAccount(), sampled_s)
+    live.set_assessment(found, sampled_s)
     replica.set_results(UNIT.id, {BEARING: bearing_state(found)})
     replica.hear(UNIT.id, "one", 2, read_signs(written_signs(unit_signs(UNIT, live))))
 
@@ -47,3 +56,53 @@ def test_what_has_waited_for_the_analysis_is_as_old_in_a_replica(
     assert shown.age_s == pytest.approx(behind_s)
     assert replica.data_age_s(UNIT.id) == pytest.approx(behind_s)
     assert replica.why_no_samples(UNIT.id) is (None if is_current else Reason.STALE)
+
+
+@pytest.fixture
+def replica(stepped_clock: Clock) -> ReplicaLive:
+    """One that has been told once of a unit whose samples arrive."""
+    made = ReplicaLive([UNIT.id], stepped_clock, STALE_AFTER_S)
+    made.hear(UNIT.id, "one", 1, signs(0.0, stepped_clock.monotonic_s()))
+    return made
+
+
+def signs(data_age_s: float, said_s: float | None) -> UnitSigns:
+    """What somebody has said of the unit, on a steady clock that began an hour before."""
+    status = UnitStatus(LinkState.CONNECTED)
+    said_s = None if said_s is None else said_s + 3600.0
+    return UnitSigns(status, data_age_s, {BEARING: data_age_s}, said_s=said_s)
+
+
+@pytest.mark.parametrize("held_up_s", [0.0, 4.0, 40.0])
+def test_a_report_that_the_database_has_kept_back_makes_nothing_younger(
+    stepped_clock: Stepped, replica: ReplicaLive, held_up_s: float
+) -> None:
+    stepped_clock.step(1.0)
+    said_s = stepped_clock.monotonic_s()
+    stepped_clock.step(held_up_s)
+    replica.hear(UNIT.id, "one", 2, signs(0.2, said_s))
+
+    assert replica.data_age_s(UNIT.id) == pytest.approx(0.2 + held_up_s, abs=0.1)
+    assert replica.is_alive(UNIT.id) is (held_up_s < SILENT_AFTER_S)
+
+
+def test_another_process_is_believed_from_its_second_report_on(
+    stepped_clock: Stepped, replica: ReplicaLive
+) -> None:
+    said_s = stepped_clock.monotonic_s()
+    stepped_clock.step(3.0)  # kept back, of which nobody can know yet
+    replica.hear(UNIT.id, "two", 1, signs(0.2, said_s))
+    assert replica.data_age_s(UNIT.id) is None
+    assert replica.why_no_samples(UNIT.id) is Reason.NOT_CONNECTED
+
+    replica.hear(UNIT.id, "two", 2, signs(0.3, stepped_clock.monotonic_s()))
+    assert replica.data_age_s(UNIT.id) == pytest.approx(0.3)
+    assert replica.why_no_samples(UNIT.id) is None
+
+
+def test_who_does_not_say_when_is_believed_to_have_said_it_now(
+    stepped_clock: Stepped, replica: ReplicaLive
+) -> None:
+    stepped_clock.step(2.0)
+    replica.hear(UNIT.id, "one", 2, signs(0.2, None))
+    assert replica.data_age_s(UNIT.id) == pytest.approx(0.2)

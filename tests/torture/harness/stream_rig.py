@@ -1,6 +1,7 @@
 """Blocks on a real stream, and what a single process makes of the same blocks in the same order."""
 
 import sqlite3
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -113,7 +114,7 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
                 analysis.analyser.hear(message)
             else:
                 analysis.analyser.hear(LinkNews(unit, LinkState.CONNECTED))
-                await analysis.analyser.take(message, 0.0)
+                await analysis.analyser.take(message, time.monotonic())
                 await analysis.recorder.flush()
     finally:
         await analysis.close()

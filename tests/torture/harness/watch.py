@@ -151,7 +151,7 @@ def silent_healthy_s(plant: LedgerPlant, offered: Offered, looks: list[Look]) ->
 
 
 def silent_healthy(plant: LedgerPlant, offered: Offered, looks: list[Look]) -> list[str]:
-    """What was shown as current and good and was not, one line each; for who looks for the cause."""
+    """What was shown as current and good and was not: a line each, for who looks for causes."""
     lines = []
     for look in sorted(looks, key=lambda one: one.at_ns):
         if _is_wrong(plant, offered, look):
