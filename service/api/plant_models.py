@@ -40,7 +40,7 @@ class SourceModel(ApiModel):
     """Since when it has been so."""
 
     data_age_s: float | None
-    """Seconds since the newest sample arrived."""
+    """Seconds since the device had the newest sample that is here."""
 
     last_sample_time: Time | None
     """Time of that sample by the device's clock."""
