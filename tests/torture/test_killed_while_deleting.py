@@ -12,6 +12,7 @@ import pytest
 from harness.deeds import HOP_NS, T0_NS, Build, value
 from harness.deleting import LATER_NS
 from harness.tape import python
+from rigs.rolled_trends import gather_all
 
 from service.store.port import Trend, TrendQuery
 from service.store.retention import deleting
@@ -40,12 +41,6 @@ def old_file(
         )
         gather_all(store)
     return path.read_bytes()
-
-
-def gather_all(store: SqliteStore) -> None:
-    while due := store.rollups.due(LATER_NS):
-        for series in due:
-            store.rollups.gather(series, LATER_NS)
 
 
 def by_the_hour(store: SqliteStore) -> Trend:

@@ -6,6 +6,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from rigs.rolled_trends import gather_all
 
 from core.assessment import Assessment
 from service.store.port import TrendQuery
@@ -37,12 +38,6 @@ def store(path: Path, assessment: Build) -> Iterator[SqliteStore]:
         ]
         opened.append(readings, [])
         yield opened
-
-
-def gather_all(store: SqliteStore, now_ns: int = LATER_NS) -> None:
-    while due := store.rollups.due(now_ns):
-        for series in due:
-            store.rollups.gather(series, now_ns)
 
 
 def extremes(store: SqliteStore) -> list[tuple[float, float]]:

@@ -1,0 +1,81 @@
+"""Nine hours of results, and how they become coarser."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from core.assessment import Assessment
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
+from core.quality import GOOD, Reading, Reason, missing, uncertain
+from rigs.rolled_trends import require_same
+from service.store.port import Trend, TrendQuery
+from service.store.retention.limits import RetentionLimits
+from service.store.sql_store import SqlStore
+
+Build = Callable[..., Assessment]
+
+
+HOUR_NS, MINUTE_NS, SECOND_NS = 3_600_000_000_000, 60_000_000_000, 1_000_000_000
+T0 = 1_767_225_600_000_000_000
+HOURS = 9
+NOW_NS = T0 + HOURS * HOUR_NS
+NAMES = ("speed_rpm", "stiffness_xx_n_per_m", "oil_temperature_c")
+KEEP_NOTHING = RetentionLimits(readings_ns=0)
+
+
+TIERS = (
+    (RetentionLimits(readings_ns=0), (2, 10, 60, 120)),
+    (RetentionLimits(readings_ns=0, minutes_ns=0), (10, 30, 60, 120)),
+    (RetentionLimits(readings_ns=0, minutes_ns=0, ten_minutes_ns=0), (60, 120)),
+)
+"""What is kept, and how wide buckets are out of it, in minutes."""
+
+
+def life(build: Build, n: int = 600, seed: int = 1) -> list[Assessment]:
+    """Nine hours with changing load, a lost probe and a hole."""
+    random = np.random.default_rng(seed)
+    times = np.sort(random.choice(HOURS * 3600, n, replace=False)) * SECOND_NS + T0
+    hole = (times > T0 + 4.2 * HOUR_NS) & (times < T0 + 4.8 * HOUR_NS)
+    return [reading(build, random, int(at)) for at in times[~hole]]
+
+
+def reading(build: Build, random: np.random.Generator, at: int) -> Assessment:
+    """One result."""
+    share = (at - T0) / (HOURS * HOUR_NS)
+    state = OperatingState.PART_LOAD if share < 0.3 else OperatingState.FULL_LOAD
+    doubt = GOOD if random.random() < 0.9 else uncertain(Reason.LOW_COVERAGE)
+    readings = {
+        "stiffness_xx_n_per_m": Reading(float(random.normal(1e9, 1e7)), doubt, u_random=2e6),
+        "speed_rpm": Reading(float(random.normal(92.3, 1.0))),
+        "eccentricity_ratio": Reading(round(float(random.normal(0.35, 0.02)), 3)),
+        "oil_temperature_c": Reading(round(45.0 + 3.0 * share + float(random.normal(0, 0.3)), 1)),
+    }
+    if 0.6 < share < 0.7:
+        readings["eccentricity_ratio"] = missing(Reason.SENSOR_FAILURE)
+    return replace(build(at, **readings), condition=BearingCondition(state, True, None))
+
+
+def delete_all(store: SqlStore, limits: RetentionLimits = KEEP_NOTHING) -> None:
+    """Delete until nothing is due."""
+    for series in series_of(store):
+        while store.retention.delete(series, limits, NOW_NS):
+            pass
+
+
+def series_of(store: SqlStore) -> list[int]:
+    """Numbers of all series."""
+    return list(store.retention.series())
+
+
+def asked(minutes: int = 60, **changes: object) -> TrendQuery:
+    """Buckets of so many minutes over everything."""
+    n_points = HOURS * 60 // minutes + 1
+    query = TrendQuery("U1", "UJB", NAMES, T0, T0 + HOURS * HOUR_NS, n_points, 1 << 62)
+    return replace(query, **changes)  # type: ignore[arg-type]
+
+
+def require_same_hours(found: Trend, wanted: Trend) -> None:
+    """As sums of sums say it."""
+    require_same(found, wanted, within=1e-9)

@@ -1,0 +1,44 @@
+"""Roll-ups are gathered, and trends out of them compared with those out of single readings."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+from service.store.port import Trend
+from service.store.sql_store import SqlStore
+
+LATER_NS = 1 << 62
+
+
+def gather_all(store: SqlStore, now_ns: int = LATER_NS) -> None:
+    """Gather until nothing is due."""
+    while due := store.rollups.due(now_ns):
+        for series in due:
+            store.rollups.gather(series, now_ns)
+
+
+def require_same(found: Trend, wanted: Trend, within: float = 1e-12) -> None:
+    """Fail unless all is equal, and means are within that share of the largest value."""
+    assert found.bucket_ns == wanted.bucket_ns
+    assert list(found.time_ns) == list(wanted.time_ns)
+    assert set(found.series) == set(wanted.series)
+    for name, theirs in wanted.series.items():
+        ours = found.series[name]
+        assert list(ours.minimum) == list(theirs.minimum), name
+        assert list(ours.maximum) == list(theirs.maximum), name
+        assert list(ours.count) == list(theirs.count), name
+        assert list(ours.worst_level) == list(theirs.worst_level), name
+        for mean, low, high, ours_mean in zip(
+            theirs.mean, theirs.minimum, theirs.maximum, ours.mean, strict=True
+        ):
+            if mean is None or low is None or high is None or ours_mean is None:
+                assert mean is ours_mean is None, name
+            else:
+                assert abs(ours_mean - mean) <= within * max(abs(low), abs(high)), name
+
+
+def n_rows(path: Path, table: str, where: str = "1") -> int:
+    """How many rows of a table there are."""
+    with closing(sqlite3.connect(path)) as connection:
+        found = connection.execute(f"SELECT count(*) FROM {table} WHERE {where}")  # noqa: S608
+        return int(found.fetchone()[0])

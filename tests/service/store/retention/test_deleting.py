@@ -1,0 +1,119 @@
+"""What is old goes in small pieces, and nothing goes that is not kept wider."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from rigs.old_results import (
+    HOUR_NS,
+    KEEP_NOTHING,
+    NOW_NS,
+    T0,
+    TIERS,
+    asked,
+    delete_all,
+    require_same_hours,
+    series_of,
+)
+from rigs.rolled_trends import gather_all, n_rows
+
+from service.store.retention import deleting
+from service.store.retention.limits import RetentionLimits
+from service.store.sqlite import SqliteStore
+
+
+def test_what_is_young_stays_as_it_was(old: SqliteStore, path: Path) -> None:
+    keep = RetentionLimits(readings_ns=5 * HOUR_NS)
+
+    delete_all(old, keep)
+
+    assert n_rows(path, "assessment", f"time_ns < {T0 + 4 * HOUR_NS}") == 0
+    young = asked(start_ns=T0 + 4 * HOUR_NS, max_points=5000)
+    assert old.trend(young).bucket_ns is None
+
+
+def test_without_limits_nothing_is_deleted(old: SqliteStore, path: Path) -> None:
+    before = path.read_bytes()
+    delete_all(old, RetentionLimits())
+    assert path.read_bytes() == before
+
+
+def test_what_is_not_rolled_up_is_not_deleted(plain: SqliteStore, tmp_path: Path) -> None:
+    n_before = n_rows(tmp_path / "plain.sqlite3", "assessment")
+    delete_all(plain)
+    assert n_rows(tmp_path / "plain.sqlite3", "assessment") == n_before
+
+
+@pytest.mark.parametrize("width_s", [60, 600, 3600])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "DELETE FROM rollup_numbers WHERE {where}",
+        "DELETE FROM rollup_cell WHERE {where}",
+        "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE {where}",
+    ],
+)
+def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
+    old: SqliteStore, plain: SqliteStore, path: Path, width_s: int, damage: str
+) -> None:
+    hour_ns = T0 + 2 * HOUR_NS
+    where = f"width_s = {width_s} AND start_ns >= {hour_ns} AND start_ns < {hour_ns + HOUR_NS}"
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(damage.format(where=where))
+
+    delete_all(old)
+    assert n_rows(path, "assessment", f"time_ns < {hour_ns}") == 0
+    assert n_rows(path, "assessment", f"time_ns < {hour_ns + HOUR_NS}") > 30
+    gather_all(old)
+    delete_all(old)
+
+    assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
+    for minutes in (2, 10, 60):
+        require_same_hours(old.trend(asked(minutes)), plain.trend(asked(minutes)))
+
+
+def test_deleting_twice_changes_nothing(old: SqliteStore, path: Path) -> None:
+    limits = TIERS[1][0]
+    delete_all(old, limits)
+    once = [n_rows(path, t) for t in ("assessment", "rollup_cell", "rollup_numbers")]
+
+    assert not any(old.retention.delete(series, limits, NOW_NS) for series in series_of(old))
+    assert [n_rows(path, t) for t in ("assessment", "rollup_cell", "rollup_numbers")] == once
+
+
+def test_each_piece_of_work_is_small(
+    old: SqliteStore, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(deleting, "MAX_READINGS", 150)
+    (series,) = series_of(old)
+    before = n_rows(path, "assessment")
+    while old.retention.delete(series, KEEP_NOTHING, NOW_NS):
+        after = n_rows(path, "assessment")
+        assert 0 < before - after <= 200
+        before = after
+    assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
+
+
+def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
+    path: Path, old: SqliteStore
+) -> None:
+    rows = [("raised", 1, "delivered"), ("raised", 2, "delivered"), ("raised", 3, "waiting")]
+    rows += [("other", 1, "refused")]
+    with closing(sqlite3.connect(path)) as connection, connection:
+        for alarm, number, state in rows:
+            connection.execute(
+                "INSERT INTO outbox (receiver, event_id, alarm, number, body, queued_ns, is_urgent,"
+                " is_active, state, done_ns) VALUES ('shift', ?, ?, ?, '{}', 0, 0, 1, ?, ?)",
+                (f"{alarm}{number}", alarm, number, state, None if state == "waiting" else T0),
+            )
+    limits = RetentionLimits(letters_ns=HOUR_NS)
+
+    old.retention.prune(limits, T0 + HOUR_NS)
+    assert n_rows(path, "outbox") == 4
+    old.retention.prune(limits, T0 + HOUR_NS + 1)
+
+    assert n_rows(path, "outbox", "alarm = 'raised' AND number = 1") == 0
+    assert n_rows(path, "outbox") == 3
+    with closing(sqlite3.connect(path)) as connection, pytest.raises(sqlite3.IntegrityError):
+        connection.execute("DELETE FROM outbox WHERE state = 'waiting'")

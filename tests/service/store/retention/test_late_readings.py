@@ -1,0 +1,151 @@
+"""Whatever comes late, and in whatever order things are done, hours say what was read."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rigs.old_results import (
+    HOUR_NS,
+    HOURS,
+    NOW_NS,
+    SECOND_NS,
+    T0,
+    TIERS,
+    Build,
+    asked,
+    delete_all,
+    life,
+    reading,
+    require_same_hours,
+)
+from rigs.rolled_trends import gather_all, n_rows
+
+from service.store.retention import deleting
+from service.store.retention.limits import RetentionLimits
+from service.store.rollups import rolling
+from service.store.sqlite import SqliteStore
+
+
+@pytest.mark.parametrize(("limits", "widths"), TIERS)
+def test_late_readings_are_added_to_what_is_left_of_their_hour(
+    old: SqliteStore,
+    plain: SqliteStore,
+    path: Path,
+    assessment: Build,
+    limits: RetentionLimits,
+    widths: tuple[int, ...],
+) -> None:
+    delete_all(old, limits)
+    random = np.random.default_rng(2)
+    late = [
+        reading(assessment, random, T0 + hour * HOUR_NS + second * SECOND_NS + 7)
+        for hour, second in ((1, 5), (1, 700), (1, 3599), (4, 1800), (4, 1801))
+    ]
+    for store in (old, plain):
+        store.append(late, [])
+
+    for _ in range(2):  # before they are merged, and after that
+        for minutes in widths:
+            require_same_hours(old.trend(asked(minutes)), plain.trend(asked(minutes)))
+        gather_all(old)
+    assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
+    assert n_rows(path, "rollup_redo") == 0
+
+
+STEPS = st.lists(
+    st.one_of(
+        st.tuples(st.just("late"), st.integers(0, HOURS * 3600 - 1)),
+        st.tuples(st.just("gather"), st.just(0)),
+        st.tuples(st.sampled_from(["single", "minutes", "ten"]), st.integers(0, HOURS)),
+    ),
+    min_size=3,
+    max_size=14,
+)
+
+
+@settings(max_examples=8, deadline=None)
+@given(STEPS, st.integers(0, 2**31))
+def test_whatever_happens_in_whatever_order_hours_say_what_was_read(
+    tmp_path_factory: pytest.TempPathFactory,
+    assessment: Build,
+    steps: list[tuple[str, int]],
+    seed: int,
+) -> None:
+    folder, random = tmp_path_factory.mktemp("order"), np.random.default_rng(seed)
+    kept, whole = SqliteStore(folder / "kept"), SqliteStore(folder / "whole")
+    with closing(kept), closing(whole):
+        for store in (kept, whole):
+            store.append(life(assessment, 80, seed), [])
+        taken: set[int] = set()
+        for what, number in steps:
+            if what == "late" and number not in taken:
+                taken.add(number)
+                late = reading(assessment, random, T0 + number * SECOND_NS + 11)
+                for store in (kept, whole):
+                    store.append([late], [])
+            elif what == "gather":
+                gather_all(kept)
+            elif what != "late":
+                _delete_until(kept, what, number)
+            require_same_hours(kept.trend(asked(60)), whole.trend(asked(60)))
+
+
+def _delete_until(store: SqliteStore, what: str, hour: int) -> None:
+    age_ns = (HOURS - hour) * HOUR_NS
+    limits = RetentionLimits(
+        readings_ns=age_ns,
+        minutes_ns=None if what == "single" else age_ns,
+        ten_minutes_ns=age_ns if what == "ten" else None,
+    )
+    delete_all(store, limits)
+
+
+def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
+    """What gathering anew does, done to an hour of which only late readings are left."""
+    rolling._gather_hour(writer, series, (hour_ns, hour_ns + HOUR_NS))
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "bug"),
+    [
+        pytest.param(
+            *(rolling, "merge_late", overwritten),
+            marks=pytest.mark.planted("late readings overwrite what was rolled up"),
+        ),
+        pytest.param(
+            *(deleting, "_stands_in", lambda *_: True),
+            marks=pytest.mark.planted("readings deleted before they were rolled up"),
+        ),
+    ],
+)
+def test_planted_bugs_are_found(
+    old: SqliteStore,
+    plain: SqliteStore,
+    path: Path,
+    assessment: Build,
+    monkeypatch: pytest.MonkeyPatch,
+    module: object,
+    name: str,
+    bug: object,
+) -> None:
+    """Late readings that overwrite their hour, and deleting unseen what was not rolled up."""
+    monkeypatch.setattr(module, name, bug)
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(
+            "DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,)
+        )
+    delete_all(old)
+    gather_all(old)
+    delete_all(old)
+    late = reading(assessment, np.random.default_rng(2), T0 + HOUR_NS + 7)
+    for store in (old, plain):
+        store.append([late], [])
+    gather_all(old)
+
+    with pytest.raises(AssertionError):
+        require_same_hours(old.trend(asked(60)), plain.trend(asked(60)))

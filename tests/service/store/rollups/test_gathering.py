@@ -1,0 +1,151 @@
+"""However readings come, late, in pieces or before a crash, they are gathered to the same."""
+
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rigs.rolled_trends import LATER_NS, gather_all, require_same
+from rigs.varied_results import (
+    HOUR_NS,
+    MINUTE_NS,
+    T0,
+    WHOLE,
+    Build,
+    N,
+    dump,
+    life,
+)
+
+from service.store import schema
+from service.store.port import StoreError
+from service.store.rollups import rolling
+from service.store.rollups.cells import bins
+from service.store.rollups.schema import ROLLUP_TABLES
+from service.store.sqlite import SqliteStore
+from service.store.sqlite.migrating import migrate
+
+
+def test_what_comes_piece_by_piece_is_gathered_like_what_comes_at_once(
+    plain: SqliteStore, assessment: Build, path_of: Callable[[str], Path]
+) -> None:
+    for name, piece in (("at-once", N), ("pieces", 37)):
+        store = SqliteStore(path_of(name))
+        results = life(assessment)
+        for first in range(0, N, piece):
+            store.append(results[first : first + piece], [])
+            gather_all(store)
+        require_same(store.trend(WHOLE), plain.trend(WHOLE))
+        store.close()
+
+    assert dump(path_of("at-once")) == dump(path_of("pieces"))
+
+
+def test_a_bounded_number_of_readings_is_gathered_at_a_time(
+    assessment: Build,
+    path_of: Callable[[str], Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    dumps = []
+    for at_once in (2, 50, 10_000):
+        monkeypatch.setattr(rolling, "MAX_READINGS", at_once)
+        store = SqliteStore(path_of(f"slow-{at_once}"))
+        store.append(life(assessment), [])
+        gather_all(store)
+        store.close()
+        dumps.append(dump(path_of(f"slow-{at_once}")))
+    assert dumps[0] == dumps[1] == dumps[2]
+
+
+@pytest.mark.parametrize("late_min", [3, 70, 200, 254])
+def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
+    rolled: SqliteStore,
+    plain: SqliteStore,
+    assessment: Build,
+    path_of: Callable[[str], Path],
+    late_min: int,
+) -> None:
+    late = assessment(T0 + late_min * MINUTE_NS + 1, speed_rpm=1e6, eccentricity_ratio=0.35)
+    later = [replace(late, time_ns=late.time_ns + i) for i in range(1, 4)]  # of the same hour
+    for store in (plain, rolled):
+        store.append([late], [])
+        store.append([late, *later], [])
+
+    require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
+    gather_all(rolled)
+    require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
+
+    newer = [assessment(T0 + (300 + i) * MINUTE_NS, speed_rpm=1.0) for i in range(20)]
+    for store in (plain, rolled):
+        store.append(newer, [])
+    gather_all(rolled)
+    require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
+    assert max(v for v in rolled.trend(WHOLE).series["speed_rpm"].maximum if v is not None) == 1e6
+    with closing(sqlite3.connect(path_of("rolled"))) as reader:
+        assert reader.execute("SELECT count(*) FROM rollup_redo").fetchone() == (0,)
+
+
+def test_a_crash_while_gathering_leaves_nothing_half_done(
+    plain: SqliteStore, path_of: Callable[[str], Path]
+) -> None:
+    with closing(sqlite3.connect(path_of("plain"))) as other, other:
+        other.execute(
+            "CREATE TRIGGER crash BEFORE INSERT ON rollup_mark"
+            " BEGIN SELECT RAISE(ABORT, 'power cut'); END"
+        )
+    before = plain.trend(WHOLE)
+
+    (series,) = plain.rollups.due(LATER_NS)
+    with pytest.raises(StoreError, match="power cut"):
+        plain.rollups.gather(series, LATER_NS)
+
+    require_same(plain.trend(WHOLE), before)
+    with closing(sqlite3.connect(path_of("plain"))) as other, other:
+        assert other.execute("SELECT count(*) FROM rollup_cell").fetchone() == (0,)
+        other.execute("DROP TRIGGER crash")
+    gather_all(plain)
+    require_same(plain.trend(WHOLE), before)
+
+
+def test_a_reading_from_the_future_does_not_make_all_others_late(
+    plain: SqliteStore, assessment: Build, path_of: Callable[[str], Path]
+) -> None:
+    now_ns = T0 + 10 * HOUR_NS
+    plain.append([assessment(T0 + 1000 * HOUR_NS, speed_rpm=1.0)], [])
+    gather_all(plain, now_ns)
+
+    with closing(sqlite3.connect(path_of("plain"))) as reader:
+        assert reader.execute("SELECT until_ns FROM rollup_mark").fetchone()[0] <= now_ns
+
+
+@pytest.mark.parametrize("width", [0.05, 2.5, 0.1])
+def test_a_value_on_the_bound_of_two_cells_is_in_the_upper_one(width: float) -> None:
+    numbers = np.arange(-40, 400)
+    bounds = np.array([round(int(number) * width, 9) for number in numbers])
+
+    assert bins(bounds, width).tolist() == numbers.tolist()
+    assert bins(np.nextafter(bounds, -np.inf), width).tolist() == (numbers - 1).tolist()
+
+
+def test_a_database_from_before_roll_ups_is_gathered_after_its_upgrade(
+    plain: SqliteStore, path_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = schema.MIGRATIONS[: schema.MIGRATIONS.index(ROLLUP_TABLES)]
+    with closing(sqlite3.connect(path_of("old"), isolation_level=None)) as old:
+        with monkeypatch.context() as at_that_time:
+            at_that_time.setattr(schema, "MIGRATIONS", before)
+            migrate(old, "old")
+        old.execute("ATTACH ? AS other", (str(path_of("plain")),))
+        for table in ("layout", "series", "assessment"):
+            old.execute(f"INSERT INTO {table} SELECT * FROM other.{table}")  # noqa: S608
+    store = SqliteStore(path_of("old"))
+
+    require_same(store.trend(WHOLE), plain.trend(WHOLE))
+    gather_all(store)
+    require_same(store.trend(WHOLE), plain.trend(WHOLE))
+
+    store.close()
+    assert len(dump(path_of("old"))) > 1000
