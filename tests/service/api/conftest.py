@@ -8,6 +8,7 @@ from typing import Any
 
 import httpx2
 import pytest
+from rigs.probes import Probes
 
 from acquisition.calibration import calibrate
 from core.assessment import Assessment
@@ -217,3 +218,9 @@ def running(service: Service, assessments: list[Assessment]) -> Service:
         service.live.set_assessment(assessment)
     service.store.append(assessments, [])
     return service
+
+
+@pytest.fixture
+def probes(service: Any) -> Probes:
+    """The first probe of unit U1, which may fail."""
+    return Probes(service)

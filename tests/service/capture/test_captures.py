@@ -1,148 +1,15 @@
 """Samples around an alarm: exactly those, in a recording that says what it is for."""
 
-import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rigs.standing_clock import StandingClock
+from rigs.capturing import SECOND, T0, block, numbers, raised, running, samples
 
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
-from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.writer import RecordingWriter
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import AlarmKind
 from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
-from core.alarms.operation import Shelve, operate
-from core.blocks import SampleBlock
-from core.machine import Measurand
-from core.quality import GOOD, Reason, bad
-from service.capture import captures as module
-from service.capture.captures import Captures
-from service.capture.outcome import Outcome
 from service.capture.span import CaptureSettings
-
-RATE_HZ = 50.0
-BLOCK = 10
-"""A fifth of a second."""
-
-T0 = 1_767_225_600_000_000_000
-SECOND = 1_000_000_000
-SETTINGS = CaptureSettings(pre_s=3.0, post_s=5.0, max_s=12.0)
-ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
-
-
-def recorded_unit(unit: str) -> RecordedUnit:
-    limits = {"full_scale_v": 10.0, "unit_per_v": 1e7, "ok_min_v": -10.0, "ok_max_v": 10.0}
-    channels = tuple(
-        RecordedChannel(id=id_, measurand=Measurand.DISPLACEMENT_UM, **limits) for id_ in "ab"
-    )
-    return RecordedUnit(
-        unit=unit,
-        rate_hz=RATE_HZ,
-        channels=channels,
-        slow_channels=(),
-        sample_type="float32",
-        block_samples=BLOCK,
-    )
-
-
-def block(
-    number: int, unit: str = "U1", lost: bool = False, start_ns: int | None = None
-) -> SampleBlock:
-    """Channel a is the number of the sample."""
-    first = number * BLOCK
-    index = np.arange(first, first + BLOCK, dtype=np.float32)
-    return SampleBlock(
-        unit=unit,
-        epoch=1,
-        first_index=first,
-        start_ns=T0 + number * SECOND // 5 if start_ns is None else start_ns,
-        rate_hz=RATE_HZ,
-        samples=np.array([index, -index]),
-        channel_quality=(bad(Reason.SENSOR_FAILURE) if lost else GOOD, GOOD),
-    )
-
-
-def raised(
-    at_s: float, kind: AlarmKind = AlarmKind.SHAFT_X, unit: str = "U1", shelved: bool = False
-) -> AlarmNews:
-    alarm = Alarm(AlarmIdentity(unit, "UJB", kind))
-    if shelved:
-        alarm, _ = operate(alarm, Shelve("A. Name", "known", T0 + 10**15), T0)
-    return AlarmNews(*advance(alarm, ALERT, T0 + round(at_s * SECOND), AlarmRule()))
-
-
-class Rig:
-    """Captures with their writer running, fed block by block."""
-
-    def __init__(self, root: Path, settings: CaptureSettings, units: tuple[str, ...]) -> None:
-        self.root, self.clock = root, StandingClock()
-        self.refuse: Exception | None = None
-        self.captures = Captures(
-            root,
-            settings,
-            {unit: self._writer_of(unit) for unit in units},
-            dict.fromkeys(units, RATE_HZ),
-            self.clock,
-        )
-
-    def _writer_of(self, unit: str) -> Callable[[Path, str], RecordingWriter]:
-        def make(folder: Path, made_by: str) -> RecordingWriter:
-            if self.refuse is not None:
-                raise self.refuse
-            return RecordingWriter(folder, recorded_unit(unit), made_by)
-
-        return make
-
-    def send(
-        self, start: int, stop: int, alarms: dict[int, AlarmNews] | None = None, **how: object
-    ) -> None:
-        for number in range(start, stop):
-            news = [alarms[number]] if alarms and number in alarms else []
-            self.captures.take(block(number, **how), news)  # type: ignore[arg-type]
-
-    async def until(self, condition: Callable[[], bool]) -> None:
-        async with asyncio.timeout(30):
-            while not condition():
-                await asyncio.sleep(0.001)
-
-    async def written(self, n: int) -> list[Recording]:
-        await self.until(lambda: self.captures.n_written == n and self.captures.n_running == 0)
-        return self.recordings()
-
-    def recordings(self) -> list[Recording]:
-        return [open_recording(folder) for folder in sorted(self.root.iterdir())]
-
-
-@asynccontextmanager
-async def running(
-    root: Path, settings: CaptureSettings = SETTINGS, units: tuple[str, ...] = ("U1",)
-) -> AsyncIterator[Rig]:
-    rig = Rig(root, settings, units)
-    task = asyncio.create_task(rig.captures.run())
-    yield rig
-    task.cancel()
-    await asyncio.wait([task])
-    await rig.captures.close()
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    return tmp_path / "captures"
-
-
-def samples(recording: Recording) -> list[int]:
-    """The numbers of the samples in a recording."""
-    blocks = recording.raw_blocks()
-    return [int(value) for raw in blocks for value in raw.counts[0]]
-
-
-def numbers(first_block: int, stop_block: int) -> list[int]:
-    return list(range(first_block * BLOCK, stop_block * BLOCK))
 
 
 async def test_a_capture_holds_exactly_the_samples_around_the_alarm(root: Path) -> None:
@@ -288,89 +155,6 @@ async def test_a_device_whose_clock_is_put_back_ends_its_capture_by_count(root: 
     assert samples(recording) == numbers(35, 95)
 
 
-async def test_a_link_that_is_lost_leaves_a_finished_capture_after_a_while(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 60, {49: raised(10.0)})
-        rig.clock.s = 34.0
-        await rig.until(lambda: any(root.iterdir()) if root.exists() else False)
-        assert rig.captures.n_written == 0
-        rig.clock.s = 36.0
-        [recording] = await rig.written(1)
-
-    assert samples(recording) == numbers(35, 60)
-
-
-async def test_a_service_that_stops_finishes_the_capture_with_what_there_is(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 60, {49: raised(10.0)})
-    [recording] = rig.recordings()
-
-    assert samples(recording) == numbers(35, 60)
-
-
-async def test_a_disk_that_refuses_is_told_and_the_next_capture_is_written(root: Path) -> None:
-    async with running(root) as rig:
-        rig.refuse = OSError(28, "No space left on device")
-        rig.send(0, 100, {49: raised(10.0)})
-        await rig.until(lambda: rig.captures.error is not None and rig.captures.n_running == 0)
-        assert rig.captures.error is not None
-        assert "No space left on device" in rig.captures.error
-        assert "U1:UJB:order1_shaft_x" in rig.captures.error
-        rig.refuse = None
-        rig.send(100, 200, {149: raised(30.0)})
-        [recording] = await rig.written(1)
-        assert rig.captures.error is None
-
-    assert samples(recording) == numbers(135, 175)
-
-
-async def test_a_disk_that_fails_half_way_leaves_nothing_behind(
-    root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(_: RecordingWriter) -> None:
-        raise OSError(5, "Input/output error")
-
-    monkeypatch.setattr(RecordingWriter, "finish", refuse)
-    async with running(root) as rig:
-        rig.send(0, 100, {49: raised(10.0)})
-        await rig.until(lambda: rig.captures.error is not None and rig.captures.n_running == 0)
-
-    assert list(root.iterdir()) == []
-
-
-async def test_a_disk_that_is_too_slow_costs_the_capture_and_no_memory(
-    root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "MAX_PENDING_SAMPLES", 2 * 20 * BLOCK)
-    rig = Rig(root, SETTINGS, ("U1",))  # nobody writes
-    rig.send(0, 60, {49: raised(10.0)})
-
-    assert sum(c.n_pending_samples for c in rig.captures._all) == 0
-    await rig.captures.close()
-    assert rig.captures.error is not None
-    assert "too slow" in rig.captures.error
-    assert list(root.iterdir()) == []
-
-
-async def test_what_a_crash_has_left_unfinished_is_removed_at_the_start(root: Path) -> None:
-    left = root / "U1-20260101T000010.000Z-order1_shaft_x.incomplete"
-    left.mkdir(parents=True)
-    (left / "samples.parquet").write_bytes(b"PAR1 and no footer")
-
-    async with running(root) as rig:
-        await rig.until(lambda: not left.exists())
-
-
-async def test_two_alarms_at_the_same_time_do_not_meet_in_one_folder(root: Path) -> None:
-    for _ in range(2):  # the service restarts, the device's clock has been put back
-        async with running(root) as rig:
-            rig.send(0, 100, {49: raised(10.0)})
-            await rig.until(lambda rig=rig: rig.captures.n_written == 1)  # type: ignore[misc]
-
-    names = sorted(path.name for path in root.iterdir())
-    assert names == [names[0], f"{names[0]}-2"]
-
-
 async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root: Path) -> None:
     settings = CaptureSettings(pre_s=3.0, post_s=2.0, max_s=12.0, window_s=8.0)
     async with running(root, settings) as rig:
@@ -378,26 +162,3 @@ async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root: P
         [recording] = await rig.written(1)
 
     assert samples(recording) == numbers(10, 60)
-
-
-async def test_what_becomes_of_a_capture_is_told_once(root: Path) -> None:
-    async with running(root) as rig:
-        told: list[Outcome] = []
-        rig.captures.tell(told.append)
-        rig.send(0, 100, {49: raised(10.0)})
-        [recording] = await rig.written(1)
-
-    assert [(outcome.folder, outcome.reason) for outcome in told] == [(recording.folder, None)]
-    assert [event.occurrence for event in told[0].alarms] == [1]
-
-
-async def test_a_capture_that_cannot_be_written_is_told_with_its_reason(root: Path) -> None:
-    async with running(root) as rig:
-        told: list[Outcome] = []
-        rig.captures.tell(told.append)
-        rig.refuse = OSError(28, "No space left on device")
-        rig.send(0, 60, {49: raised(10.0)})
-        await rig.until(lambda: bool(told))
-
-    assert told[0].folder is None
-    assert "No space left on device" in str(told[0].reason)
