@@ -17,7 +17,11 @@ REST_SHARE = 9.0
 
 
 class Retaining:
-    """Deletes what is old, a little of each bearing in turn, in a thread and with rests between."""
+    """Deletes what is old, a little of each bearing in turn, in a thread and with rests between.
+
+    Ages are counted from the newest result where the host's clock is ahead of it: a clock that was
+    set years ahead deletes nothing.
+    """
 
     def __init__(self, store: RetentionStore, limits: RetentionLimits, clock: Clock) -> None:
         self._store, self._limits, self._clock = store, limits, clock
@@ -33,8 +37,12 @@ class Retaining:
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
         """Delete once of each bearing; whether there was anything to delete."""
-        now_ns, found = self._clock.now_ns(), False
+        found = False
         try:
+            newest_ns = await asyncio.to_thread(self._store.newest_ns)
+            if newest_ns is None:
+                return False
+            now_ns = min(self._clock.now_ns(), newest_ns)
             for series in await asyncio.to_thread(self._store.series):
                 pulse.beat(LOOK_S)
                 found |= await self._rested(series, now_ns)

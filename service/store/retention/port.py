@@ -13,6 +13,10 @@ class RetentionStore(Protocol):
         """Numbers of all bearings."""
         ...
 
+    def newest_ns(self) -> int | None:
+        """When the newest result of all was measured; None if there is none."""
+        ...
+
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
         """Delete some of a bearing; whether there was anything to delete."""
         ...

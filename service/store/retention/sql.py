@@ -18,9 +18,19 @@ OLD_LETTERS = """
     SELECT id FROM outbox AS old WHERE state <> 'waiting' AND done_ns < ? AND EXISTS (
         SELECT 1 FROM outbox AS newer WHERE newer.receiver = old.receiver
         AND newer.alarm = old.alarm AND newer.state = old.state AND newer.id > old.id
+    ) AND NOT EXISTS (
+        SELECT 1 FROM alarm_event WHERE alarm_event.alarm = old.alarm
+        AND alarm_event.number = old.number AND alarm_event.time_ns >= ?
     ) ORDER BY id LIMIT ?
 """
-"""The last one of each alarm stays: whether it is to be told that it has returned depends on it."""
+"""The last one of each alarm stays: whether it is to be told that it has returned depends on it.
+What happened lately stays, too: a host that began in 1970 has sent it long ago by its clock."""
+
+NEWEST = """
+    SELECT max(time_ns) FROM (SELECT (
+        SELECT max(time_ns) FROM assessment WHERE assessment.series = series.id
+    ) AS time_ns FROM series) AS newest
+"""
 
 DELETE_LETTER = "DELETE FROM outbox WHERE id = ?"
 
@@ -53,6 +63,12 @@ class SqlRetention:
         with self._reading() as reader:
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
+    def newest_ns(self) -> int | None:
+        """When the newest result of all was measured; None if there is none."""
+        with self._reading() as reader:
+            newest: int | None = reader.execute(NEWEST).fetchone()[0]
+        return newest
+
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
         """Delete some of a bearing; whether there was anything to delete.
 
@@ -76,7 +92,8 @@ class SqlRetention:
         if limits.letters_ns is None:
             return False
         with self._writing() as writer:
-            old = writer.execute(OLD_LETTERS, (now_ns - limits.letters_ns, MAX_LETTERS)).fetchall()
+            before_ns = now_ns - limits.letters_ns
+            old = writer.execute(OLD_LETTERS, (before_ns, before_ns, MAX_LETTERS)).fetchall()
             writer.executemany(DELETE_LETTER, old)
         return len(old) == MAX_LETTERS
 

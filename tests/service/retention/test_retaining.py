@@ -23,6 +23,11 @@ class OldStore:
         self.left = {1: 3, 2: 1}
         self.done: list[int] = []
         self.trouble: str | None = None
+        self.newest: int | None = clock.now_ns()
+        self.asked_ns: int | None = None
+
+    def newest_ns(self) -> int | None:
+        return self.newest
 
     def series(self) -> Sequence[int]:
         return list(self.left)
@@ -31,6 +36,7 @@ class OldStore:
         assert (limits, now_ns <= self._clock.now_ns()) == (LIMITS, True)
         if self.trouble:
             raise StoreError(self.trouble)
+        self.asked_ns = now_ns
         self._step(1.0)
         self.left[series] -= 1
         self.done.append(series)
@@ -72,6 +78,20 @@ async def test_a_store_that_fails_is_asked_again(old: OldStore, stepped_clock: C
     assert not await retaining.round()
     old.trouble = None
     assert await retaining.round()
+
+
+async def test_a_clock_that_is_years_ahead_makes_nothing_old(
+    old: OldStore, stepped_clock: Clock
+) -> None:
+    stepped_clock.step(20.0 * 365.0 * 86_400.0)  # type: ignore[attr-defined]
+    await Retaining(old, LIMITS, stepped_clock).round()
+    assert old.asked_ns == old.newest
+
+
+async def test_where_there_is_no_result_nothing_is_old(old: OldStore, stepped_clock: Clock) -> None:
+    old.newest = None
+    assert not await Retaining(old, LIMITS, stepped_clock).round()
+    assert old.done == []
 
 
 def test_nothing_finer_is_kept_longer_than_what_is_coarser() -> None:

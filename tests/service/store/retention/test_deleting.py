@@ -11,6 +11,7 @@ from rigs.old_results import (
     NOW_NS,
     T0,
     TIERS,
+    Build,
     asked,
     delete_all,
     require_same_hours,
@@ -117,3 +118,35 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
     assert n_rows(path, "outbox") == 3
     with closing(sqlite3.connect(path)) as connection, pytest.raises(sqlite3.IntegrityError):
         connection.execute("DELETE FROM outbox WHERE state = 'waiting'")
+
+
+def test_a_message_of_what_happened_lately_stays_whatever_the_clock_said_then(
+    path: Path, old: SqliteStore
+) -> None:
+    with closing(sqlite3.connect(path)) as connection, connection:
+        for number, event_ns in ((1, T0 - 2 * HOUR_NS), (2, T0), (3, T0)):
+            connection.execute(
+                "INSERT INTO alarm_event (alarm, number, unit, subject, kind, change, state_before,"
+                " state_after, time_ns, occurrence, actor, reason) VALUES"
+                " ('probe', ?, 'U1', '', 'channel_not_ok', 'raised', 'a', 'b', ?, 1, '', '')",
+                (number, event_ns),
+            )
+            connection.execute(
+                "INSERT INTO outbox (receiver, event_id, alarm, number, body, queued_ns, is_urgent,"
+                " is_active, state, done_ns)"
+                " VALUES ('shift', ?, 'probe', ?, '{}', 0, 0, 1, 'delivered', 0)",
+                (f"probe{number}", number),
+            )
+
+    old.retention.prune(RetentionLimits(letters_ns=HOUR_NS), T0 + 1)
+
+    assert n_rows(path, "outbox", "number = 1") == 0
+    assert n_rows(path, "outbox") == 2
+
+
+def test_the_newest_result_of_all_is_known(old: SqliteStore, assessment: Build) -> None:
+    newest = old.retention.newest_ns()
+    assert newest is not None
+    assert T0 < newest < NOW_NS
+    old.append([assessment(newest + 5, bearing="LJB", speed_rpm=1.0)], [])
+    assert old.retention.newest_ns() == newest + 5
