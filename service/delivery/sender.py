@@ -8,6 +8,7 @@ from typing import Literal, TypeVar
 
 import structlog
 
+from acquisition.arrival import Arrival
 from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.delivery.backoff import wait_s
@@ -99,6 +100,7 @@ class Sender:
     def __init__(self, receiver: Receiver, outbox: Outbox, clock: Clock) -> None:
         self.receiver, self.status = receiver, SenderStatus()
         self._outbox, self._clock = outbox, clock
+        self._begun = Arrival.now(clock)
         self._news = asyncio.Event()
         self._pulse: Pulse = UNHEARD
 
@@ -165,7 +167,7 @@ class Sender:
         if before.n_failures == 0:
             log.warning("not delivered", receiver=self.receiver.name, reason=failed.answer)
         await self._kept(lambda: self._outbox.fail(letter.id, failed.answer))
-        await self._expire(failed.answer, now_ns)
+        await self._expire(failed.answer)
         n_failures = before.n_failures + 1
         pause_s = wait_s(n_failures, failed.retry_after_s, self.receiver.max_retry_s)
         self.status = SenderStatus(
@@ -178,11 +180,19 @@ class Sender:
         self._pulse.beat(pause_s)
         await self._clock.sleep(pause_s)
 
-    async def _expire(self, answer: str, now_ns: int) -> None:
-        """Give up what is too old, all of it at once: the receiver has just shown that it fails."""
-        name, before_ns = self.receiver.name, now_ns - ns_from_s(self.receiver.max_age_s)
+    async def _expire(self, answer: str) -> None:
+        """Give up what is too old, all of it at once: the receiver has just shown that it fails.
+
+        A host's clock that was set forward since the start makes nothing older.
+        """
+        now = Arrival.now(self._clock)
+        set_forward_s = max(0.0, now.step_s_since(self._begun))
+        before_ns = now.host_ns - ns_from_s(set_forward_s + self.receiver.max_age_s)
+        name = self.receiver.name
         words = f"too old after: {answer}"
-        n_given_up = await self._kept(lambda: self._outbox.expire(name, before_ns, words, now_ns))
+        n_given_up = await self._kept(
+            lambda: self._outbox.expire(name, before_ns, words, now.host_ns)
+        )
         if n_given_up:
             log.error("given up", receiver=name, n_messages=n_given_up, reason=answer)
 

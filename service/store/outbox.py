@@ -40,8 +40,13 @@ FAIL = """
 """
 EXPIRE = """
     UPDATE outbox SET state = 'expired', answer = ?, done_ns = ?
-    WHERE receiver = ? AND state = 'waiting' AND queued_ns < ?
+    WHERE receiver = ? AND state = 'waiting' AND queued_ns < ? AND NOT EXISTS (
+        SELECT 1 FROM alarm_event WHERE alarm_event.alarm = outbox.alarm
+        AND alarm_event.number = outbox.number AND alarm_event.time_ns >= ?
+    )
 """
+"""What happened lately is not too old, even if it was queued in 1970 by a clock not yet set."""
+
 REVIVE = """
     UPDATE outbox SET state = 'waiting', done_ns = NULL, queued_ns = ?
     WHERE receiver = ? AND state IN ('refused', 'expired')
@@ -93,7 +98,8 @@ class SqlOutbox:
         """Give up what has waited since before a time; return how many."""
         with self._write() as writer:
             words = answer[:MAX_ANSWER]
-            return writer.execute(EXPIRE, (words, now_ns, receiver, before_ns)).rowcount
+            given = (words, now_ns, receiver, before_ns, before_ns)
+            return writer.execute(EXPIRE, given).rowcount
 
     def revive(self, receiver: str, now_ns: int) -> int:
         """Let what was refused or given up wait again, in its old place; return how many."""

@@ -132,7 +132,7 @@ class Outbox(Protocol):
         ...
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Give up what has waited since before a time; return how many."""
+        """Give up what has waited since before a time, and happened before it; return how many."""
         ...
 
     def revive(self, receiver: str, now_ns: int) -> int:

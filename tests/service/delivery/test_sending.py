@@ -207,7 +207,7 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
         room.open_store(),
     )
     store.append([], [], [room.news(n) for n in range(5)])
-    room.clock.ns += 3_601 * 10**9
+    room.clock.ns += 3_610 * 10**9
     store.append([], [], [room.news(5)])
     sender = room.sender(server, store, max_age_s=3600.0)
 
@@ -219,6 +219,38 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
     assert backlog.n_dead == 5
     assert backlog.last_dead is not None
     assert backlog.last_dead.answer == "too old after: 503"
+
+
+YEARS_20_S = 20.0 * 365.0 * 86_400.0
+
+
+async def test_a_clock_that_is_set_forward_gives_nothing_up(room: Any) -> None:
+    server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
+    store = room.open_store()
+    store.append([], [], [room.news(n) for n in range(3)])
+    sender = room.sender(server, store, max_age_s=3600.0)
+    room.clock.wrong_s = YEARS_20_S
+
+    async with room.running(sender):
+        await room.settled(sender, store)
+
+    assert [r.id for r in server.requests] == ["id-0", "id-0", "id-1", "id-2"]
+
+
+async def test_what_was_queued_before_the_clock_was_set_right_is_not_given_up_later(
+    room: Any,
+) -> None:
+    server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
+    store = room.open_store()
+    room.clock.wrong_s = -50.0 * 365.0 * 86_400.0
+    store.append([], [], [room.news(n) for n in range(3)])
+    room.clock.wrong_s = 0.0
+    sender = room.sender(server, store, max_age_s=3600.0)  # as after a restart
+
+    async with room.running(sender):
+        await room.settled(sender, store)
+
+    assert [r.id for r in server.requests] == ["id-0", "id-0", "id-1", "id-2"]
 
 
 async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_order(
