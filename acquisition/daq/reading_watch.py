@@ -3,13 +3,15 @@
 from collections import deque
 
 from acquisition.modbus.ring_layout import U32, RingLayout
+from acquisition.modbus.timeline import ahead
 
 
 class ReadingWatch:
     """Notes what is written and which registers are asked for.
 
-    A slot counts as read when its last register was, and all before it were. A reader that has read
-    the newest slot before it looks at the header again leaves out what it has not read.
+    A slot counts as read when its last register was, and all before it were. A reader that was told
+    of a newest slot and has read it before it looks at the header again leaves out what it has not
+    read up to there. Of slots that came later it knows nothing, though it may read their places.
 
     Attributes
     ----------
@@ -23,24 +25,28 @@ class ReadingWatch:
         self._layout = layout
         self._unread: deque[int] = deque(maxlen=layout.n_slots)
         self._newest = 0
-        self._newest_was_read = False
+        self._told: int | None = None
+        self._told_was_read = False
         self.anything_read = False
         self.waiting = False
 
     def begin_anew(self) -> None:
         """Forget all slots, as an empty ring does."""
         self._unread.clear()
+        self._told, self._told_was_read = None, False
 
     def note_written(self, sequence: int) -> None:
         """Note the newest slot."""
         self._unread.append(sequence)
-        self._newest, self._newest_was_read = sequence, False
+        self._newest = sequence
         self.waiting = False
 
     def note_look(self) -> None:
         """Note that the header is read."""
-        if self._newest_was_read:
-            self._unread.clear()
+        if self._told is not None and self._told_was_read:
+            while self._unread and ahead(self._told, self._unread[0]) >= 0:
+                self._unread.popleft()
+        self._told, self._told_was_read = self._newest, False
         self.waiting = not self._unread
 
     def note_read(self, asked: range) -> None:
@@ -52,7 +58,7 @@ class ReadingWatch:
         while self._unread and self._unread[0] % ring.n_slots in places:
             self._unread.popleft()
             self.anything_read = True
-        self._newest_was_read |= self._newest % ring.n_slots in places
+        self._told_was_read |= self._told is not None and self._told % ring.n_slots in places
 
     @property
     def n_unread(self) -> int:
