@@ -13,7 +13,13 @@ from harness.service_rig import ServiceRig
 
 N_CYCLES = 4
 LIFE_S = 8.0
+LEAST_S = 8.0
+"""Long enough for ten results: a bug in every seventh shows."""
+
 SILENT_S = 12.0
+SHOWN_S = 4.0
+"""Until there are results: before that nothing can be missing, joined or stale."""
+
 N_LOST_SLOTS = 3
 
 
@@ -61,6 +67,7 @@ def test_a_bug_in_the_service_is_found_out(
     plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
 
     def trouble(number: int) -> None:
+        time.sleep(SHOWN_S)
         if number % 4 == 2:
             daq.tell(f"U1 drop {N_LOST_SLOTS}")
         elif number % 4 == 3 and bug == "stale_shown_as_current":
@@ -68,7 +75,7 @@ def test_a_bug_in_the_service_is_found_out(
 
     with ServiceRig(plant_file, "harness.planted_service", environment={"PLANTED": bug}) as rig:
         rng = np.random.default_rng(torture_seed)
-        done = kill_cycles(plant, daq, rig, plant_file, N_CYCLES, rng, LIFE_S, trouble)
+        done = kill_cycles(plant, daq, rig, plant_file, N_CYCLES, rng, LIFE_S, trouble, LEAST_S)
     assert kind in found_kinds(done), done
 
 

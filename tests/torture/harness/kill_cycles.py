@@ -62,8 +62,17 @@ def kill_cycles(
     rng: np.random.Generator,
     life_s: float = LIFE_S,
     trouble: Trouble | None = None,
+    least_s: float = 0.0,
 ) -> Cycles:
-    """Kill a service at random moments; every fourth time within half a second of its start."""
+    """Kill a service at random moments; every fourth time within half a second of its start.
+
+    Parameters
+    ----------
+    life_s, least_s
+        How long it lives on average, when nothing else ends it, and at least.
+    trouble
+        Called in each life with its number.
+    """
     done = Cycles()
     watch = Watch(plant, daq.offered)
     lives: dict[str, list[int]] = {unit: [] for unit in plant.units}
@@ -84,7 +93,7 @@ def kill_cycles(
             watch.wait_for_result()
         if trouble is not None:
             trouble(number)
-        time.sleep(min(rng.exponential(life_s), LONGEST_LIFE_S))
+        time.sleep(min(max(rng.exponential(life_s), least_s), LONGEST_LIFE_S))
         with rig.api() as api:
             act(api, number, watch)
         rig.kill()

@@ -26,7 +26,7 @@ SLOW_S = 1.5
 
 def alarms_forgotten_at_start() -> None:
     """Begin with all alarms normal."""
-    AlarmEngine.restore = lambda self, alarms: None  # type: ignore[method-assign]  # noqa: ARG005
+    AlarmEngine.restore = lambda self, *_: None  # type: ignore[method-assign]  # noqa: ARG005
 
 
 def outage_not_recorded() -> None:
