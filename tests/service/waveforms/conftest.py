@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.standing_clock import StandingClock
 
 from acquisition.raw import RawBlock
 from acquisition.recording.manifest import RecordedChannel, RecordedUnit
@@ -25,17 +26,8 @@ N_SAMPLES, RATE_HZ = 500, 50.0
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 
 
-class Clock:
-    """Time passes when a test says so."""
-
-    def __init__(self) -> None:
-        self.s = 0.0
-
-    def now_ns(self) -> int:
-        return T0 + round(self.s * 1e9)
-
-    def monotonic_s(self) -> float:
-        return self.s
+class Clock(StandingClock):
+    """Time passes when a test says so, or somebody waits."""
 
     async def sleep(self, duration_s: float) -> None:
         self.s += duration_s
