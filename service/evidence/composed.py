@@ -1,7 +1,6 @@
 """The document of a bundle, put together from a snapshot."""
 
 import hashlib
-import json
 from typing import Any
 
 from core.films.film_rules import FilmRules
@@ -20,10 +19,11 @@ from service.settings.plant import PlantFile
 def sealed(document: dict[str, Any]) -> bytes:
     """The document as its file has it, with the hash of all the rest."""
     nobody = "0" * 64
-    whole = Evidence(**document, sha256=nobody).model_dump(mode="json", by_alias=True)
-    whole.pop("sha256")
-    whole["sha256"] = hashlib.sha256(canonical(whole)).hexdigest()
-    return (json.dumps(whole, ensure_ascii=False, allow_nan=False, indent=1) + "\n").encode()
+    blank = Evidence(**document, sha256=nobody)
+    content = blank.model_dump(mode="json", by_alias=True)
+    content.pop("sha256")
+    whole = blank.model_copy(update={"sha256": hashlib.sha256(canonical(content)).hexdigest()})
+    return (whole.model_dump_json(by_alias=True, indent=1) + "\n").encode()
 
 
 def composed(snapshot: Snapshot, maker: Maker) -> dict[str, Any]:

@@ -16,13 +16,8 @@ from service.capture.captures import Captures
 from service.capture.outcome import Outcome
 from service.evidence.capture_link import link, link_all, note_lost
 from service.evidence.configuration import Configuration, keep_configuration
-from service.evidence.folders import (
-    EvidenceLimits,
-    clear_leftovers,
-    make_room,
-    note_beginning,
-    place_of,
-)
+from service.evidence.folders import clear_leftovers, note_beginning, place_of
+from service.evidence.room import EvidenceRoom
 from service.evidence.snapshot import Camera, Snapshot
 from service.evidence.writer import EvidenceWriter
 from service.heartbeats import UNHEARD, Pulse
@@ -67,12 +62,12 @@ class EvidenceKeeper:
         folders: EvidenceFolders,
         camera: Camera,
         writer: EvidenceWriter,
-        limits: EvidenceLimits,
+        room: EvidenceRoom,
         configuration: Configuration,
         captures: Captures,
         clock: Clock,
     ) -> None:
-        self._folders, self._camera, self._writer, self._limits = folders, camera, writer, limits
+        self._folders, self._camera, self._writer, self._room = folders, camera, writer, room
         self._configuration, self._captures, self._clock = configuration, captures, clock
         self._pending: deque[Snapshot] = deque()
         self._outcomes: deque[Outcome] = deque()
@@ -164,17 +159,20 @@ class EvidenceKeeper:
 
     def _write(self, snapshot: Snapshot, with_history: bool) -> None:
         keep_configuration(self._folders.configurations, self._configuration)
-        self._writer.write(snapshot, with_history=with_history)
+        self._room.note(self._writer.write(snapshot, with_history=with_history))
         self.n_written += 1
 
     def _link(self, outcome: Outcome) -> None:
         """In the thread: tell all bundles of what was captured where to find it."""
         for event in outcome.alarms:
-            folder = place_of(self._folders.evidence, event).folder
-            if folder.is_dir() and outcome.folder is None:
-                note_lost(folder, outcome.reason or "no samples arrived")
-            elif folder.is_dir() and outcome.folder is not None and outcome.folder.is_dir():
-                link(folder, outcome.folder)
+            place = place_of(self._folders.evidence, event)
+            if not place.folder.is_dir():
+                continue
+            if outcome.folder is None:
+                note_lost(place.folder, outcome.reason or "no samples arrived")
+            elif outcome.folder.is_dir():
+                link(place.folder, outcome.folder)
+            self._room.note(place)
 
     def _begin(self) -> None:
         """In the thread: keep the configuration, remove and link what a crash has left."""
@@ -185,8 +183,8 @@ class EvidenceKeeper:
         link_all(self._folders.evidence, self._folders.captures)
 
     def _make_room(self) -> None:
-        for gone in make_room(self._folders.evidence, self._limits, self._clock.now_ns()):
-            log.info("evidence is removed to make room", folder=gone.folder.name)
+        for name in self._room.make():
+            log.info("evidence is removed to make room", folder=name)
 
     async def _trying(self, do: Callable[[], None]) -> bool:
         """Do something in the thread; return whether the disk and the store let it."""

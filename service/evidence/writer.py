@@ -5,19 +5,17 @@ from contextlib import suppress
 from pathlib import Path
 
 from core.assessment import Assessment
-from core.units import NS_PER_S
 from service.evidence.compared import cell_of, comparisons
 from service.evidence.comparison_part import ComparisonPart
 from service.evidence.composed import composed, not_known, sealed
 from service.evidence.files import file_part, sync_folder, write_synced
-from service.evidence.folders import DOCUMENT, INCOMPLETE, EvidenceLimits, Place, place_of
+from service.evidence.folders import DOCUMENT, INCOMPLETE, Place, place_of
 from service.evidence.maker import Maker
 from service.evidence.members import members_of
+from service.evidence.room import DAY_NS, EvidenceLimits
 from service.evidence.snapshot import Snapshot
 from service.evidence.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
 from service.store.film_port import FilmQuery, FilmStore
-
-DAY_NS = 86_400 * NS_PER_S
 
 
 class EvidenceWriter:

@@ -10,9 +10,9 @@ from service.cli.made_by import made_by
 from service.evidence.archive import EvidenceArchive
 from service.evidence.configuration import Configuration, built_from, configuration_of
 from service.evidence.desk import EvidenceDesk
-from service.evidence.folders import EvidenceLimits
 from service.evidence.keeper import EvidenceFolders, EvidenceKeeper
 from service.evidence.maker import Maker
+from service.evidence.room import EvidenceLimits, EvidenceRoom
 from service.evidence.snapshot import Camera
 from service.evidence.writer import EvidenceWriter
 from service.films.keeper import FilmKeeper
@@ -55,7 +55,8 @@ def evidence_of(
     maker = Maker(plant, configuration, made_by(), origin)
     writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
     camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
-    return EvidenceKeeper(folders, camera, writer, limits, configuration, captures, clock)
+    room = EvidenceRoom(folders.evidence, limits, clock)
+    return EvidenceKeeper(folders, camera, writer, room, configuration, captures, clock)
 
 
 def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:

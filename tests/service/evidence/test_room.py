@@ -1,13 +1,14 @@
 """Evidence takes no more space than it may, and what is young stays longest."""
 
+import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from service.evidence.folders import EvidenceLimits, clear_leftovers, make_room, places, removed
-
-NOW_NS = 1_767_225_600_000_000_000
-"""2026-01-01."""
+from service.evidence.folders import Place, clear_leftovers, places, removed
+from service.evidence.room import SURVEY_S, EvidenceLimits, EvidenceRoom
 
 KB = b"x" * 1000
 
@@ -21,40 +22,119 @@ OLDEST, OLD, YOUNG, NEWEST = (
 def root(tmp_path: Path) -> Path:
     """Four bundles of a kilobyte."""
     for name in (OLDEST, OLD, YOUNG, NEWEST):
-        folder = tmp_path / "U1" / name
-        folder.mkdir(parents=True)
-        (folder / "evidence.json").write_bytes(KB)
+        bundle(tmp_path, name)
     return tmp_path
 
 
-def left(root: Path, soft: int, hard: int, most: int = 200) -> list[str]:
-    make_room(root, EvidenceLimits(soft, hard, 30.0, most), NOW_NS)
+@pytest.fixture
+def room_of(root: Path, stepped_clock: Any) -> Callable[..., EvidenceRoom]:
+    """Builds what makes room, at the beginning of 2026, by the limits it is given."""
+
+    def build(soft: int, hard: int = 8000, most: int = 200) -> EvidenceRoom:
+        return EvidenceRoom(root, EvidenceLimits(soft, hard, 30.0, most), stepped_clock)
+
+    return build
+
+
+def bundle(root: Path, name: str, content: bytes = KB) -> Place:
+    """A bundle on the disk, as written by hand."""
+    folder = root / "U1" / name
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "evidence.json").write_bytes(content)
+    return next(each for each in places(root, "U1") if each.folder == folder)
+
+
+def left(root: Path) -> list[str]:
     return [each.folder.name for each in places(root)]
 
 
-def test_what_fits_stays(root: Path) -> None:
-    assert left(root, 4000, 8000) == [OLDEST, OLD, YOUNG, NEWEST]
+def test_what_fits_stays(root: Path, room_of: Callable[..., EvidenceRoom]) -> None:
+    assert room_of(4000).make() == []
+    assert left(root) == [OLDEST, OLD, YOUNG, NEWEST]
 
 
-def test_the_oldest_goes_first_and_is_remembered(root: Path) -> None:
-    assert left(root, 3000, 8000) == [OLD, YOUNG, NEWEST]
+def test_the_oldest_goes_first_and_is_remembered(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    assert room_of(3000).make() == [OLDEST]
+    assert left(root) == [OLD, YOUNG, NEWEST]
     assert removed(root, "U1") == [OLDEST]
 
 
-def test_what_is_young_stays_until_the_hard_limit(root: Path) -> None:
-    assert left(root, 1, 8000) == [YOUNG, NEWEST]
-    assert left(root, 1, 1) == [NEWEST]
+@pytest.mark.parametrize(("hard", "kept"), [(8000, [YOUNG, NEWEST]), (1, [NEWEST])])
+def test_what_is_young_stays_until_the_hard_limit(
+    root: Path, room_of: Callable[..., EvidenceRoom], hard: int, kept: list[str]
+) -> None:
+    room_of(1, hard).make()
+    assert left(root) == kept
 
 
-def test_an_alarm_that_chatters_loses_its_own_oldest(root: Path) -> None:
-    other = root / "U1" / "20250101T000000.000Z-LJB-stiffness_x-1"
-    other.mkdir()
-    assert left(root, 8000, 8000, most=2) == [other.name, YOUNG, NEWEST]
+def test_an_alarm_that_chatters_loses_its_own_oldest(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    other = bundle(root, "20250101T000000.000Z-LJB-stiffness_x-1").folder.name
+    assert room_of(8000, most=2).make() == [OLDEST, OLD]
+    assert left(root) == [other, YOUNG, NEWEST]
 
 
-def test_what_is_none_of_ours_is_left_alone(root: Path) -> None:
+def test_a_bundle_that_was_written_makes_its_room(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    room = room_of(4000)
+    assert room.make() == []
+    room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
+    assert room.make() == [OLDEST]
+    assert room.make() == []
+
+
+def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    room = room_of(4500)
+    room.make()
+    room.note(bundle(root, NEWEST, KB + b"x" * 400))
+    assert room.make() == []
+    room.note(bundle(root, NEWEST, KB + b"x" * 600))
+    assert room.make() == [OLDEST]
+
+
+def test_an_alarm_that_begins_to_chatter_is_noticed_without_a_look_at_all(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    room = room_of(8000, most=4)
+    assert room.make() == []
+    room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
+    assert room.make() == [OLDEST]
+
+
+def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
+    root: Path, room_of: Callable[..., EvidenceRoom], stepped_clock: Any
+) -> None:
+    room = room_of(4000)
+    room.make()
+    shutil.rmtree(root / "U1" / OLDEST)
+    stepped_clock.step(SURVEY_S + 1.0)
+    room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
+    assert room.make() == []
+
+
+def test_what_cannot_be_removed_is_looked_for_again(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    room = room_of(3000)
+    (root / "U1" / (OLDEST + ".incomplete")).write_bytes(b"in the way")
+    with pytest.raises(OSError, match=OLDEST):
+        room.make()
+    assert OLDEST in left(root)
+    (root / "U1" / (OLDEST + ".incomplete")).unlink()
+    assert room.make() == [OLDEST]
+
+
+def test_what_is_none_of_ours_is_left_alone(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
     notes = root / "U1" / "my notes"
     notes.mkdir()
     clear_leftovers(root)
-    left(root, 1, 1)
+    room_of(1, 1).make()
     assert notes.is_dir()
