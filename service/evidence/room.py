@@ -101,6 +101,7 @@ class EvidenceRoom:
         if self._surveyed_s is not None and now_s - self._surveyed_s <= SURVEY_S:
             return self._surveyed_s
         self._sizes, self._n_bytes = {}, 0
+        self._crowded.clear()
         for place in places(self._root):
             self.note(place)
         return now_s

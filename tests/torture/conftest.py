@@ -9,6 +9,9 @@ from harness import summary
 N_SHORT = 25
 """By how much the short torture of every test run is less than the whole one."""
 
+SHORT_SOAK_S = 3.0
+"""A soak of every test run; nothing can be said of what grows, but the accounts must close."""
+
 TABLE = Path(__file__).parents[2] / "build" / "torture.txt"
 
 
@@ -16,6 +19,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of ``make torture``; a run of all tests knows none of them."""
     parser.addoption("--torture", action="store_true", help="as long as the issue of it asks for")
     parser.addoption("--torture-seed", type=int, default=1, help="of everything that is random")
+    parser.addoption("--soak-minutes", type=float, default=20.0, help="of the whole torture's soak")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -44,6 +48,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 def torture_seed(pytestconfig: pytest.Config) -> int:
     """Seed of everything that is random."""
     return int(pytestconfig.getoption("--torture-seed", 1))
+
+
+@pytest.fixture(scope="session")
+def soak_s(pytestconfig: pytest.Config, is_whole: bool) -> float:
+    """How long the soak lasts."""
+    return 60.0 * float(pytestconfig.getoption("--soak-minutes")) if is_whole else SHORT_SOAK_S
 
 
 @pytest.fixture(scope="session")

@@ -121,13 +121,24 @@ def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
 def test_what_cannot_be_removed_is_looked_for_again(
     root: Path, room_of: Callable[..., EvidenceRoom]
 ) -> None:
-    room = room_of(3000)
-    (root / "U1" / (OLDEST + ".incomplete")).write_bytes(b"in the way")
+    room, in_the_way = room_of(8000, most=3), root / "U1" / (OLDEST + ".incomplete")
+    in_the_way.write_bytes(b"not a folder")
     with pytest.raises(OSError, match=OLDEST):
         room.make()
     assert OLDEST in left(root)
-    (root / "U1" / (OLDEST + ".incomplete")).unlink()
+    in_the_way.unlink()
     assert room.make() == [OLDEST]
+
+
+def test_all_that_is_taken_away_by_hand_meanwhile_is_no_longer_looked_for(
+    root: Path, room_of: Callable[..., EvidenceRoom]
+) -> None:
+    room = room_of(8000, most=3)
+    (root / "U1" / (OLDEST + ".incomplete")).write_bytes(b"not a folder")
+    with pytest.raises(OSError, match=OLDEST):
+        room.make()
+    shutil.rmtree(root / "U1")
+    assert room.make() == []
 
 
 def test_what_is_none_of_ours_is_left_alone(
