@@ -221,31 +221,26 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
     assert backlog.last_dead.answer == "too old after: 503"
 
 
-YEARS_20_S = 20.0 * 365.0 * 86_400.0
+YEAR_S = 365.0 * 86_400.0
 
 
-async def test_a_clock_that_is_set_forward_gives_nothing_up(room: Any) -> None:
-    server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
-    store = room.open_store()
-    store.append([], [], [room.news(n) for n in range(3)])
-    sender = room.sender(server, store, max_age_s=3600.0)
-    room.clock.wrong_s = YEARS_20_S
-
-    async with room.running(sender):
-        await room.settled(sender, store)
-
-    assert [r.id for r in server.requests] == ["id-0", "id-0", "id-1", "id-2"]
-
-
-async def test_what_was_queued_before_the_clock_was_set_right_is_not_given_up_later(
-    room: Any,
+@pytest.mark.parametrize(
+    ("queued_wrong_s", "sent_wrong_s"),
+    [
+        pytest.param(0.0, 20.0 * YEAR_S, id="set years ahead while it sends"),
+        pytest.param(-50.0 * YEAR_S, 0.0, id="set right before it was started again"),
+    ],
+)
+async def test_a_clock_that_is_set_gives_nothing_up(
+    room: Any, queued_wrong_s: float, sent_wrong_s: float
 ) -> None:
     server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
     store = room.open_store()
-    room.clock.wrong_s = -50.0 * 365.0 * 86_400.0
+    room.clock.wrong_s = queued_wrong_s
     store.append([], [], [room.news(n) for n in range(3)])
     room.clock.wrong_s = 0.0
-    sender = room.sender(server, store, max_age_s=3600.0)  # as after a restart
+    sender = room.sender(server, store, max_age_s=3600.0)
+    room.clock.wrong_s = sent_wrong_s
 
     async with room.running(sender):
         await room.settled(sender, store)
