@@ -7,53 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from rigs.capturing import ALERT, BLOCK, T0, block, recorded_unit
 
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
 from acquisition.recording.reader import open_recording
 from acquisition.recording.writer import RecordingWriter
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.life_cycle import advance
-from core.blocks import SampleBlock
-from core.machine import Measurand
-from core.quality import GOOD, Reason, bad
 from service.capture.file import CaptureFile
 
 RECORDINGS = "/api/v1/recordings"
-START_NS = 1_767_225_600_000_000_000
-N = 10
-ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
 Keep = Callable[..., Path]
-
-
-def block(number: int, unit: str, lost: bool) -> SampleBlock:
-    """Channel a is the number of the sample."""
-    index = np.arange(number * N, (number + 1) * N, dtype=np.float32)
-    return SampleBlock(
-        unit=unit,
-        epoch=1,
-        first_index=number * N,
-        start_ns=START_NS + number * 200_000_000,
-        rate_hz=50.0,
-        samples=np.array([index, -index]),
-        channel_quality=(bad(Reason.SENSOR_FAILURE) if lost else GOOD, GOOD),
-    )
-
-
-def recorded_unit(unit: str) -> RecordedUnit:
-    limits = {"full_scale_v": 10.0, "unit_per_v": 1e7, "ok_min_v": -10.0, "ok_max_v": 10.0}
-    channels = tuple(
-        RecordedChannel(id=id_, measurand=Measurand.DISPLACEMENT_UM, **limits) for id_ in "ab"
-    )
-    return RecordedUnit(
-        unit=unit,
-        rate_hz=50.0,
-        channels=channels,
-        slow_channels=(),
-        sample_type="float32",
-        block_samples=N,
-    )
 
 
 @pytest.fixture
@@ -62,7 +26,7 @@ def keep(tmp_path: Path) -> Keep:
 
     def make(at_s: int, unit: str = "U1", lost: bool = False) -> Path:
         alarm = Alarm(AlarmIdentity(unit, "UJB", AlarmKind.SHAFT_X))
-        _, events = advance(alarm, ALERT, START_NS + at_s * 1_000_000_000, AlarmRule())
+        _, events = advance(alarm, ALERT, T0 + at_s * 1_000_000_000, AlarmRule())
 
         def writer(folder: Path, made_by: str) -> RecordingWriter:
             return RecordingWriter(folder, recorded_unit(unit), made_by)
@@ -110,7 +74,7 @@ async def test_a_recording_is_described_with_its_holes_and_checksums(
 
     manifest = open_recording(folder).manifest
     assert body["recording"]["id"] == folder.name
-    assert (body["n_gaps"], body["n_gap_samples"], body["epochs"]) == (1, N, [1])
+    assert (body["n_gaps"], body["n_gap_samples"], body["epochs"]) == (1, BLOCK, [1])
     assert body["end"] == "2026-01-01T00:00:01.000Z"
     assert [each["id"] for each in body["channels"]] == ["a", "b"]
     assert {each["unit"] for each in body["channels"]} == {"um"}
@@ -144,7 +108,7 @@ async def test_the_samples_of_a_recording_come_as_csv_without_the_missing_ones(
     assert [int(row["index"]) for row in rows] == [*range(30), *range(40, 50)]
     assert [float(row["b [um]"]) for row in rows] == [-float(row["index"]) for row in rows]
     lost = [row["index"] for row in rows if row["a [um]"] == "nan"]
-    assert lost == [str(index) for index in range(N, 2 * N)]
+    assert lost == [str(index) for index in range(BLOCK, 2 * BLOCK)]
 
 
 async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(
