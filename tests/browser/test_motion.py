@@ -25,6 +25,16 @@ HAS_ORBIT = """() => {
   return dots.some((value) => value > 0);
 }"""
 
+DRAWN_WITHOUT_A_SIZE = """async () => {
+  const { orbitPicture } = await import("/static/charts/orbit_picture.js");
+  const trace = [1, 2, 3];
+  const clip = {
+    startS: 0, rate_hz: 1, n_samples: 3, turnS: 1, mark: [], order1: null,
+    shaft_x_um: trace, shaft_y_um: trace, clearance_um: 100, centre_um: [0, 0],
+  };
+  orbitPicture().draw(clip, 2, { turns: 1, whole: true, alone: false, inClearance: true });
+}"""
+
 
 async def await_spectra(page: Page) -> None:
     chart = page.locator("[data-chart=waterfall] .chart")
@@ -197,3 +207,10 @@ async def test_the_last_motion_does_not_pass_for_the_present_one_when_the_link_i
     sentence = page.locator(".player .sentence")
     await expect(sentence).to_contain_text("not the present", timeout=DATA_MS)
     await expect(page.locator("canvas.orbit-canvas")).to_be_visible()
+
+
+async def test_an_orbit_may_be_drawn_before_its_place_on_the_page_has_a_size(
+    running_plant, page
+) -> None:
+    await page.goto(running_plant.url)
+    await page.evaluate(DRAWN_WITHOUT_A_SIZE)

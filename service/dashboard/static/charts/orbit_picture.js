@@ -35,7 +35,8 @@ export function orbitPicture() {
 function planeOf(clip, { inClearance }, width, height) {
   const centre = (inClearance && clip.centre_um) || [0, 0];
   const reach = inClearance ? Math.max(clip.clearance_um, Math.hypot(...centre) + reachOf(clip)) * 1.06 : 1.15 * reachOf(clip);
-  const scale = (Math.min(width, height) / 2 - EDGE_PX) / reach;
+  // a surface that has not got its size yet is smaller than its edges
+  const scale = Math.max(Math.min(width, height) / 2 - EDGE_PX, 0) / reach;
   const at = (x, y) => [width / 2 + x * scale, height / 2 - y * scale];
   return { reach, scale, at, of: (x, y) => (x === null || y === null ? null : at(x + centre[0], y + centre[1])), centre };
 }
