@@ -143,8 +143,8 @@ class EvidenceRoom:
 
 
 def _remember(root: Path, unit: str, names: Iterable[str]) -> None:
-    """Remember what is about to go: what is there all the same is found before its name."""
-    all_names = [*removed(root, unit), *names][-MAX_REMOVED:]
+    """Remember what is about to go, once: what is there all the same is found before its name."""
+    all_names = list(dict.fromkeys((*removed(root, unit), *names)))[-MAX_REMOVED:]
     write_synced(root / unit / REMOVED, "".join(f"{name}\n" for name in all_names).encode())
 
 

@@ -16,6 +16,10 @@ MOST_GROWTH_MIB = 12.0
 """In an hour. What alarms and results leave in caches is less; a leak of one block in a thousand
 would be more: twenty units deliver 3.6 GB of samples an hour."""
 
+MOST_IN_GAPS = 0.1
+"""Share of the samples. A ring holds 1.6 s, so a machine that is held up for longer loses some; one
+that loses more has not been under the load that this is about."""
+
 
 @pytest.mark.timeout(5400)
 def test_a_long_time_under_load_leaves_everything_as_it_was(
@@ -45,3 +49,4 @@ def assert_nothing_grows(done: Soaked) -> None:
     assert memory.may_be_nothing or memory.per_hour <= MOST_GROWTH_MIB, str(memory)
     for name in ("n_files", "n_threads"):
         assert done.growth(name).may_be_nothing, name
+    assert done.n_gap <= MOST_IN_GAPS * done.n_offered

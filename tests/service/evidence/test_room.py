@@ -128,6 +128,7 @@ def test_what_cannot_be_removed_is_looked_for_again(
     assert OLDEST in left(root)
     in_the_way.unlink()
     assert room.make() == [OLDEST]
+    assert removed(root, "U1") == [OLDEST]
 
 
 def test_all_that_is_taken_away_by_hand_meanwhile_is_no_longer_looked_for(
