@@ -1,10 +1,11 @@
 """What holds for every page there is: no complaint, a title, phone width, light and dark."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Locator, Page, expect
 
 AXE = Path(__file__).parent / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
 FIRST_MS = 60_000
@@ -99,16 +100,22 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await picture_of(page, "dark")
 
 
+async def number_with(reading: Locator, unit: str) -> float:
+    """The number of a reading once it is there, and not only the unit that it will have."""
+    number = reading.locator(".number")
+    await expect(reading.locator(".suffix")).to_have_text(unit, timeout=FIRST_MS)
+    await expect(number).to_have_text(re.compile(r"\d"), timeout=FIRST_MS)
+    return float(await number.inner_text())
+
+
 async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(
     running_plant, page
 ) -> None:
     await page.goto(running_plant.url + "#/units/U1/bearings/UJB")
     shaft = page.locator("[data-reading=order1_shaft_x_um_pk]")
-    await expect(shaft.locator(".suffix")).to_have_text("µm pk", timeout=FIRST_MS)
-    before = float(await shaft.locator(".number").inner_text())
+    before = await number_with(shaft, "µm pk")
     await page.get_by_label("Amplitudes").select_option("pp")
-    await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk", timeout=FIRST_MS)
-    after = float(await shaft.locator(".number").inner_text())
+    after = await number_with(shaft, "µm pk-pk")
     assert after / before == pytest.approx(2.0, rel=0.1)  # the machine lives on in between
     chart = page.locator("[data-chart=amplitude-trend] .ytitle")
     await expect(chart).to_have_text("µm pk-pk", timeout=FIRST_MS)
