@@ -16,7 +16,7 @@ from service.bus import Bus
 from service.delivery.facts import Around
 from service.health.page import Health
 from service.health.serving import HealthServer
-from service.heartbeats import Heartbeats, Pulse
+from service.heartbeats import Heartbeats, Loop, Pulse
 from service.http.listening import url_of
 from service.instance import only_one
 from service.metrics.kept import store_info
@@ -24,7 +24,7 @@ from service.metrics.timed import timed_monitors
 from service.metrics.timings import Timings
 from service.notify import NOBODY, ServiceManager
 from service.origin import Origin
-from service.roles.analysis import Analysis, Loop, analysis_on
+from service.roles.analysis import Analysis, analysis_on
 from service.roles.ground import Ground, live_view
 from service.roles.holding import Holds
 from service.roles.leadership import Leadership

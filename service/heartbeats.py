@@ -28,6 +28,10 @@ class Pulse(Protocol):
         ...
 
 
+Loop = Callable[[Pulse], Awaitable[None]]
+"""Something that runs until it is cancelled, and is heard."""
+
+
 @runtime_checkable
 class Audible(Protocol):
     """Something that can be heard working, while one task works with it."""
@@ -90,7 +94,7 @@ class Heartbeats:
         self._clock = clock
         self._pulses: dict[str, HeardPulse] = {}
 
-    async def tend(self, name: str, run: Callable[[Pulse], Awaitable[None]]) -> None:
+    async def tend(self, name: str, run: Loop) -> None:
         """Run a loop and listen to it; once it has returned, it counts as dead."""
         pulse = self._pulses[name] = HeardPulse(self._clock)
         try:

@@ -1,7 +1,7 @@
 """`Analysis`: the parts that turn blocks into stored results, alarms, evidence and messages."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from core.monitor_port import Monitor
@@ -17,7 +17,7 @@ from service.delivery.facts import Around
 from service.evidence.keeper import EvidenceKeeper
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
-from service.heartbeats import Pulse
+from service.heartbeats import Loop
 from service.load.strain import LoadLimits
 from service.load.watch import LoadWatch
 from service.origin import Origin
@@ -42,9 +42,6 @@ from service.wiring.sources import vector_rows
 from service.wiring.space import space_watch
 from service.wiring.tapes import tape_of
 from service.wiring.waveforms import waveform_keeper
-
-Loop = Callable[[Pulse], Awaitable[None]]
-"""Something that runs until it is cancelled, and is heard."""
 
 
 @dataclass(frozen=True)

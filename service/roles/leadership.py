@@ -1,13 +1,13 @@
 """`Leadership`: does what only one process of a plant may do, in whichever process is there."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 
 import structlog
 
 from acquisition.clock import Clock
-from service.heartbeats import Heartbeats, Pulse
+from service.heartbeats import Heartbeats, Loop, Pulse
 from service.store.database import Hold
 from service.store.port import StoreError
 
@@ -18,8 +18,6 @@ SHARED_WORK = "shared work"
 
 TRY_EVERY_S = 2.0
 LOOK_EVERY_S = 1.0
-
-Loop = Callable[[Pulse], Awaitable[None]]
 
 
 class Leadership:

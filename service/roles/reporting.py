@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Collection, Mapping
 
+from service.heartbeats import Loop
 from service.replica.carrying_out import CarryingOut
 from service.replica.process import process_name
 from service.replica.reporter import Reporter
 from service.roles.analysis import Analysis
-from service.roles.leadership import Loop
 
 
 def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:

@@ -1,5 +1,6 @@
 """Twenty units at five times nominal for a long time: nothing grows, and every account closes."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +20,9 @@ would be more: twenty units deliver 3.6 GB of samples an hour."""
 MOST_IN_GAPS = 0.1
 """Share of the samples. A ring holds 1.6 s, so a machine that is held up for longer loses some; one
 that loses more has not been under the load that this is about."""
+
+POOL_THREADS = (os.cpu_count() or 1) + 4
+"""Of asyncio's own pool, which makes one more whenever more are wanted at once than ever before."""
 
 
 @pytest.mark.timeout(5400)
@@ -47,6 +51,6 @@ def test_a_long_time_under_load_leaves_everything_as_it_was(
 def assert_nothing_grows(done: Soaked) -> None:
     memory = done.growth("rss_mib")
     assert memory.may_be_nothing or memory.per_hour <= MOST_GROWTH_MIB, str(memory)
-    for name in ("n_files", "n_threads"):
-        assert done.growth(name).may_be_nothing, name
+    assert done.growth("n_files").may_be_nothing
+    assert done.growth("n_threads").may_be_nothing or done.rise("n_threads") < POOL_THREADS
     assert done.n_gap <= MOST_IN_GAPS * done.n_offered

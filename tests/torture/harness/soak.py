@@ -57,6 +57,11 @@ class Soaked:
         at_s = np.array([usage.at_s for usage in self.settled])
         return slope(at_s, np.array([float(getattr(usage, name)) for usage in self.settled]))
 
+    def rise(self, name: str) -> float:
+        """How much more of something there was in the end than after the warm-up."""
+        first, last = (float(getattr(self.settled[at], name)) for at in (0, -1))
+        return last - first
+
     def most(self, name: str) -> float:
         """The most of something after the warm-up."""
         return max(float(getattr(usage, name)) for usage in self.settled)
