@@ -15,7 +15,6 @@ from service.roles.replica import Replica, replica_context, replica_on
 from service.roles.serving import Serving, serving_of
 from service.roles.stopping import stop_on_signals
 from service.settings.plant import PlantFile
-from service.spare_memory import SpareMemory
 from service.store.port import Store
 from service.supervision import Supervision
 from service.wiring.access import access_desk
@@ -81,11 +80,7 @@ async def _perform(
 ) -> None:
     stopped = stop_on_signals()
     async with asyncio.TaskGroup() as tasks:
-        loops = {
-            "feed": replica.feed.run,
-            "references": replica.references.run,
-            "spare memory": SpareMemory(serving.ground.clock).run,
-        }
+        loops = {"feed": replica.feed.run, "references": replica.references.run}
         beside = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
         server = serving.start(tasks)
         announcing = tasks.create_task(serving.tell(supervision), name="announce")

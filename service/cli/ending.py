@@ -11,6 +11,8 @@ from typing import Any, NoReturn
 import structlog
 import uvloop
 
+from service.heap import return_large_pieces
+
 LEAVE_S = 0.5
 """What threads get to finish in after the program has ended."""
 
@@ -28,6 +30,7 @@ def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
     nobody is there for any more; no thread can be stopped from outside, but the process can.
     """
     sys.setswitchinterval(SWITCH_S)
+    return_large_pieces()
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
         runner.run(program)
         leaving = Timer(LEAVE_S, _leave_threads)

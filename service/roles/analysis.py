@@ -32,7 +32,6 @@ from service.rolling import Rolling
 from service.scrubbing import Scrubbing
 from service.soundness import Soundness
 from service.space.watch import SpaceWatch
-from service.spare_memory import SpareMemory
 from service.waveforms.keeper import WaveformKeeper
 from service.wiring.captures import captures_of
 from service.wiring.delivery import receivers_of
@@ -88,7 +87,6 @@ class Analysis:
             "space": self.space.run,
             "load": self.load.run,
             "soundness": self.soundness.run,
-            "spare memory": SpareMemory(self.ground.clock).run,
         }
         if self.ground.origin is Origin.LIVE:  # what a replay shows is no history of a machine
             loops |= {"learn": self.films.run, "recordings": self.recordings.run}
