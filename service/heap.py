@@ -13,8 +13,8 @@ def return_large_pieces() -> None:
 
     By itself the GNU C library raises the size from which it does so to that of what was given
     back, to 32 MiB at most (mallopt(3)). From then on arrays that come and go with each result lie
-    between pieces that stay, and leave holes there: the memory of a process under load grows for
-    hours although it has no more in use. Another C library is left as it is.
+    between pieces that stay, and leave holes there: the process keeps more than it uses. Another C
+    library is left as it is.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
