@@ -1,9 +1,9 @@
 """The page of accounts and keys: an admin lets people and machines in, and shuts them out again."""
 
+from on_screen import DATA_MS
 from playwright.async_api import Page, expect
 
 ACCESS = "#/access"
-FIRST_MS = 60_000
 NEW = "[data-account=newcomer]"
 FIELDS = ("password", "new-password", "new-password-again")
 
@@ -13,7 +13,7 @@ async def open_access(page: Page, url: str, password: str) -> None:
     await page.get_by_label("Name", exact=True).fill("admin")
     await page.get_by_label("Password", exact=True).fill(password)
     await page.keyboard.press("Enter")
-    await expect(page.locator("[data-account=admin]")).to_be_visible(timeout=FIRST_MS)
+    await expect(page.locator("[data-account=admin]")).to_be_visible(timeout=DATA_MS)
 
 
 async def test_an_admin_adds_changes_and_removes_an_account_by_keys_alone(
@@ -97,7 +97,7 @@ async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
 
 async def test_a_plant_that_nobody_needs_to_log_in_to_says_so(running_plant, page) -> None:
     await page.goto(running_plant.url + ACCESS)
-    await expect(page.locator(".accounts")).to_contain_text("No account yet", timeout=FIRST_MS)
+    await expect(page.locator(".accounts")).to_contain_text("No account yet", timeout=DATA_MS)
     await expect(page.locator(".keys")).to_contain_text("No key yet")
 
 
@@ -116,7 +116,7 @@ async def test_whoever_is_logged_in_changes_his_own_password(
     await again.fill(other)
     await page.keyboard.press("Enter")
     said = page.get_by_text("Your password is changed.")
-    await expect(said).to_be_visible(timeout=FIRST_MS)
+    await expect(said).to_be_visible(timeout=DATA_MS)
     new_context, at = page.context.browser.new_context, f"{guarded_plant.url}api/v1"
     found = await (await new_context()).request.post(
         f"{at}/session", data={"name": "admin", "password": other}

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from on_screen import DATA_MS
 from playwright.async_api import expect
 
 from core.alarms.alarm import AlarmKind, AlarmState
@@ -11,7 +12,6 @@ from core.alarms.event import AlarmChange
 
 LIST = "#/alarms"
 LINK = "[data-alarm='U1:link:link_lost']"
-DATA_MS = 60_000
 
 WORDS = Path(__file__).parents[2] / "service" / "dashboard" / "static" / "alarm_words.js"
 ENTRY = re.compile(r"^  (\w+): \"[^\"]{3,40}\",$", re.MULTILINE)

@@ -1,10 +1,9 @@
 """The page of the audit trail: who did what to what, found again by keyboard."""
 
+from on_screen import DATA_MS, assert_fits
 from playwright.async_api import expect
 
 AUDIT = "#/audit"
-DATA_MS = 60_000
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
 WORDS = """
 async (entry) => {
@@ -78,5 +77,4 @@ async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(
 async def test_the_audit_trail_fits_a_phone(running_plant, phone_page) -> None:
     await phone_page.goto(running_plant.url + AUDIT)
     await expect(phone_page.locator("[data-entry]").first).to_be_visible(timeout=DATA_MS)
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)

@@ -3,9 +3,8 @@
 import asyncio
 import socket
 
+from on_screen import DATA_MS
 from playwright.async_api import expect
-
-DATA_MS = 60_000
 
 RECEIVER = """
 [[delivery.receiver]]

@@ -3,24 +3,22 @@
 import json
 import re
 
-import pytest
+from on_screen import A_NUMBER, DATA_MS, assert_fits, tab_to
 from playwright.async_api import Page, Request, Route, expect
 
 BEARING = "#/units/U1/bearings/UJB"
-A_NUMBER = re.compile(r"\d")
 A_SPREAD = re.compile(r"± \d")
-RESULT_MS = 60_000
 PREFERRED = "stiffness_xx_n_per_m"
 SPREAD = f".tiles [data-reading={PREFERRED}] button.spread"
 SAVED_BUDGET = f"**/budgets/{PREFERRED}"
 
 ROWS = ("dynamic", "transfer_order1", "transfer_vortex", "ratio_order1", "ratio_vortex")
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
+MATCHES = "selector => document.activeElement.matches(selector)"
 
 
 async def open_bearing(page: Page, url: str) -> None:
     await page.goto(url + BEARING)
-    await expect(page.locator(SPREAD)).to_have_text(A_SPREAD, timeout=RESULT_MS)
+    await expect(page.locator(SPREAD)).to_have_text(A_SPREAD, timeout=DATA_MS)
 
 
 async def freeze_budget(page: Page, url: str) -> dict:
@@ -35,14 +33,6 @@ async def freeze_budget(page: Page, url: str) -> dict:
     return json.loads(body)
 
 
-async def focus_by_tab(page: Page, selector: str) -> None:
-    for _ in range(60):
-        await page.keyboard.press("Tab")
-        if await page.evaluate("s => document.activeElement.matches(s)", selector):
-            return
-    pytest.fail(f"the tab key never reaches {selector}")
-
-
 def gn_per_m(value: float) -> str:
     return f"{value / 1e9:.5f} GN/m"
 
@@ -53,7 +43,7 @@ async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(
     complaints = complaints_of(page)
     await open_bearing(page, running_plant.url)
     budget = await freeze_budget(page, running_plant.url)
-    await focus_by_tab(page, SPREAD)
+    await tab_to(page, MATCHES, SPREAD)
     await page.keyboard.press("Enter")
     shown = page.locator(".tiles .budget")
     rows = shown.locator("tbody tr")
@@ -70,7 +60,7 @@ async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(
     )
     await expect(page.locator(SPREAD)).to_have_attribute("aria-expanded", "true")
     await picture_of(page, "budget")
-    await focus_by_tab(page, ".closing")
+    await tab_to(page, MATCHES, ".closing")
     await page.keyboard.press("Enter")
     await expect(shown).to_be_hidden()
     await expect(page.locator(SPREAD)).to_be_focused()
@@ -111,7 +101,7 @@ async def test_a_budget_that_cannot_be_had_says_why(running_plant, page) -> None
     await expect(page.locator(".tiles .budget tbody tr").first).to_be_visible()
     await page.route(SAVED_BUDGET, refuse)
     sentence = page.locator(".tiles .budget .sentence")
-    await expect(sentence).to_have_text("No budget now. No number just now.", timeout=RESULT_MS)
+    await expect(sentence).to_have_text("No budget now. No number just now.", timeout=DATA_MS)
     await expect(page.locator(".tiles .budget table")).to_be_hidden()
 
 
@@ -123,7 +113,7 @@ async def test_all_estimators_stand_side_by_side_and_the_preferred_one_is_named(
     found = [await row.get_attribute("data-estimator") for row in await rows.all()]
     assert found == list(ROWS)
     dynamic = page.locator("[data-estimator=dynamic]")
-    await expect(dynamic.locator("th")).to_have_text("dynamic preferred", timeout=RESULT_MS)
+    await expect(dynamic.locator("th")).to_have_text("dynamic preferred", timeout=DATA_MS)
     for name in ("dynamic_k_xx_n_per_m", "dynamic_c_yy_n_s_per_m"):
         number = page.locator(f".film [data-reading={name}] .number")
         await expect(number).to_have_text(A_NUMBER)
@@ -179,7 +169,7 @@ async def test_the_stiffness_trend_draws_random_uncertainty_apart_and_says_so(
     figure = page.locator("[data-chart=stiffness-trend]")
     await expect(figure.get_by_role("radio", name="Preferred")).to_be_checked()
     caption = figure.locator("figcaption")
-    await expect(caption).to_contain_text("Dotted: random uncertainty", timeout=RESULT_MS)
+    await expect(caption).to_contain_text("Dotted: random uncertainty", timeout=DATA_MS)
     drawn = "node => node.querySelector('.js-plotly-plot, .chart').data.map(t => t.meta ?? t.name)"
     traces = await figure.evaluate(drawn)
     assert traces.count("random") == 2
@@ -191,6 +181,5 @@ async def test_an_open_budget_fits_a_phone(running_plant, phone_page, picture_of
     await open_bearing(phone_page, running_plant.url)
     await phone_page.locator(".estimators button.spread:visible").first.click()
     await expect(phone_page.locator(".estimators .budget tbody tr").first).to_be_visible()
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)
     await picture_of(phone_page, "budget")

@@ -1,18 +1,16 @@
 """What holds for every page there is: no complaint, a title, phone width, light and dark."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Locator, Page, expect
+from on_screen import DATA_MS, assert_fits, number_with
+from playwright.async_api import Page, expect
 
 AXE = Path(__file__).parent / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
-FIRST_MS = 60_000
 SEGMENTS = {":unit": "U1", ":bearing": "UJB"}
 
 PATTERNS = "import('/static/pages.js').then(({ PAGES }) => PAGES.map(({ pattern }) => pattern))"
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 WAITING = "Asking the service."
 BAND = "getComputedStyle(document.body).backgroundColor"
 CHECK = "axe.run(document, { rules: { 'target-size': { enabled: true } } })"
@@ -33,10 +31,10 @@ async def addresses(page: Page, url: str) -> list[str]:
 
 async def settled(page: Page) -> None:
     """Wait until a page has had the answers that it opens with."""
-    await expect(page.locator("#service")).to_contain_text("Service answered", timeout=FIRST_MS)
+    await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)
     await expect(page.locator("#main").get_by_role("heading").first).to_be_attached()
     waiting = page.locator("#main").get_by_text(WAITING).filter(visible=True)
-    await expect(waiting).to_have_count(0, timeout=FIRST_MS)
+    await expect(waiting).to_have_count(0, timeout=DATA_MS)
 
 
 async def test_every_page_opens_without_a_complaint_and_under_a_title_of_its_own(
@@ -58,8 +56,7 @@ async def test_no_page_scrolls_sideways_on_a_phone(running_plant, phone_page, pi
     for address in await addresses(phone_page, running_plant.url):
         await phone_page.goto(running_plant.url + address)
         await settled(phone_page)
-        width, visible = await phone_page.evaluate(WIDTHS)
-        assert width <= visible, address
+        await assert_fits(phone_page)
         await picture_of(phone_page, "-".join(address.split("/")[1:]) or "overview")
 
 
@@ -91,21 +88,13 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.reload()
     assert await page.evaluate(BAND) == light
     grid = page.locator("[data-chart=spectrum] .chart path.xgrid").first
-    await expect(grid).to_be_attached(timeout=FIRST_MS)
+    await expect(grid).to_be_attached(timeout=DATA_MS)
     stroke = "node => node.style.stroke"
     drawn = await grid.evaluate(stroke)
     await page.get_by_label("Look").select_option("system")
     assert await page.evaluate(BAND) == dark
     await page.wait_for_function(REDRAWN, arg=drawn)
     await picture_of(page, "dark")
-
-
-async def number_with(reading: Locator, unit: str) -> float:
-    """The number of a reading once it is there, and not only the unit that it will have."""
-    number = reading.locator(".number")
-    await expect(reading.locator(".suffix")).to_have_text(unit, timeout=FIRST_MS)
-    await expect(number).to_have_text(re.compile(r"\d"), timeout=FIRST_MS)
-    return float(await number.inner_text())
 
 
 async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(
@@ -118,6 +107,6 @@ async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(
     after = await number_with(shaft, "µm pk-pk")
     assert after / before == pytest.approx(2.0, rel=0.1)  # the machine lives on in between
     chart = page.locator("[data-chart=amplitude-trend] .ytitle")
-    await expect(chart).to_have_text("µm pk-pk", timeout=FIRST_MS)
+    await expect(chart).to_have_text("µm pk-pk", timeout=DATA_MS)
     await page.reload()
-    await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk", timeout=FIRST_MS)
+    await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk", timeout=DATA_MS)

@@ -7,9 +7,9 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from on_screen import DATA_MS
 from playwright.async_api import Page, Request, expect
 
-DATA_MS = 60_000
 STIFFNESS = "[data-chart=trend-film-stiffness-gn-m]"
 COMPARED = "#/trends?b=U1/UJB&b=U1/LJB&q=stiffness_xx_n_per_m"
 CURVES = ".chart .scatterlayer .trace path.js-line"

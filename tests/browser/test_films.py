@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from on_screen import assert_fits
 from playwright.async_api import Page, expect
 
 FILM = "#/units/U1/bearings/UJB/film"
@@ -13,7 +14,6 @@ WORDS = re.compile(
     "Normal|Alert|Danger|Gathering evidence|No baseline|Not enough excitation|Reading doubted"
     "|Not settled"
 )
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
 
 async def await_charts(page: Page) -> None:
@@ -138,6 +138,5 @@ async def test_films_fit_a_phone(living_plant, phone_page, picture_of, address) 
     await expect(phone_page.locator(".verdict .mark").first).to_contain_text(WORDS, timeout=DATA_MS)
     if address == FILM:
         await await_charts(phone_page)
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)
     await picture_of(phone_page, "film" if address == FILM else "bearing")

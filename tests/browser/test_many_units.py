@@ -3,11 +3,11 @@
 import copy
 from typing import Any
 
+from on_screen import DATA_MS
 from playwright.async_api import Page, Route, expect
 
 N_UNITS = 20
 LOST = 7
-FIRST_MS = 60_000
 SIZE = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
 
 
@@ -31,7 +31,7 @@ async def twenty_of_one(route: Route) -> None:
 async def see(page: Page, url: str) -> None:
     await page.route("**/api/v1/overview", twenty_of_one)
     await page.goto(url)
-    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=FIRST_MS)
+    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=DATA_MS)
 
 
 async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
@@ -39,7 +39,7 @@ async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
 ) -> None:
     await see(page, running_plant.url)
     stiffness = page.locator("[data-unit=U20] [data-bearing=UJB] .number").first
-    await expect(stiffness).not_to_have_text("—", timeout=FIRST_MS)
+    await expect(stiffness).not_to_have_text("—", timeout=DATA_MS)
     width, height = await page.evaluate(SIZE)
     assert (width, height) == (1280, 800)
     lost = page.locator(f"[data-unit=U{LOST}] .tile-head .mark").filter(visible=True)

@@ -5,13 +5,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from on_screen import DATA_MS, assert_fits
 from playwright.async_api import Page, expect
 
 SPECTRA = "#/units/U1/bearings/UJB/waterfall"
 ORBITS = "#/units/U1/bearings/UJB/orbits"
 RECORDING = Path(__file__).parents[1] / "recordings" / "part_load"
-DATA_MS = 60_000
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 TWO_FRAMES = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 SECOND_SPECTRUM = "() => Number(document.querySelector('#moment')?.max) > 0"
 AT = "() => Number(document.querySelector('#orbit-at').value)"
@@ -190,8 +189,7 @@ async def test_spectra_and_orbits_fit_a_phone(
     await phone_page.goto(running_plant.url + address)
     await (await_spectra if address == SPECTRA else await_orbit)(phone_page)
 
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)
     await picture_of(phone_page, address.rpartition("/")[2])
 
 

@@ -1,13 +1,11 @@
 """What a page says is what the API says, to the last digit shown; nothing else passes for it."""
 
 import json
-import re
 
+from on_screen import A_NUMBER, DATA_MS
 from playwright.async_api import Page, Route, expect
 
 BEARING = "#/units/U1/bearings/UJB"
-A_NUMBER = re.compile(r"\d")
-HAS_STIFFNESS_MS = 60_000
 N_NUMBERS = 57
 """Two preferred, seven of operation and gaps, four of the shaft centre, 13 for each of two orders
 (amplitudes, coherence, frequency, equation (5), transfer), four phases, five broad-band, and
@@ -92,7 +90,7 @@ def spread(name: str, reading: dict) -> str:
 async def await_stiffness(page: Page) -> None:
     for name in ("stiffness_xx_n_per_m", "order1_k_eff_xx_n_per_m"):
         number = page.locator(f"[data-reading={name}] .number").first
-        await expect(number).to_have_text(A_NUMBER, timeout=HAS_STIFFNESS_MS)
+        await expect(number).to_have_text(A_NUMBER, timeout=DATA_MS)
 
 
 async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(

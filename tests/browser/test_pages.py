@@ -1,16 +1,13 @@
 """The pages as such: charts, console, keyboard, narrow screens."""
 
-import re
 
 import pytest
+from on_screen import A_NUMBER, DATA_MS, assert_fits, tab_to
 from playwright.async_api import Page, expect
 
 BEARING = "#/units/U1/bearings/UJB"
 CHARTS = ("stiffness-trend", "amplitude-trend", "orbit", "centre", "spectrum")
-A_NUMBER = re.compile(r"\d")
-DATA_MS = 60_000
-
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
+SAYS = "wanted => (document.activeElement.value || document.activeElement.textContent) === wanted"
 
 
 async def await_charts(page: Page) -> None:
@@ -51,29 +48,19 @@ async def test_a_phone_never_scrolls_sideways(
     await expect(phone_page.locator(".number").first).to_have_text(A_NUMBER, timeout=DATA_MS)
     if address:
         await await_charts(phone_page)
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)
     await picture_of(phone_page, "bearing" if address else "overview")
 
 
 async def test_an_operator_needs_no_mouse(running_plant, page) -> None:
     await page.goto(running_plant.url)
     await expect(page.locator("[data-bearing=UJB]")).to_be_visible()
-    await focus_by_tab(page, "UJB")
+    await tab_to(page, SAYS, "UJB")
     await page.keyboard.press("Enter")
     await expect(page.locator("h1")).to_contain_text("UJB")
-    await focus_by_tab(page, "900")
+    await tab_to(page, SAYS, "900")
     await page.keyboard.press("ArrowRight")
     await expect(page.get_by_role("radio", name="1 h")).to_be_checked()
-
-
-async def focus_by_tab(page: Page, wanted: str) -> None:
-    for _ in range(60):
-        await page.keyboard.press("Tab")
-        words = "document.activeElement.value || document.activeElement.textContent"
-        if await page.evaluate(words) == wanted:
-            return
-    pytest.fail(f"the tab key never reaches {wanted}")
 
 
 async def test_an_unknown_bearing_is_named_and_leads_back(running_plant, page) -> None:

@@ -1,9 +1,9 @@
 """The page of recordings and reports while there are none; with an alarm see `test_evidence`."""
 
+from on_screen import assert_fits
 from playwright.async_api import expect
 
 RECORDINGS = "#/recordings"
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
 
 async def test_a_plant_without_alarms_says_why_nothing_has_been_recorded(
@@ -19,5 +19,4 @@ async def test_a_plant_without_alarms_says_why_nothing_has_been_recorded(
 async def test_recordings_fit_a_phone(running_plant, phone_page) -> None:
     await phone_page.goto(running_plant.url + RECORDINGS)
     await expect(phone_page.locator(".reports")).to_contain_text("None yet")
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)

@@ -2,12 +2,11 @@
 
 import re
 
+from on_screen import DATA_MS, assert_fits
 from playwright.async_api import expect
 
 SOURCES = "#/sources"
 ROW = "[data-source=U1]"
-DATA_MS = 60_000
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
 JUDGE = """
 async ([changes, alarms, lost]) => {
@@ -89,5 +88,4 @@ async def test_sources_fit_a_phone(running_plant, phone_page) -> None:
     await phone_page.goto(running_plant.url + SOURCES)
     await expect(phone_page.locator(ROW)).to_contain_text("Connected", timeout=DATA_MS)
     await phone_page.get_by_role("button", name="Details").click()
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)

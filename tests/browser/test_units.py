@@ -1,13 +1,10 @@
 """The page of a unit: its bearings side by side, what is wrong with it, and the way on."""
 
-import re
 
+from on_screen import A_NUMBER, DATA_MS, assert_fits
 from playwright.async_api import Page, Response, expect
 
 UNIT = "#/units/U1"
-DATA_MS = 60_000
-A_NUMBER = re.compile(r"\d")
-WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 HREFS = "links => links.map(link => link.getAttribute('href'))"
 LEADS_SOMEWHERE = """
 async (addresses) => {
@@ -70,8 +67,7 @@ async def test_the_keyboard_leads_from_the_plant_to_a_unit_and_to_its_bearing(
 async def test_a_unit_fits_a_phone(running_plant, phone_page) -> None:
     await phone_page.goto(running_plant.url + UNIT)
     await expect(phone_page.locator(OIL).first).to_have_text(A_NUMBER, timeout=DATA_MS)
-    width, visible = await phone_page.evaluate(WIDTHS)
-    assert width <= visible
+    await assert_fits(phone_page)
 
 
 async def test_an_unknown_unit_is_named_and_leads_back(running_plant, page) -> None:
