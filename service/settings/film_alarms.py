@@ -168,7 +168,7 @@ class FilmAlarmSettings(Settings):
 
     acceptance: Literal["automatic", "by_engineer"] = "automatic"
     """Whether a learned baseline is put in force by padwatch ("automatic"), as long as it agrees
-    with the one before, or only "by_engineer"."""
+    with the first that was accepted and the film did not drift meanwhile, or only "by_engineer"."""
 
     latching: bool = False
     """Whether an alarm stays until it is reset after its change has gone."""

@@ -17,7 +17,7 @@ TABLE = Path(__file__).parents[2] / "build" / "torture.txt"
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of ``make torture``; a run of all tests knows none of them."""
-    parser.addoption("--torture", action="store_true", help="as long as the issue of it asks for")
+    parser.addoption("--torture", action="store_true", help="the whole of it, for hours")
     parser.addoption("--torture-seed", type=int, default=1, help="of everything that is random")
     parser.addoption("--soak-minutes", type=float, default=20.0, help="of the whole torture's soak")
 
