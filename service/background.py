@@ -10,6 +10,9 @@ log = structlog.get_logger()
 LOOK_S = 20.0
 """Between heartbeats during a long rest."""
 
+MOST_REST_S = 120.0
+"""After one piece of work."""
+
 
 class TroubleLog:
     """Logs when something begins to fail, and when it ceases to; not each time between.
@@ -36,6 +39,14 @@ class TroubleLog:
 async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
     """Rest, and be heard meanwhile."""
     until_s = clock.monotonic_s() + duration_s
-    while clock.monotonic_s() < until_s:
+    while (left_s := until_s - clock.monotonic_s()) > 0.0:
         pulse.beat(LOOK_S)
-        await clock.sleep(LOOK_S)
+        await clock.sleep(min(left_s, LOOK_S))
+
+
+async def rest_after(taken_s: float, share: float, clock: Clock, pulse: Pulse) -> None:
+    """Rest so many times as long as the work took, and be heard meanwhile.
+
+    A disk that stood still says nothing of how much work it was: the rest is bounded.
+    """
+    await rest(min(share * taken_s, MOST_REST_S), clock, pulse)

@@ -3,7 +3,7 @@
 import asyncio
 
 from acquisition.clock import Clock
-from service.background import LOOK_S, TroubleLog, rest
+from service.background import LOOK_S, TroubleLog, rest, rest_after
 from service.heartbeats import UNHEARD, Pulse
 from service.store.port import StoreError
 from service.store.retention.limits import RetentionLimits
@@ -45,7 +45,7 @@ class Retaining:
             now_ns = min(self._clock.now_ns(), newest_ns)
             for series in await asyncio.to_thread(self._store.series):
                 pulse.beat(LOOK_S)
-                found |= await self._rested(series, now_ns)
+                found |= await self._rested(series, now_ns, pulse)
             found |= await asyncio.to_thread(self._store.prune, self._limits, now_ns)
             found |= await asyncio.to_thread(self._store.give_back)
         except StoreError as error:
@@ -54,8 +54,9 @@ class Retaining:
         self._trouble.note(None)
         return found
 
-    async def _rested(self, series: int, now_ns: int) -> bool:
+    async def _rested(self, series: int, now_ns: int, pulse: Pulse) -> bool:
         begun_s = self._clock.monotonic_s()
         found = await asyncio.to_thread(self._store.delete, series, self._limits, now_ns)
-        await self._clock.sleep(REST_SHARE * (self._clock.monotonic_s() - begun_s))
+        taken_s = self._clock.monotonic_s() - begun_s
+        await rest_after(taken_s, REST_SHARE, self._clock, pulse)
         return found

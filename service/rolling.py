@@ -3,7 +3,7 @@
 import asyncio
 
 from acquisition.clock import Clock
-from service.background import TroubleLog
+from service.background import TroubleLog, rest_after
 from service.heartbeats import UNHEARD, Pulse
 from service.store.port import StoreError
 from service.store.rollups.port import RollupStore
@@ -40,7 +40,8 @@ class Rolling:
                 pulse.beat(PERIOD_S)
                 begun_s = self._clock.monotonic_s()
                 await asyncio.to_thread(self._rollups.gather, series, now_ns)
-                await self._clock.sleep(REST_SHARE * (self._clock.monotonic_s() - begun_s))
+                taken_s = self._clock.monotonic_s() - begun_s
+                await rest_after(taken_s, REST_SHARE, self._clock, pulse)
         except StoreError as error:
             self._trouble.note(str(error))
             return False

@@ -3,7 +3,7 @@
 import asyncio
 
 from acquisition.clock import Clock
-from service.background import LOOK_S, TroubleLog, rest
+from service.background import LOOK_S, TroubleLog, rest, rest_after
 from service.heartbeats import UNHEARD, Pulse
 from service.store.integrity_port import Integrity
 from service.store.port import StoreError
@@ -29,10 +29,10 @@ class Scrubbing:
         """Look for ever."""
         while True:
             pulse.beat(LOOK_S)
-            if await self.look():
+            if await self.look(pulse):
                 await rest(PERIOD_S, self._clock, pulse)
 
-    async def look(self) -> bool:
+    async def look(self, pulse: Pulse = UNHEARD) -> bool:
         """Look at some rows and rest; whether that was once around."""
         begun_s = self._clock.monotonic_s()
         try:
@@ -43,5 +43,5 @@ class Scrubbing:
             return False
         self._trouble.note(None)
         taken_s = self._clock.monotonic_s() - begun_s
-        await self._clock.sleep(max(LEAST_REST_S, REST_SHARE * taken_s))
+        await rest_after(max(LEAST_REST_S / REST_SHARE, taken_s), REST_SHARE, self._clock, pulse)
         return is_around

@@ -44,10 +44,14 @@ class Deliveries:
     async def run(self, beats: Heartbeats | None = None) -> None:
         """Deliver for ever."""
         beats = beats or Heartbeats(self._clock)
-        async with asyncio.TaskGroup() as tasks:
-            for sender in self._senders:
-                name = f"deliver {sender.receiver.name}"
-                tasks.create_task(beats.tend(name, sender.run), name=name)
+        loops = {f"deliver {sender.receiver.name}": sender.run for sender in self._senders}
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                for name, loop in loops.items():
+                    tasks.create_task(beats.tend(name, loop), name=name)
+        except asyncio.CancelledError:
+            beats.release(*loops)  # another process of the plant delivers from now on
+            raise
 
     def wake(self) -> None:
         """Say that there may be something new in the outbox."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition.clock import Clock
 from core.units import NS_PER_S
 from service.evidence.clock_words import compact
-from service.evidence.files import sync_folder, write_synced
+from service.evidence.files import sync_folder, write_whole
 from service.evidence.folders import INCOMPLETE, REMOVED, Place, places, removed
 
 MAX_REMOVED = 10_000
@@ -145,7 +145,7 @@ class EvidenceRoom:
 def _remember(root: Path, unit: str, names: Iterable[str]) -> None:
     """Remember what is about to go, once: what is there all the same is found before its name."""
     all_names = list(dict.fromkeys((*removed(root, unit), *names)))[-MAX_REMOVED:]
-    write_synced(root / unit / REMOVED, "".join(f"{name}\n" for name in all_names).encode())
+    write_whole(root / unit / REMOVED, "".join(f"{name}\n" for name in all_names).encode())
 
 
 def _remove(folder: Path) -> None:

@@ -18,6 +18,7 @@ from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.store.conditions import BETWEEN_BOUNDS, IN_STATES
 from service.store.database import Connection
 from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision
+from service.store.moments import free_moment
 from service.store.port import StoreError
 from service.store.series import series_of
 
@@ -43,6 +44,10 @@ INSERT = (
     f" VALUES ({', '.join('?' * len(COLUMNS))})"
     " ON CONFLICT (series, estimator, time_ns) DO NOTHING"
 )
+MEASURED_THEN = f"""
+    SELECT {", ".join(CONDITION_COLUMNS)} FROM film_reading
+    WHERE series = ? AND estimator = ? AND time_ns = ?
+"""  # noqa: S608
 REMEMBER = """
     INSERT INTO film_decision VALUES (?, ?, ?, ?, ?)
     ON CONFLICT (series, direction) DO UPDATE SET
@@ -90,7 +95,7 @@ def insert_film_news(
     for told in news:
         reading = told.reading
         series = series_of(writer, reading.unit, reading.bearing)
-        writer.execute(INSERT, _row(series, told, provenance))
+        writer.execute(INSERT, _row(writer, series, told, provenance))
         for direction, finding, decision in zip(
             DIRECTIONS, told.findings, told.decisions, strict=True
         ):
@@ -99,12 +104,17 @@ def insert_film_news(
             writer.execute(REMEMBER, (series, direction, reading.estimator, version, document))
 
 
-def _row(series: int, news: FilmNews, provenance: Provenance) -> tuple[object, ...]:
+def _row(
+    writer: Connection, series: int, news: FilmNews, provenance: Provenance
+) -> tuple[object, ...]:
     reading = news.reading
+    key = (series, reading.estimator.value)
+    measured = tuple(_or_null(getattr(reading, name)) for name in CONDITION_COLUMNS)
     return (
-        *(series, reading.estimator.value, reading.time_ns, provenance.value),
+        *(*key, free_moment(writer, MEASURED_THEN, key, reading.time_ns, measured)),
+        provenance.value,
         *(int(reading.condition.state), int(reading.condition.is_settled)),
-        *(_or_null(getattr(reading, name)) for name in CONDITION_COLUMNS),
+        *measured,
         *(
             cell
             for value, finding in zip(reading.values, news.findings, strict=True)

@@ -23,6 +23,7 @@ from service.store.film_readings import insert_film_news
 from service.store.films import SqlFilms
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity, Unmarked
+from service.store.moments import free_moment
 from service.store.newest import select_newest
 from service.store.outbox import SqlOutbox
 from service.store.outbox_port import Address, nobody
@@ -56,6 +57,9 @@ MAX_GAPS = 5000
 INSERT_ASSESSMENT = """
     INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
     ON CONFLICT (series, time_ns) DO NOTHING
+"""
+MEASURED_THEN = """
+    SELECT epoch, first_index, stop_index FROM assessment WHERE series = ? AND time_ns = ?
 """
 INSERT_GAP = """
     INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns, start_ns, is_estimated)
@@ -135,8 +139,8 @@ class SqlStore:
             If nothing was written; the message is the database's.
         """
         with self._writing() as writer:
-            rows = [self._row(writer, assessment) for assessment in assessments]
-            writer.executemany(INSERT_ASSESSMENT, rows)
+            for assessment in assessments:
+                writer.execute(INSERT_ASSESSMENT, self._row(writer, assessment))
             insert_spectra(writer, assessments, self._spectra_limits)
             writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
             insert_alarms(writer, alarms, self._chain.add, self._address)
@@ -213,15 +217,15 @@ class SqlStore:
 
     def _row(self, writer: Connection, assessment: Assessment) -> tuple[object, ...]:
         values, qualities = self._layout.encode(assessment.readings)
-        condition = assessment.condition
+        condition, window = assessment.condition, assessment.window
+        series = series_of(writer, assessment.unit, assessment.bearing)
+        measured = (window.epoch, window.first_index, window.stop_index)
         return (
-            series_of(writer, assessment.unit, assessment.bearing),
-            assessment.time_ns,
-            assessment.window.epoch,
-            assessment.window.first_index,
-            assessment.window.stop_index,
-            assessment.window.n_segments,
-            assessment.window.coverage,
+            series,
+            free_moment(writer, MEASURED_THEN, (series,), assessment.time_ns, measured),
+            *measured,
+            window.n_segments,
+            window.coverage,
             assessment.speed_source.value,
             assessment.readings["eccentricity_ratio"].value,
             assessment.readings["oil_temperature_c"].value,

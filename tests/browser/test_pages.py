@@ -1,6 +1,5 @@
 """The pages as such: charts, console, keyboard, narrow screens."""
 
-
 import pytest
 from on_screen import A_NUMBER, DATA_MS, assert_fits, tab_to
 from playwright.async_api import Page, expect

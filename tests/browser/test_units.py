@@ -1,6 +1,5 @@
 """The page of a unit: its bearings side by side, what is wrong with it, and the way on."""
 
-
 from on_screen import A_NUMBER, DATA_MS, assert_fits
 from playwright.async_api import Page, Response, expect
 

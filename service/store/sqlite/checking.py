@@ -59,10 +59,11 @@ def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iter
         with closing(
             sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None)
         ) as reader:
+            mark = _mark_inside(reader)  # now: a running service moves both on
             yield from _structure(reader)
             seals.know(reader)
             _look_at_rows(reader, seals, log, told)
-            mark = select_mark(reader)
+            mark = mark or select_mark(reader)
             if mark is not None:
                 for found in compared(said, mark, host_id()):
                     yield Finding("high_water", found.detail)
@@ -76,6 +77,13 @@ def _mark_beside(path: Path) -> Mark | str:
         return MarkFile(mark_path(path)).read()
     except MarkError as error:
         return str(error)
+
+
+def _mark_inside(reader: sqlite3.Connection) -> Mark | None:
+    try:
+        return select_mark(reader)
+    except (sqlite3.Error, UnicodeDecodeError):
+        return None  # asked again at the end: damage elsewhere is told all the same
 
 
 def _structure(reader: sqlite3.Connection) -> Iterator[Finding]:

@@ -1,6 +1,7 @@
 """`Scrubber`: looks at every row in turn, a few at a time, for damage that nobody has met."""
 
 import json
+import re
 from typing import Any
 
 from service.store.database import Connection, Database
@@ -13,6 +14,7 @@ from service.store.sqlite.walking import Key, Walk, walks
 ROWS_AT_ONCE = 500
 """A few milliseconds, after which the log beside the file may be brought into it."""
 
+HEX = "hex"
 REMEMBER_EVERY = 300
 """Looks, after which it is written down how far it has come."""
 
@@ -76,7 +78,8 @@ class Scrubber:
 
     def _remember(self) -> None:
         walk = self._walks[self._number]
-        written = json.dumps([walk.table.name, walk.is_of_seals, self._after])
+        after = None if self._after is None else [_told(cell) for cell in self._after]
+        written = json.dumps([walk.table.name, walk.is_of_seals, after])
         with self._database.writing() as writer:
             writer.execute(REMEMBER, (written,))
 
@@ -90,12 +93,26 @@ def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
         return 0, None
     for number, walk in enumerate(ways):
         if (walk.table.name, walk.is_of_seals) == (name, is_of_seals) and _is_key(walk, after):
-            return number, None if after is None else tuple(after)
+            return number, None if after is None else tuple(_cell(told) for told in after)
     return 0, None
+
+
+def _told(cell: Any) -> Any:
+    """A cell of a key as JSON can hold it; the keys of sessions are bytes."""
+    return {HEX: cell.hex()} if isinstance(cell, bytes) else cell
+
+
+def _cell(told: Any) -> Any:
+    return bytes.fromhex(told[HEX]) if isinstance(told, dict) else told
 
 
 def _is_key(walk: Walk, after: Any) -> bool:
     if after is None:
         return True
     fits = isinstance(after, list) and len(after) == len(walk.table.key)
-    return fits and all(isinstance(cell, int | float | str) for cell in after)
+    return fits and all(isinstance(told, int | float | str) or _is_hex(told) for told in after)
+
+
+def _is_hex(told: Any) -> bool:
+    is_one = isinstance(told, dict) and list(told) == [HEX] and isinstance(told[HEX], str)
+    return is_one and re.fullmatch("([0-9a-f]{2})*", told[HEX]) is not None

@@ -5,13 +5,15 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 from core.assessment import Assessment
 from service.cli.commands import app
-from service.store.sqlite import SqliteStore
+from service.store.highwater.comparison import MAX_BEHIND
+from service.store.sqlite import SqliteStore, checking
 
 Build = Callable[..., Assessment]
 T0 = 1_767_225_600_000_000_000
@@ -62,6 +64,23 @@ def test_a_database_that_was_rolled_back_is_told(plant: Path) -> None:
     assert result.exit_code == 1
     assert "high_water: the database was rolled back" in result.stdout
     assert "NOT WHOLE: 1 high_water" in result.stdout
+
+
+def test_a_service_that_writes_meanwhile_is_no_fault(
+    plant: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look_at_rows = checking._look_at_rows
+    with closing(SqliteStore(plant.parent / "data" / "padwatch.sqlite3")) as store:
+
+        def slowly(*args: Any) -> None:
+            for n in range(MAX_BEHIND + 2):
+                store.append([assessment(T0 + 100 + n)], [])
+            look_at_rows(*args)
+
+        monkeypatch.setattr(checking, "_look_at_rows", slowly)
+        result = CliRunner().invoke(app, ["store", "check", str(plant)])
+
+    assert result.exit_code == 0, result.output
 
 
 def test_a_plant_without_a_database_is_told(plant: Path) -> None:

@@ -1,5 +1,7 @@
 """Evidence takes no more space than it may, and what is young stays longest."""
 
+import errno
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -150,3 +152,19 @@ def test_what_is_none_of_ours_is_left_alone(
     clear_leftovers(root)
     room_of(1, 1).make()
     assert notes.is_dir()
+
+
+def test_names_of_what_was_removed_are_not_lost_where_there_is_no_room_to_write_them(
+    root: Path, room_of: Callable[..., EvidenceRoom], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert room_of(3000).make() == [OLDEST]
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        room_of(2000).make()
+
+    assert removed(root, "U1") == [OLDEST]
+    assert left(root) == [OLD, YOUNG, NEWEST]
+
+
+def full(_: int) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

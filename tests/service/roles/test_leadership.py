@@ -2,14 +2,29 @@
 
 import asyncio
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from service.delivery.deliveries import Deliveries
+from service.delivery.outcome import Delivered
+from service.delivery.sender import Receiver
 from service.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.roles.leadership import Leadership
 from service.store.port import StoreError
+from service.store.sqlite import SqliteStore
+
+
+class Postman:
+    """Carries everything at once."""
+
+    async def carry(self, *_: object) -> Delivered:
+        return Delivered("")
+
+
+SHIFT = Receiver("shift", "webhook", "", Postman())
 
 
 class Name:
@@ -130,3 +145,24 @@ async def test_work_that_fails_ends_the_process(name: Name) -> None:
     with pytest.raises(ExceptionGroup):
         await leadership.run(UNHEARD)
     assert name.holder is None
+
+
+async def test_senders_of_a_process_that_lost_the_name_do_not_count_as_dead(
+    name: Name, tmp_path: Path
+) -> None:
+    clock = QuickClock()
+    beats = Heartbeats(clock)
+    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as store:
+        deliveries = Deliveries([SHIFT], store.outbox, clock)
+
+        async def deliver(_: Pulse) -> None:
+            await deliveries.run(beats)
+
+        leadership = Leadership(name.hold, {"deliver": deliver}, beats, clock)
+        task = asyncio.create_task(leadership.run(UNHEARD))
+        await until(lambda: "deliver shift" in beats.look())
+        name.holder, name.is_away = None, True
+        await until(lambda: not leadership.is_leading)
+        assert beats.look() == {}
+        task.cancel()
+        await asyncio.wait([task])

@@ -1,6 +1,7 @@
 """What was appended is read back, to the last bit."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -248,3 +249,18 @@ def n_bytes(store: SqliteStore) -> int:
         for name in ("page_count", "page_size")
     )
     return int(n_pages * size)
+
+
+def test_what_a_clock_shows_for_the_second_time_is_no_repetition(
+    store: SqliteStore, assessment: Build, query: Ask, at: At
+) -> None:
+    def measured(epoch: int, speed_rpm: float) -> Assessment:
+        made = assessment(at(0), speed_rpm=speed_rpm)
+        return replace(made, window=replace(made.window, epoch=epoch))
+
+    for _ in range(2):  # the second time as after a commit of which nobody could tell
+        store.append([measured(1, 90.0)], [])
+        store.append([measured(2, 91.0), measured(3, 92.0)], [])
+
+    series = store.trend(query("speed_rpm")).series["speed_rpm"]
+    assert list(series.mean) == [90.0, 91.0, 92.0]

@@ -1,15 +1,20 @@
 """Damage that nobody meets is found by looking at every row in turn."""
 
+import asyncio
 import sqlite3
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from core.assessment import Assessment
+from service.background import LOOK_S
+from service.heartbeats import PATIENCE_S, Heartbeats
 from service.scrubbing import Scrubbing
+from service.security.roles import Role
+from service.security.sessions import Session
 from service.soundness import Soundness
 from service.store.audit_port import AuditQuery
 from service.store.seals.damage import Place
@@ -89,8 +94,32 @@ def test_after_a_restart_it_goes_on_where_it_was(
         assert once_around(store) == 2
 
 
+def test_places_among_sessions_whose_keys_are_bytes_are_remembered_too(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scrubbing, "REMEMBER_EVERY", 1)
+    with closing(SqliteStore(path)) as store:
+        store.access.accounts.add("anna", Role.ADMIN, "hash", 1)
+        for n in (0x80, 0xFF):
+            assert store.access.sessions.add(Session(bytes([n]) * 32, "anna", 2, 3), 1, 0)
+    monkeypatch.setattr(scrubbing, "ROWS_AT_ONCE", 1)
+    with closing(SqliteStore(path)) as store:
+        n_looks = once_around(store)
+
+    n_with_restarts, is_around = 0, False
+    while not is_around:
+        with closing(SqliteStore(path)) as store:
+            is_around = store.integrity.look_on()
+        n_with_restarts += 1
+    assert n_with_restarts == n_looks
+
+
 @pytest.mark.parametrize(
-    "place", ["nonsense", "[1]", '["gone", false, null]', '["gap", true, [{}]]']
+    "place",
+    [
+        *("nonsense", "[1]", '["gone", false, null]', '["gap", true, [{}]]'),
+        *('["session", false, [{"hex": 1}]]', '["session", false, [{"hex": "f"}]]'),
+    ],
 )
 def test_a_damaged_place_makes_it_begin_anew(path: Path, place: str) -> None:
     with closing(SqliteStore(path)) as store:
@@ -140,3 +169,36 @@ def test_a_scrubber_that_looks_at_rows_only_misses_those_that_are_gone(
     with closing(SqliteStore(path)) as store:
         once_around(store)
         assert store.integrity.n_damaged == 0
+
+
+async def test_a_disk_that_stands_still_makes_the_loop_rest_but_not_fall_silent(
+    stepped_clock: Any,
+) -> None:
+    beats = Heartbeats(stepped_clock)
+    loop = Scrubbing(SlowDisk(stepped_clock), stepped_clock)
+    slept_s = []
+
+    async def sleep(duration_s: float) -> None:
+        slept_s.append(duration_s)
+        stepped_clock.step(duration_s)
+        assert not beats.troubles
+        if len(slept_s) == 20:
+            raise asyncio.CancelledError
+
+    stepped_clock.sleep = sleep
+    with suppress(asyncio.CancelledError):
+        await beats.tend("scrub", loop.run)
+
+    assert max(slept_s) <= LOOK_S
+    assert sum(slept_s) > PATIENCE_S
+
+
+class SlowDisk:
+    """Whose every look takes half a minute."""
+
+    def __init__(self, clock: Any) -> None:
+        self._clock = clock
+
+    def look_on(self) -> bool:
+        self._clock.step(30.0)
+        return False
