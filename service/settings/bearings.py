@@ -108,8 +108,8 @@ class BearingSettings(Settings):
 
     preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
     """Estimators that the stiffness for trends and alarms is taken from, best first: the first
-    whose result is good, otherwise the first of those that are doubted least. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
-    "ratio_order1"."""
+    whose result is good, otherwise the first of those that are doubted least. "dynamic",
+    "transfer_vortex", "transfer_order1", "ratio_vortex", "ratio_order1"."""
 
     watched_estimator: Estimator | None = None
     """Whose stiffness is compared with its baseline; without it the first of preference, and
