@@ -11,6 +11,7 @@ from prometheus_client.process_collector import ProcessCollector
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor_port import Monitor
+from core.outage import Reach
 from service.alarms.gone_alarms import SHARED
 from service.bus import Bus
 from service.delivery.facts import Around
@@ -193,9 +194,14 @@ class Analysing:
 
     async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
         """Where each unit goes on."""
-        return {unit: self._progress(unit, stream, newest) for unit in self._monitors}
+        reaches = {
+            unit: await asyncio.to_thread(self._ground.store.reach, unit) for unit in self._monitors
+        }
+        return {
+            unit: self._progress(unit, stream, newest, reach) for unit, reach in reaches.items()
+        }
 
-    def _progress(self, unit: str, stream: str, newest: int) -> UnitProgress:
+    def _progress(self, unit: str, stream: str, newest: int, reach: Reach | None) -> UnitProgress:
         ground, analysis = self._ground, self._analysis
         if analysis is None:
             raise RuntimeError("there is no analysis yet")
@@ -203,7 +209,8 @@ class Analysing:
         settings = next(its for its in ground.plant.unit if its.id == unit)
         identity = identity_of(self._plant, settings)
         parts = (analysis.analyser, ground.live, analysis.recorder, ground.clock)
-        return UnitProgress(identity, stream, stored, self._memories.get(unit), *parts)
+        done = reach if stored is None else None
+        return UnitProgress(identity, stream, stored, self._memories.get(unit), *parts, done)
 
     async def _watch(self, pulse: Pulse) -> None:
         """See that the units are still this process's, and which have fallen silent."""

@@ -65,6 +65,7 @@ class Consumer:
         self._stream: str | None = None
         self._queues: dict[str, asyncio.Queue[Msg]] = {}
         self._fetched: dict[str, int] = {}
+        self._settled: dict[str, int] = {}
         self.trouble: str | None = "the servers have not been reached yet"
         self.n_pending: dict[str, int] = {}
 
@@ -134,8 +135,11 @@ class Consumer:
     async def _offer(self, unit: str, message: Msg) -> None:
         sequence = message.metadata.sequence.stream
         self.n_pending[unit] = message.metadata.num_pending
-        if sequence <= self._fetched[unit]:
-            return  # delivered again while it still waits here
+        if sequence <= self._fetched[unit]:  # delivered again: it waits here, or nobody was told
+            if sequence <= self._settled.get(unit, 0):
+                with suppress(Error):
+                    await message.ack()
+            return
         await self._queues[unit].put(message)
         self._fetched[unit] = sequence
 
@@ -151,6 +155,7 @@ class Consumer:
             for message in batch:
                 with suppress(Error):  # it is stored; who was not told sends it once more
                     await (message.term() if message in refused else message.ack())
+            self._settled[unit] = _sequence(batch[-1])
 
     async def _stored(self, progress: UnitProgress) -> None:
         """Wait until all that was taken in is on the disk, with how far that is."""

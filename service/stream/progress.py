@@ -6,6 +6,8 @@ from dataclasses import replace
 import structlog
 
 from acquisition.clock import Clock
+from core.blocks import SampleBlock
+from core.outage import Reach
 from core.units import s_from_ns
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
@@ -37,6 +39,8 @@ class UnitProgress:
     clock
         Of this host; how far behind a block is can be told as well as it agrees with that of the
         host that acquires.
+    done
+        Up to where results are stored, where it is not known which messages they are of.
     """
 
     def __init__(
@@ -49,6 +53,7 @@ class UnitProgress:
         live: LiveView,
         recorder: Recorder,
         clock: Clock,
+        done: Reach | None = None,
     ) -> None:
         self._clock = clock
         self.unit, self._identity, self._stream = identity.unit, identity, stream
@@ -57,6 +62,8 @@ class UnitProgress:
         self._stored = stored
         self._memory = None if stored is None else memory
         self._heard_s: float | None = None
+        self._is_rewound = False
+        self._done = done
         self._why_refused: str | None = None
         self.sequence = 0
         self.refused: Counter[str] = Counter()
@@ -72,15 +79,13 @@ class UnitProgress:
 
         What is there no more is a gap in the samples, which the monitor finds by their index.
         """
-        stored, memory = self._stored, self._memory
-        if stored is None or memory is None or self.sequence:
+        stored = self._stored
+        if stored is None or self._memory is None or self.sequence:
             return
         if first_sequence > stored.sequence + 1:
             log.error("the stream does not reach back to what is stored", unit=self.unit)
         elif first_sequence > stored.window_sequence:
             log.warning("the stream holds less than the window", unit=self.unit)
-        if first_sequence <= stored.sequence:
-            self._analyser.rewind(self.unit, memory)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
         """Take a message in; False if it is refused."""
@@ -97,6 +102,9 @@ class UnitProgress:
         self._heard_s, self._why_refused = self._clock.monotonic_s(), None
         if self._stored is not None and sequence <= self._stored.sequence:
             await self._relive(sequence, message)
+        elif self._is_done(message):
+            self.sequence = sequence
+            self.n_repeated += 1
         else:
             self._settle()
             await self._live_on(sequence, message)
@@ -134,12 +142,40 @@ class UnitProgress:
             self._live.set_link(self.unit, message.state, message.reason)
             return
         self._live.set_link(self.unit, LinkState.CONNECTED)
+        self._rewind(message.block)
         await self._analyser.relive(message.block, self._sampled_s(message))
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
+    def _is_done(self, message: Taken | LinkNews) -> bool:
+        """Whether the results of a block are stored; from the first on of which they are not none.
+
+        Analysed once more they would be on another grid of segments, and be there twice.
+        """
+        if self._done is None or isinstance(message, LinkNews):
+            return False
+        block, done = message.block, self._done
+        if block.epoch == done.epoch:
+            is_done = block.stop_index <= done.stop_index
+        else:
+            is_done = block.stop_ns <= done.stop_ns
+        if not is_done:
+            self._done = None
+        return is_done
+
+    def _rewind(self, block: SampleBlock) -> None:
+        """Before the first block that is seen once more.
+
+        Only by that it is known that samples of the window are left: news of links stay on the
+        stream when blocks have gone by age, and blocks of another configuration are refused.
+        """
+        if self._memory is None or self._is_rewound or block.epoch != self._memory.monitor.epoch:
+            return
+        self._analyser.rewind(self.unit, self._memory)
+        self._is_rewound = True
+
     def _settle(self) -> None:
-        """After the last message that was seen once more."""
-        if self._memory is not None and self.sequence:
+        """After the last message that was seen once more; without any, as after a stop."""
+        if self._memory is not None and self._is_rewound:
             self._analyser.settle(self.unit, self._memory)
         self._stored = self._memory = None
 

@@ -31,6 +31,10 @@ RETRY_S = 1.0
 MISFIT_RETRY_S = 5.0
 FULL_RETRY_S = 1.0
 
+UNCONFIRMED = "the servers do not confirm blocks: is the disk slow, or the cluster split?"
+MOST_UNCONFIRMED = 3
+"""Tries in a row, of all units together, before another connection is made."""
+
 STREAM_FULL = (10047, 10077, 10023)
 """Error codes of servers: no storage left, more than the stream's most bytes, no resources."""
 
@@ -63,6 +67,7 @@ class Publisher:
         self.trouble: str | None = "the servers have not been reached yet"
         self.n_repeated = 0
         self.n_doubles = 0
+        self._n_unconfirmed = 0
 
     async def publish(self, block: SampleBlock) -> None:
         """Take a block, waiting while too much waits for the servers."""
@@ -93,7 +98,8 @@ class Publisher:
             try:
                 async with session(self._settings, "padwatch acquire") as stream:
                     await ensure(stream, self._plant, self._settings)
-                    self._note(None)
+                    if not self._n_unconfirmed:
+                        self._note(None)
                     await self._send_all(stream, pulse)
             except StreamError as error:
                 self._note(str(error))
@@ -128,7 +134,11 @@ class Publisher:
                 headers={Header.MSG_ID: message.id},
             )
         except (NatsTimeoutError, NoRespondersError, NoStreamResponseError):
-            self._note("the servers do not confirm blocks: is the disk slow, or the cluster split?")
+            self._note(UNCONFIRMED)
+            self._n_unconfirmed += 1
+            if self._n_unconfirmed % MOST_UNCONFIRMED == 0:
+                # cut off from the others, a server answers all but this; the stream may be gone
+                raise StreamError(UNCONFIRMED) from None
             return False
         except MaxPayloadError:
             raise StreamMisfitError(
@@ -138,6 +148,7 @@ class Publisher:
         except APIError as error:
             self._note(_refusal(error, stream_name(self._plant)))
             return False
+        self._n_unconfirmed = 0
         self.n_doubles += bool(answer.duplicate)
         self._note(None)
         return True

@@ -18,6 +18,7 @@ from harness.stream_rig import (
     single_process,
     written_plant,
 )
+from nats.aio.msg import Msg
 from nats.js.errors import NotFoundError
 
 from acquisition.clock import SystemClock
@@ -32,6 +33,7 @@ from service.roles.partition import Partition
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
+from service.stream import consumer as consuming
 from service.stream import publisher as publishing
 from service.stream.consumer import Consumer
 from service.stream.names import consumer_name, identity_of, stream_name, subject
@@ -94,6 +96,9 @@ class Look:
     async def acknowledged(self) -> int:
         return (await self._info())[0]
 
+    async def all_acknowledged(self) -> bool:
+        return await self.acknowledged() == N_BLOCKS
+
     async def many_delivered(self) -> bool:
         return (await self._info())[1] >= N_BLOCKS // 3
 
@@ -143,11 +148,7 @@ async def check_acknowledging(plant: PlantFile, server: NatsServer) -> None:
             await asyncio.sleep(0.2)  # for who acknowledges at once to be seen doing it
             await look.require_acknowledged_is_stored()
         await until(lambda: _is(look.stored() == N_BLOCKS))
-
-        async def all_acknowledged() -> bool:
-            return await look.acknowledged() == N_BLOCKS
-
-        await until(all_acknowledged)
+        await until(look.all_acknowledged)
 
 
 async def _is(so: bool) -> bool:
@@ -163,6 +164,25 @@ async def test_a_block_is_acknowledged_after_its_results_are_stored(
     plant: PlantFile, server: NatsServer
 ) -> None:
     await check_acknowledging(plant, server)
+
+
+async def test_of_what_is_delivered_again_what_is_stored_is_acknowledged_again(
+    plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ack, lost = Msg.ack, []
+
+    async def lossy(message: Msg) -> None:
+        if len(lost) < 5:
+            lost.append(message)
+        else:
+            await ack(message)
+
+    monkeypatch.setattr(Msg, "ack", lossy)
+    monkeypatch.setattr(consuming, "ACK_WAIT_S", 1.0)
+    await publish(plant)
+    async with looking(plant, server) as look, analysing(plant):
+        await until(look.all_acknowledged)
+    assert len(lost) == 5
 
 
 async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_why(

@@ -141,3 +141,89 @@ async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(
         assert found[name] == rows, name
     assert len(wanted["assessment"]) > 30
     assert wanted["gap"]
+
+
+class SteadyDevice(Device):
+    """One with which nothing goes wrong unless it is asked to."""
+
+    def _stumble(self) -> None:
+        """Keep going."""
+
+    def _quality(self) -> Quality:
+        return GOOD
+
+    def skip(self, n_samples: int) -> None:
+        """Measure so many samples that nobody fetches."""
+        self._next += n_samples
+
+    def restart(self) -> None:
+        """Be off for three seconds, and count anew."""
+        self._begin_ns += round((self._next / self._unit.sampling_hz + 3.0) * NS_PER_S)
+        self._epoch, self._next = self._epoch + 1, 0
+
+
+def sent_by(device: Device, unit: MovingUnit, n: int, first: int) -> list[Message]:
+    return [
+        (first + number, encoded_block(device.block(), unit.identity, T0)) for number in range(n)
+    ]
+
+
+async def lived_until_its_blocks_have_gone(unit: MovingUnit, device: Device) -> Message:
+    """Analyse some blocks and a word on the link, which is all that stays on the stream."""
+    told = encoded_link(LinkNews("U1", LinkState.NOT_CONNECTED, "silent"), unit.identity)
+    word = (61, told)
+    await unit.live([*sent_by(device, unit, 60, 1), word], None, np.random.default_rng(1))
+    return word
+
+
+async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(tmp_path: Path) -> None:
+    unit = moving_unit(tmp_path / "plant")
+    device = SteadyDevice(unit.plant.unit[0], 1)
+    word = await lived_until_its_blocks_have_gone(unit, device)
+    device.skip(5 * SPAN)
+
+    await unit.live([word, *sent_by(device, unit, 60, 62)], None, np.random.default_rng(1))
+
+    found = found_in(unit.database)
+    (gap,) = found["gap"]
+    before = [row for row in found["assessment"] if row["stop_index"] <= gap["first_index"]]
+    after = [row for row in found["assessment"] if row not in before]
+    assert gap["first_index"] == max(row["stop_index"] for row in before)
+    assert gap["first_index"] + gap["n_samples"] == 60 * N_SAMPLES + 5 * SPAN
+    assert len(after) > 10
+
+
+async def test_a_device_that_counts_anew_after_all_blocks_went_is_analysed_at_once(
+    tmp_path: Path,
+) -> None:
+    unit = moving_unit(tmp_path / "plant")
+    device = SteadyDevice(unit.plant.unit[0], 1)
+    word = await lived_until_its_blocks_have_gone(unit, device)
+    device.restart()
+
+    await unit.live([word, *sent_by(device, unit, 60, 62)], None, np.random.default_rng(1))
+
+    found = found_in(unit.database)
+    anew = [row for row in found["assessment"] if row["epoch"] == 4]
+    assert min(row["stop_index"] for row in anew) <= SPAN
+    assert found["gap"]
+
+
+async def test_a_stream_that_lost_its_end_is_not_analysed_a_second_time(tmp_path: Path) -> None:
+    unit = moving_unit(tmp_path / "plant")
+    device = SteadyDevice(unit.plant.unit[0], 1)
+    sent = sent_by(device, unit, 60, 101)
+    await unit.live(sent, None, np.random.default_rng(1))
+    first = found_in(unit.database)["assessment"]
+
+    # of what was confirmed the last are gone, and of what is left the first, by age
+    left = [(sequence - 100, payload) for sequence, payload in sent[7:50]]
+    device.skip(SPAN)
+    await unit.live([*left, *sent_by(device, unit, 20, 51)], None, np.random.default_rng(1))
+
+    found = found_in(unit.database)
+    reach = max(row["stop_index"] for row in first)
+    assert [row for row in found["assessment"] if row["stop_index"] <= reach] == first
+    assert len(found["assessment"]) > len(first)
+    (gap,) = found["gap"]
+    assert gap["first_index"] + gap["n_samples"] == 60 * N_SAMPLES + SPAN

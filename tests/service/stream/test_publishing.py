@@ -258,3 +258,17 @@ async def test_a_connection_that_several_lose_at_once_is_one_trouble(server: Nat
     server.start()
     with pytest.raises(StreamMisfitError, match="the worse one"):
         await use(server, ConnectionClosedError(), StreamMisfitError("the worse one"))
+
+
+async def test_a_stream_that_is_deleted_meanwhile_is_made_again(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    async with running(publisher(plant, server)) as publishing:
+        await publishing.publish(block(plant, 0))
+        await drained(publishing)
+        async with looking(server) as stream:
+            await stream.delete_stream(stream_name(plant))
+        await publishing.publish(block(plant, 1))
+        await drained(publishing)
+
+    assert [found.first_index for found in await kept(plant, server)] == [60]

@@ -107,4 +107,5 @@ class MovingUnit:
         )
         parts = (analysis.analyser, live, analysis.recorder, clock)
         stored, memory = usable(found, STREAM, newest), memories.get(unit.id)
-        return Life(analysis, UnitProgress(self.identity, STREAM, stored, memory, *parts))
+        done = store.reach(unit.id) if stored is None else None
+        return Life(analysis, UnitProgress(self.identity, STREAM, stored, memory, *parts, done))
