@@ -13,6 +13,7 @@ from core.alarms.alarm import PLANT
 from core.monitor_port import Monitor
 from core.outage import Reach
 from service.alarms.gone_alarms import SHARED
+from service.alarms.health import StreamLook
 from service.bus import Bus
 from service.delivery.facts import Around
 from service.health.page import Health
@@ -159,8 +160,9 @@ class Analysing:
             if (found := await asyncio.to_thread(ground.store.position, unit)) is not None
         }
         self._memories = memories_of(self._stored.values())
+        stream = StreamLook(self._trouble, self._behind_s)
         analysis = await analysis_on(
-            ground, monitors, bus, self._around, self._share, self._memories, self._trouble
+            ground, monitors, bus, self._around, self._share, self._memories, stream
         )
         self._analysis = analysis
         consumer = Consumer(
@@ -191,6 +193,11 @@ class Analysing:
     def _trouble(self) -> str | None:
         """Why no blocks come over the stream."""
         return None if self._consumer is None else self._consumer.trouble
+
+    def _behind_s(self) -> float:
+        """How far behind their devices the blocks are that are taken in."""
+        units = self._consumer.units if self._consumer else {}
+        return max((progress.behind_s for progress in units.values()), default=0.0)
 
     async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
         """Where each unit goes on."""
@@ -237,7 +244,10 @@ class Analysing:
         def shown() -> dict[str, str]:
             units = {u: self._ground.live.status(u).state.value for u in self._monitors}
             shown = {f"unit {unit}": state for unit, state in units.items()}
-            return {**shown, "database": self._ground.store.kind}
+            shown["database"] = self._ground.store.kind
+            if self._analysis is not None:  # there is one alarm of each for the whole plant
+                shown |= _of_this_host(self._analysis)
+            return shown
 
         def metrics() -> Iterator[Metric]:
             if self._consumer is not None:
@@ -246,6 +256,16 @@ class Analysing:
             yield from ProcessCollector(registry=None).collect()
 
         return Health(checks, shown, metrics)
+
+
+def _of_this_host(analysis: Analysis) -> dict[str, str]:
+    """What only shows here, unless it is this process that raises alarms about the service."""
+    troubles = {
+        "stored data": analysis.soundness.trouble,
+        "captures": analysis.captures.trouble,
+        "recordings": analysis.tape.trouble,
+    }
+    return {"disk": str(analysis.space), **{name: why or "ok" for name, why in troubles.items()}}
 
 
 def shared_work(analysis: Analysis) -> dict[str, Loop]:

@@ -40,7 +40,8 @@ class ServiceHealth:
     waiting_share
         How far the queue from acquisition to analysis is filled, 0 to 1.
     analysis_delay_s
-        For how long the oldest block in it has waited.
+        For how long the oldest block in it has waited, or how far behind its device the block from
+        a stream was that was taken in last.
     captures_error
         Why samples around alarms are not kept; None if they are.
     recording_error
@@ -74,6 +75,22 @@ class ServiceHealth:
     disk: DiskJudge = enough_room
 
 
+@dataclass(frozen=True)
+class StreamLook:
+    """How blocks come over the stream, where they come that way.
+
+    Parameters
+    ----------
+    trouble
+        Why none come; None if they do.
+    behind_s
+        How far behind their devices those are that are taken in now.
+    """
+
+    trouble: Callable[[], str | None]
+    behind_s: Callable[[], float]
+
+
 LookAtHealth = Callable[[], ServiceHealth]
 
 
@@ -88,7 +105,7 @@ def health_of(
     tape: Tape | None = None,
     recordings: WaveformKeeper | None = None,
     soundness: Soundness | None = None,
-    stream: Callable[[], str | None] | None = None,
+    stream: StreamLook | None = None,
 ) -> LookAtHealth:
     """A look at the parts of the running service."""
     names = list(units)
@@ -99,13 +116,13 @@ def health_of(
             store_behind_s=recorder.behind_s,
             n_unstored=live.n_unstored,
             waiting_share=bus.depth / bus.capacity,
-            analysis_delay_s=bus.oldest_wait_s,
+            analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
             captures_error=captures.trouble,
             recording_error=tape.trouble if tape else None,
             n_recordings_damaged=recordings.n_lost if recordings else 0,
             refused=load.words if load else None,
             stored_trouble=soundness.trouble if soundness else None,
-            stream_trouble=stream() if stream else None,
+            stream_trouble=stream.trouble() if stream else None,
             accounts={unit: live.status(unit).account for unit in names},
             disk=enough_room if space is None else space.condition,
         )

@@ -51,6 +51,9 @@ class ServiceAlarms:
         Limits of the service.
     look
         How the service does now; None where nobody looks at that.
+    leads
+        Whether it is this process that raises what there is one alarm of for the whole plant; lost
+        samples of its units are each process's own.
     """
 
     def __init__(
@@ -58,10 +61,14 @@ class ServiceAlarms:
         units: Iterable[str] = (),
         rules: ServiceRules | None = None,
         look: LookAtHealth | None = None,
+        *,
+        leads: bool = True,
     ) -> None:
-        self._look = look
+        self._look, self._leads = look, leads
         names = list(units) if look else []
-        self._watches = service_watches(names, rules or ServiceRules()) if look else {}
+        watches = service_watches(names, rules or ServiceRules()) if look else {}
+        own = {loss_key(unit) for unit in names}
+        self._watches = {key: its for key, its in watches.items() if leads or key in own}
         self._board = AlarmBoard(self._watches.values())
         self._losses = {unit: SampleLoss() for unit in names}
         self._n_unstored = 0
@@ -101,7 +108,10 @@ class ServiceAlarms:
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Look at the service once."""
         if self._look is not None:
-            self._judge(self._look(), host_ns)
+            health = self._look()
+            if self._leads:
+                self._judge(health, host_ns)
+            self._count_losses(health, host_ns)
         self._board.expire(host_ns)
         return self._board.told()
 
@@ -136,6 +146,8 @@ class ServiceAlarms:
         self._find(
             AlarmKind.STREAM_AWAY, _unless_well(health.stream_trouble, AlarmLevel.DANGER), now_ns
         )
+
+    def _count_losses(self, health: ServiceHealth, now_ns: int) -> None:
         for unit, account in health.accounts.items():
             share = self._losses[unit].share(account, now_ns)
             self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)

@@ -83,6 +83,11 @@ def loss_key(unit: str) -> str:
     return f"{AlarmKind.SAMPLES_LOST}:{unit}"
 
 
+def told_by(identity: AlarmIdentity) -> str:
+    """Unit whose process tells of an alarm: of lost samples, the one that analyses their unit."""
+    return identity.subject if identity.kind is AlarmKind.SAMPLES_LOST else identity.unit
+
+
 def _identity(subject: str, kind: AlarmKind) -> AlarmIdentity:
     return AlarmIdentity(PLANT, subject, kind)
 

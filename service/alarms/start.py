@@ -18,7 +18,7 @@ from service.alarms.gone_alarms import is_shared
 from service.alarms.health import LookAtHealth
 from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.alarms.service_alarms import ServiceAlarms
-from service.alarms.service_rules import service_rules_of
+from service.alarms.service_rules import service_rules_of, told_by
 from service.alarms.stream_alarms import stream_alarms
 from service.capture.captures import Captures
 from service.conversion import machine_of
@@ -81,8 +81,8 @@ async def alarm_engine(
         for unit in plant.unit
     }
     # how a replay is served depends on the host, and is nothing that the recording tells
-    seen = look if origin is Origin.LIVE and part.leads else None
-    service = ServiceAlarms(units, service_rules_of(plant.alarms), seen)
+    seen = look if origin is Origin.LIVE else None
+    service = ServiceAlarms(units, service_rules_of(plant.alarms), seen, leads=part.leads)
     chatter = chatter_rule_of(plant.alarms)
     listener = _listener(captures, tape)
     is_alone = part == WHOLE
@@ -92,7 +92,7 @@ async def alarm_engine(
     ours = [
         alarm
         for alarm in stored
-        if part.looks_after(alarm.identity.unit) and (is_alone or not is_shared(alarm))
+        if part.looks_after(told_by(alarm.identity)) and (is_alone or not is_shared(alarm))
     ]
     engine.restore(ours, memories)
     for held in await asyncio.to_thread(store.order1_references.in_force):

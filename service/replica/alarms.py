@@ -6,6 +6,7 @@ from core.alarms.alarm import PLANT, Alarm
 from core.alarms.chatter import ChatterRule
 from service.alarms.count import AlarmCount, count_of
 from service.alarms.gone_alarms import SHARED, is_shared
+from service.alarms.service_rules import told_by
 from service.replica.unit_state import UnitState
 
 
@@ -79,7 +80,8 @@ class ReplicaAlarms:
         """Its unit, or who else tells of it where it is of no unit that there is."""
         if is_shared(alarm):
             return SHARED
-        return alarm.identity.unit if alarm.identity.unit in self._units else PLANT
+        unit = told_by(alarm.identity)
+        return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:
         """How many alarms are on the list."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 from core.alarms.alarm import Alarm
 from core.assessment import Assessment
 from service.alarms.engine import AlarmEngine
+from service.alarms.service_rules import told_by
 from service.films.keeper import FilmKeeper
 from service.live import LiveView, UnitStatus
 from service.replica.unit_state import BearingState, FilmState, UnitSigns, UnitState
@@ -33,7 +34,7 @@ def unit_state(
 ) -> UnitState:
     """What is known of a unit now."""
     unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
-    own = alarm_state([alarm for alarm in alarms.alarms if alarm.identity.unit == unit], alarms)
+    own = alarm_state([alarm for alarm in alarms.alarms if told_by(alarm.identity) == unit], alarms)
     found = {bearing: live.assessment(unit, bearing) for bearing in bearings}
     seen = {bearing: films.newest(unit, bearing) for bearing in bearings}
     in_force = {bearing: films.baseline(unit, bearing) for bearing in bearings}

@@ -76,7 +76,7 @@ class ReplicaScrape:
             [which],
         )
         yield store_info(of.store_kind)
-        yield from _unit_metrics(of)
+        yield from unit_metrics(of)
         yield _bearing_metric(of)
         yield from alarm_metrics(of.alarms, of.bearings)
         yield from film_metrics(of.films.newest, of.bearings)
@@ -84,7 +84,8 @@ class ReplicaScrape:
         yield from ProcessCollector(registry=None).collect()
 
 
-def _unit_metrics(of: ReplicaMetrics) -> Iterator[Metric]:
+def unit_metrics(of: ReplicaMetrics) -> Iterator[Metric]:
+    """How each unit is, as far as this replica has been told."""
     live, units = of.live, list(of.bearings)
     connected = (((u,), live.status(u).state is LinkState.CONNECTED) for u in units)
     yield gauge("link_connected", "1 while the device is connected.", UNIT, connected)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.alarms.gone_alarms import SHARED, is_shared
+from service.alarms.service_rules import told_by
 from service.background import TroubleLog
 from service.films.keeper import FilmKeeper
 from service.heartbeats import UNHEARD, Pulse
@@ -109,7 +110,7 @@ class Reporter:
         others = [
             alarm
             for alarm in self._alarms.alarms
-            if alarm.identity.unit not in self._units and is_shared(alarm) == (unit == SHARED)
+            if told_by(alarm.identity) not in self._units and is_shared(alarm) == (unit == SHARED)
         ]
         return alarm_state(others, self._alarms), plant_signs(self._live)
 

@@ -1,12 +1,12 @@
 """`Analysis`: the parts that turn blocks into stored results, alarms, evidence and messages."""
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from core.monitor_port import Monitor
 from service.alarms.engine import AlarmEngine
-from service.alarms.health import health_of
+from service.alarms.health import StreamLook, health_of
 from service.alarms.start import alarm_engine
 from service.bus import Bus
 from service.capture.captures import Captures
@@ -117,7 +117,7 @@ async def analysis_on(
     around: Around,
     part: PlantPart = WHOLE,
     memories: Mapping[str, UnitMemory] = NO_MEMORIES,
-    stream: Callable[[], str | None] | None = None,
+    stream: StreamLook | None = None,
 ) -> Analysis:
     """Put the parts together, and let them go on where the service stopped.
 
@@ -132,7 +132,7 @@ async def analysis_on(
     memories
         What was known of units besides what is stored, where no sample is missing since.
     stream
-        Why no blocks come over the stream, where they come that way.
+        How blocks come over the stream, where they come that way.
 
     Raises
     ------

@@ -24,6 +24,12 @@ def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
         UNIT,
         (((unit,), n) for unit, n in consumer.n_pending.items()),
     )
+    yield gauge(
+        "stream_analysis_behind_seconds",
+        "How far behind its device the block of the unit was that was taken in last.",
+        UNIT,
+        (((unit,), its.behind_s) for unit, its in consumer.units.items()),
+    )
     yield counter(
         "stream_refused",
         "Messages of the unit that could not be used, by reason.",

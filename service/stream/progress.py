@@ -66,6 +66,7 @@ class UnitProgress:
         self._done = done
         self._why_refused: str | None = None
         self.sequence = 0
+        self.behind_s = 0.0
         self.refused: Counter[str] = Counter()
         self.n_repeated = 0
 
@@ -194,8 +195,8 @@ class UnitProgress:
 
     def _sampled_s(self, message: Taken) -> float:
         """By this process's steady clock, where the clocks of both hosts agree."""
-        behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
-        return self._clock.monotonic_s() - behind_s
+        self.behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
+        return self._clock.monotonic_s() - self.behind_s
 
     def _hear(self, news: LinkNews) -> None:
         if self._live.set_link(news.unit, news.state, news.reason):

@@ -29,9 +29,9 @@ WAITING, LATE = "plant:service:blocks_waiting", "plant:service:analysis_late"
 class Watched:
     """The service's own alarms, and a health that tests set."""
 
-    def __init__(self, host: Any) -> None:
+    def __init__(self, host: Any, *, leads: bool = True) -> None:
         self.host, self.health = host, ServiceHealth()
-        self.alarms = ServiceAlarms(["U1"], ServiceRules(), lambda: self.health)
+        self.alarms = ServiceAlarms(["U1"], ServiceRules(), lambda: self.health, leads=leads)
 
     def after(self, seconds: float, **health: Any) -> list[str]:
         self.health = ServiceHealth(**health)
@@ -100,6 +100,18 @@ def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
     assert watched.after(100.0, **account(180_000, 40_000)) == ["plant:U1:samples_lost raised"]
     later = [watched.after(100.0, **account(180_000 + n * 60_000, 40_000)) for n in range(1, 8)]
     assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
+
+
+def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_nothing_else(
+    host: Any,
+) -> None:
+    watched = Watched(host, leads=False)
+    accounts = {"U1": SampleAccount(n_stored=10)}
+    assert watched.after(0.5, accounts=accounts, store_behind_s=99.0, n_unstored=7) == []
+    accounts = {"U1": SampleAccount(n_stored=10, n_gap=10)}
+    assert watched.after(0.5, accounts=accounts, analysis_delay_s=99.0) == [
+        "plant:U1:samples_lost raised"
+    ]
 
 
 @pytest.fixture

@@ -5,10 +5,17 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 import yaml
+from prometheus_client.metrics_core import Metric
+
+from service.live import LinkState
+from service.replica.metrics import unit_metrics as replica_unit_metrics
+from service.stream.consumer_metrics import consumer_metrics
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 DASHBOARD = DEPLOY / "grafana" / "padwatch.json"
@@ -150,11 +157,20 @@ def check(expr: str, exposed: Exposed) -> tuple[Query, set[str]]:
     return query, query.kept or known
 
 
+def of_several_processes() -> Iterator[Metric]:
+    """What `padwatch serve` and `padwatch analyse` tell besides, by their own functions."""
+    status = SimpleNamespace(state=LinkState.CONNECTED)
+    live = Mock(read_error=None, **{"status.return_value": status, "silence_s.return_value": 0.5})
+    yield from replica_unit_metrics(Mock(live=live, bearings={"U1": ["UJB"]}))
+    unit = SimpleNamespace(behind_s=0.5, refused={}, n_repeated=0)
+    yield from consumer_metrics(Mock(trouble=None, n_pending={"U1": 3}, units={"U1": unit}))
+
+
 @pytest.fixture(scope="module")
 def exposed(told: Any) -> Exposed:
-    """All that a running service tells, once its results are on the disk."""
+    """All that a running service tells, once its results are on the disk, and what others do."""
     found: Exposed = dict(BY_PROMETHEUS)
-    for family in told.plain.families.values():
+    for family in (*told.plain.families.values(), *of_several_processes()):
         for sample in family.samples:
             is_gauge = family.type == "gauge"
             _, sets = found.setdefault(sample.name, ("gauge" if is_gauge else "counter", set()))
