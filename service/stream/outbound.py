@@ -10,10 +10,17 @@ from acquisition.clock import Clock
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A message with its id; the id is the same whenever the same message is sent."""
+    """A message with its id; the id is the same whenever the same message is sent.
+
+    Parameters
+    ----------
+    is_news
+        Whether it tells of a link: of several in a row the last says it all.
+    """
 
     id: str
     payload: bytes
+    is_news: bool = False
 
 
 class Outbound:
@@ -54,10 +61,13 @@ class Outbound:
             self.add(unit, message)
 
     def add(self, unit: str, message: Outgoing) -> None:
-        """Queue a message at once; for small ones that are few."""
+        """Queue a message at once; news of a link take the place of those before them."""
+        queue = self._waiting[unit]
         if not self.n_waiting:
             self._last_s = self._clock.monotonic_s()
-        self._waiting[unit].append(message)
+        if message.is_news and len(queue) > 1 and queue[-1].is_news:  # the first is under way
+            self.n_bytes -= len(queue.pop().payload)
+        queue.append(message)
         self.n_bytes += len(message.payload)
         self._news[unit].set()
 

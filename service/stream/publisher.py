@@ -89,7 +89,7 @@ class Publisher:
         self._links[news.unit] = news
         identity = self._identities[news.unit]
         id_ = f"{identity.plant.hex()[:8]}.{news.unit}.link.{self._clock.now_ns()}"
-        self.waiting.add(news.unit, Outgoing(id_, encoded_link(news, identity)))
+        self.waiting.add(news.unit, Outgoing(id_, encoded_link(news, identity), is_news=True))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Publish for ever, over one connection after the other."""
