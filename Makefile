@@ -8,7 +8,7 @@ NPM_FOLDER := tests/browser/javascript
 AXE := $(NPM_FOLDER)/node_modules/axe-core/axe.min.js
 SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-.PHONY: install run axe test check docs screenshots bench fuzz accuracy torture format lock clean
+.PHONY: install run axe test check docs screenshots bench fuzz accuracy torture soak format lock clean
 
 $(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
@@ -60,10 +60,14 @@ accuracy: install
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2
 
 SEED ?= $(shell date +%s)
+SOAK_MINUTES ?= 20
 PLANTED = $$(grep -rl --include='test_*.py' mark.planted tests --exclude-dir torture)
 torture: install
 	@echo "make torture SEED=$(SEED); it takes hours"
 	$(BIN)/python -m pytest tests/torture $(PLANTED) --torture --torture-seed $(SEED) --durations 20
+
+soak: install
+	$(BIN)/python -m pytest tests/torture/test_soak.py --torture --torture-seed $(SEED) --soak-minutes $(SOAK_MINUTES)
 
 format: install
 	$(BIN)/ruff format .

@@ -13,9 +13,16 @@ from harness.soak import Soaked, soak
 LOAD = 5.0
 WHOLE = LedgerPlant(n_units=20, load=LOAD, segment_samples=8192, n_segments=24)
 SHORT = LedgerPlant(n_units=1, load=LOAD, segment_samples=4096)
-MOST_GROWTH_MIB = 12.0
-"""In an hour. What alarms and results leave in caches is less; a leak of one block in a thousand
-would be more: twenty units deliver 3.6 GB of samples an hour."""
+MOST_RISE_MIB = 6.0
+"""From the warm-up to the end, by the fitted line, however long that is. Blocks that have to wait
+raise the mark up to which the heap was ever filled, by some MiB and not for ever; a leak of one
+block in a hundred is more in a quarter of an hour."""
+
+FEW_BUNDLES = "[evidence]\nmax_per_alarm = 3\n"
+"""So that the limits of evidence are reached in the warm-up, as in a plant of some years."""
+
+SPARE_FILES = 2
+"""Of which it may happen to have more in the second half than ever in the first."""
 
 MOST_IN_GAPS = 0.1
 """Share of the samples. A ring holds 1.6 s, so a machine that is held up for longer loses some; one
@@ -25,7 +32,7 @@ POOL_THREADS = (os.cpu_count() or 1) + 4
 """Of asyncio's own pool, which makes one more whenever more are wanted at once than ever before."""
 
 
-@pytest.mark.timeout(5400)
+@pytest.mark.timeout(9000)
 def test_a_long_time_under_load_leaves_everything_as_it_was(
     tmp_path: Path,
     torture_seed: int,
@@ -36,7 +43,7 @@ def test_a_long_time_under_load_leaves_everything_as_it_was(
     shape = WHOLE if is_whole else SHORT
     plant = LedgerPlant(**{**vars(shape), "seed": torture_seed})
     with ledger_daq(plant, tmp_path) as daq:
-        plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
+        plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, FEW_BUNDLES)
         with ServiceRig(plant_file) as rig:
             done = soak(plant, daq, rig, plant_file, soak_s, plant.units[:2])
     figure(f"soak\n{done.table(plant)}")
@@ -50,7 +57,8 @@ def test_a_long_time_under_load_leaves_everything_as_it_was(
 
 def assert_nothing_grows(done: Soaked) -> None:
     memory = done.growth("rss_mib")
-    assert memory.may_be_nothing or memory.per_hour <= MOST_GROWTH_MIB, str(memory)
-    assert done.growth("n_files").may_be_nothing
-    assert done.growth("n_threads").may_be_nothing or done.rise("n_threads") < POOL_THREADS
+    hours = (done.settled[-1].at_s - done.settled[0].at_s) / 3600.0
+    assert memory.per_hour * hours <= MOST_RISE_MIB, str(memory)
+    assert done.rise("n_files") <= SPARE_FILES
+    assert done.rise("n_threads") <= POOL_THREADS
     assert done.n_gap <= MOST_IN_GAPS * done.n_offered

@@ -58,9 +58,13 @@ class Soaked:
         return slope(at_s, np.array([float(getattr(usage, name)) for usage in self.settled]))
 
     def rise(self, name: str) -> float:
-        """How much more of something there was in the end than after the warm-up."""
-        first, last = (float(getattr(self.settled[at], name)) for at in (0, -1))
-        return last - first
+        """How much more of something there was at most in the second half after the warm-up."""
+        half = len(self.settled) // 2
+        first, second = (
+            max(float(getattr(usage, name)) for usage in part)
+            for part in (self.settled[:half], self.settled[half:])
+        )
+        return second - first
 
     def most(self, name: str) -> float:
         """The most of something after the warm-up."""

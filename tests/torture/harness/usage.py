@@ -14,6 +14,8 @@ MIB = 2**20
 BATCH_S = 20.0
 """Readings closer together than this are alike, and count as one."""
 
+MOST_ALIKE = 0.95
+
 T_95 = 2.1
 """Student's t for 95 % and about eighteen degrees of freedom."""
 
@@ -51,17 +53,16 @@ class Slope:
     per_hour: float
     half_width: float
 
-    @property
-    def may_be_nothing(self) -> bool:
-        """Whether there may be no growth at all."""
-        return self.per_hour - self.half_width <= 0.0
-
     def __str__(self) -> str:
         return f"{self.per_hour:+.1f} ± {self.half_width:.1f}"
 
 
 def slope(at_s: FloatArray, value: FloatArray) -> Slope:
-    """Fit a straight line through means of batches (least squares)."""
+    """Fit a straight line through means of batches (least squares).
+
+    Memory comes in steps, so neighbouring residuals are alike: the interval is that of as many
+    independent ones as their correlation leaves (autoregressive, of first order).
+    """
     batch = ((at_s - at_s[0]) // BATCH_S).astype(int)
     t = np.array([at_s[batch == b].mean() for b in np.unique(batch)]) / 3600.0
     y = np.array([value[batch == b].mean() for b in np.unique(batch)])
@@ -70,5 +71,8 @@ def slope(at_s: FloatArray, value: FloatArray) -> Slope:
     dt = t - t.mean()
     gain = float(dt @ y / (dt @ dt))
     residual = y - y.mean() - gain * dt
+    alike = float(residual[1:] @ residual[:-1]) / (float(residual @ residual) or 1.0)
+    alike = min(max(alike, 0.0), MOST_ALIKE)
     error = math.sqrt(float(residual @ residual) / (len(t) - 2) / float(dt @ dt))
+    error *= math.sqrt((1.0 + alike) / (1.0 - alike))
     return Slope(gain, T_95 * error)
