@@ -103,17 +103,18 @@ class AlarmBoard:
 
         Parameters
         ----------
+        kept
+            All of them watched.
         stored
             As they were after their newest events, which may be newer: what people did since.
         """
         newest = {alarm.identity.id: alarm for alarm in stored}
         for alarm in kept:
             id_ = alarm.identity.id
-            if id_ in self._rules:
-                told = newest.get(id_, alarm)
-                later = told.n_events > alarm.n_events
-                found = replace(told, condition=alarm.condition, timers=alarm.timers)
-                self._alarms[id_] = found if later else alarm
+            told = newest.get(id_, alarm)
+            later = told.n_events > alarm.n_events
+            found = replace(told, condition=alarm.condition, timers=alarm.timers)
+            self._alarms[id_] = found if later else alarm
 
     def told(self) -> list[AlarmNews]:
         """Hand over the news since the last call."""

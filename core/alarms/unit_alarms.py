@@ -180,7 +180,8 @@ class UnitAlarms:
             and delays go on.
         """
         stored = list(alarms)
-        kept = memory.alarms if memory else ()
+        # what nothing watches any more is no less gone for having been known to the last
+        kept = [a for a in memory.alarms if a.identity.id in self._board] if memory else []
         known = {alarm.identity.id for alarm in kept}
         self._board.restore((a for a in stored if a.identity.id not in known), host_ns)
         self._board.resume(kept, stored)
