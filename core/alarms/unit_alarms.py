@@ -204,6 +204,8 @@ class UnitAlarms:
         self._segment_faults = dict(memory.segment_faults)
         self._state = (memory.state, memory.state_ns)
         self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
+        if self._watched.link is not None:
+            self._link = memory.link_by(self._board.alarm(self._watched.link.id))
 
     def _is_repeated(self, block: SampleBlock) -> bool:
         """Whether the block brings nothing new; where samples are missing, delays stand still."""

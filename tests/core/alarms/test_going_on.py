@@ -9,7 +9,7 @@ import pytest
 from core.alarms.alarm import Alarm, AlarmLevel, AlarmState
 from core.alarms.event import AlarmNews
 from core.alarms.limits import Limits
-from core.alarms.operation import Acknowledge
+from core.alarms.operation import Acknowledge, Action, Comment
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
@@ -26,6 +26,7 @@ UNIT = Unit(
     (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0), oil_temperature="oil"),),
 )
 OIL = "U1:UJB:oil_temperature"
+LINK = "U1:link:link_lost"
 WATCHED = UnitRules(
     bearings={"UJB": BearingRules(oil_temperature=LimitRule(Limits(65.0), rule_of(0.0, 0.0)))},
     clock=None,
@@ -57,6 +58,18 @@ class Lives:
         self.store(self.alarms.take(block, [], start_ns))
         self.memory = self.alarms.memory
 
+    def hear(self, is_connected: bool, *seconds: int) -> None:
+        """Hear of the link, and let time pass; nothing is kept with that but events."""
+        self.store(self.alarms.link(is_connected, "why", seconds[0] * SECOND))
+        self.wait(*seconds[1:])
+
+    def wait(self, *seconds: int) -> None:
+        for second in seconds:
+            self.store(self.alarms.tick(second * SECOND))
+
+    def ask(self, id_: str, action: Action) -> None:
+        self.store(self.alarms.operate(id_, action, 0))
+
     def store(self, news: Iterable[AlarmNews]) -> None:
         for told in news:
             self.stored[told.alarm.identity.id] = told.alarm
@@ -84,7 +97,7 @@ def test_an_alarm_whose_limit_is_gone_is_closed_and_can_be_acknowledged(hot: Liv
     assert hot.events == [(OIL, "raised", "above_limit"), (OIL, "returned", "no_longer_watched")]
     assert hot.stored[OIL].state is AlarmState.RETURNED_UNACKNOWLEDGED
 
-    hot.store(hot.alarms.operate(OIL, Acknowledge("A. Name", 1), 0))
+    hot.ask(OIL, Acknowledge("A. Name", 1))
     assert hot.stored[OIL].state is AlarmState.NORMAL
 
 
@@ -97,7 +110,7 @@ def test_one_that_was_closed_and_not_acknowledged_is_there_after_the_next_restar
     hot.restart(NO_LIMIT)
 
     assert hot.changes(OIL) == ["raised", "returned"]
-    hot.store(hot.alarms.operate(OIL, Acknowledge("A. Name", 1), 0))
+    hot.ask(OIL, Acknowledge("A. Name", 1))
     assert hot.changes(OIL) == ["raised", "returned", "acknowledged"]
 
 
@@ -108,3 +121,42 @@ def test_one_whose_limit_comes_back_is_judged_again(hot: Lives) -> None:
 
     assert hot.changes(OIL) == ["raised", "returned", "raised"]
     assert (hot.stored[OIL].level, hot.stored[OIL].occurrence) == (AlarmLevel.ALERT, 2)
+
+
+def test_a_link_that_was_lost_when_nothing_more_was_kept_stays_lost_until_samples_come(
+    lives: Lives,
+) -> None:
+    lives.hear(True, 0)
+    lives.take(1)
+    lives.hear(False, 5, 16)
+    for _ in range(2):
+        lives.restart()
+        lives.wait(20, 21, 99)
+        assert lives.changes(LINK) == ["raised"]
+        assert not lives.alarms.is_connected
+    lives.hear(True, 100, 101)
+    assert lives.changes(LINK) == ["raised", "returned"]
+
+
+def test_a_link_that_has_come_back_since_it_was_kept_as_lost_is_there(lives: Lives) -> None:
+    lives.take(1)
+    lives.hear(False, 2, 13)
+    lives.memory = lives.alarms.memory
+    lives.hear(True, 20)
+    lives.restart()
+    lives.wait(21, 22, 60)
+
+    assert lives.changes(LINK) == ["raised", "returned"]
+    assert lives.alarms.is_connected
+
+
+def test_what_people_say_of_a_lost_link_holds_its_delay_neither_up_nor_off(lives: Lives) -> None:
+    lives.take(1)
+    lives.hear(False, 2, 8)
+    lives.memory = lives.alarms.memory
+    lives.ask(LINK, Comment("A. Name", "the cable"))
+    lives.restart()
+    lives.wait(11)
+    assert lives.changes(LINK) == ["commented"]
+    lives.wait(12)
+    assert lives.changes(LINK) == ["commented", "raised"]
