@@ -214,8 +214,9 @@ class Analysing:
         while True:
             pulse.beat(WATCH_EVERY_S)
             await asyncio.to_thread(self._holds.require)
-            if self._silence is not None and self._consumer is not None:
-                self._silence.look(self._consumer.units, self._consumer.trouble)
+            consumer, silence = self._consumer, self._silence
+            if consumer is not None and silence is not None:
+                silence.look(consumer.units, consumer.trouble, consumer.waiting)
             await self._ground.clock.sleep(WATCH_EVERY_S)
 
     def _health(self) -> Health:

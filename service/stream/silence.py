@@ -1,6 +1,6 @@
 """`Silence`: sees which units nothing comes of, whether the stream was ever reached or not."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import structlog
 
@@ -32,7 +32,12 @@ class Silence:
         self._analyser, self._live = analyser, live
         self._since_s = clock.monotonic_s()
 
-    def look(self, begun: Mapping[str, UnitProgress], trouble: str | None) -> None:
+    def look(
+        self,
+        begun: Mapping[str, UnitProgress],
+        trouble: str | None,
+        waiting: Collection[str] = frozenset(),
+    ) -> None:
         """Look at all units once.
 
         Parameters
@@ -41,8 +46,13 @@ class Silence:
             Those whose place on the stream is known.
         trouble
             Why nothing can come, where that is known.
+        waiting
+            Units of which something has come that was not taken in yet: these are not silent,
+            however long the store holds them up.
         """
         for unit in self._units:
+            if unit in waiting:
+                continue
             if unit in begun:
                 begun[unit].fall_silent(self._after_s, trouble)
             elif self._clock.monotonic_s() - self._since_s > self._after_s:

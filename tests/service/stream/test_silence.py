@@ -1,6 +1,6 @@
 """A unit of which nothing comes is lost, and stays lost, whoever starts and stops meanwhile."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -52,6 +52,7 @@ class Process:
     silence: Silence
     clock: Stepped
     is_reached: bool = True
+    waiting: Collection[str] = ()
 
     async def take(self, messages: list[Message]) -> None:
         """Take messages in, a second each, and store what comes of them."""
@@ -66,7 +67,8 @@ class Process:
         for _ in range(round(TICKS_PER_S * seconds)):
             self.clock.step(1 / TICKS_PER_S)
             alarms.tick()
-            self.silence.look({UNIT: self.life.progress} if self.is_reached else {}, None)
+            begun = {UNIT: self.life.progress} if self.is_reached else {}
+            self.silence.look(begun, None, self.waiting)
         await self.life.analysis.recorder.flush()
 
     @property
@@ -196,3 +198,16 @@ async def test_a_process_that_was_killed_after_blocks_came_back_raises_nothing_a
         await again.wait(AFTER_S - 1.0)
         await again.take(place.messages[N_BLOCKS:])
         assert again.changes == [("raised", 1), ("returned", 1)]
+
+
+async def test_a_unit_whose_blocks_wait_for_the_store_is_not_silent(place: Place) -> None:
+    async with place.process() as first:
+        await first.take(place.messages[:N_BLOCKS])
+        first.waiting = [UNIT]
+        await first.wait(3 * SURELY_S)
+        assert first.changes == []
+        first.waiting = []
+        await first.take(place.messages[N_BLOCKS:])
+        assert (first.changes, first.n_judged > 0) == ([], True)
+        await first.wait(SURELY_S)
+        assert first.changes == [("raised", 1)]
