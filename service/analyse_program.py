@@ -43,6 +43,7 @@ from service.stream.consumer import Consumer
 from service.stream.consumer_metrics import consumer_metrics
 from service.stream.names import identity_of
 from service.stream.progress import UnitProgress
+from service.stream.silence import Silence
 from service.stream.stored import memories_of, usable
 from service.supervision import Supervision
 from service.wiring.delivery import router_of
@@ -119,6 +120,7 @@ class Analysing:
         self._memories: dict[str, UnitMemory] = {}
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
+        self._silence: Silence | None = None
         self._silent_units: SilentUnits | None = None
 
     async def run(
@@ -172,6 +174,8 @@ class Analysing:
         everywhere = [unit.id for unit in self._plant.unit]
         silent = SilentUnits(everywhere, analysis.alarms, ground.store, ground.clock)
         self._silent_units = silent
+        after_s = self._settings.silent_after_s
+        self._silence = Silence(monitors, after_s, analysis.analyser, ground.live, ground.clock)
         tend = ground.beats.tend
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)
@@ -224,9 +228,9 @@ class Analysing:
         while True:
             pulse.beat(WATCH_EVERY_S)
             await asyncio.to_thread(self._holds.require)
-            units = self._consumer.units if self._consumer else {}
-            for progress in units.values():
-                progress.fall_silent(self._settings.silent_after_s, self._trouble())
+            consumer, silence = self._consumer, self._silence
+            if consumer is not None and silence is not None:
+                silence.look(consumer.units, consumer.trouble, consumer.waiting)
             await self._ground.clock.sleep(WATCH_EVERY_S)
 
     def _health(self) -> Health:

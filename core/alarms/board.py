@@ -6,6 +6,7 @@ from dataclasses import replace
 from core.alarms.alarm import Alarm, AlarmKind, AlarmRule, Condition, unknown
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance, interrupted, restored
+from core.alarms.memory import is_same_occurrence
 from core.alarms.operation import Action, expire, operate
 from core.alarms.watch import Watch
 
@@ -103,17 +104,16 @@ class AlarmBoard:
 
         Parameters
         ----------
+        kept
+            All of them watched.
         stored
-            As they were after their newest events, which may be newer: what people did since.
+            As they were after their newest events, which may be newer: what people did since, and
+            what became of a link while no block came with which more could be kept.
         """
         newest = {alarm.identity.id: alarm for alarm in stored}
         for alarm in kept:
             id_ = alarm.identity.id
-            if id_ in self._rules:
-                told = newest.get(id_, alarm)
-                later = told.n_events > alarm.n_events
-                found = replace(told, condition=alarm.condition, timers=alarm.timers)
-                self._alarms[id_] = found if later else alarm
+            self._alarms[id_] = _gone_on(alarm, newest.get(id_, alarm))
 
     def told(self) -> list[AlarmNews]:
         """Hand over the news since the last call."""
@@ -124,3 +124,12 @@ class AlarmBoard:
         self._alarms[id_] = alarm
         if events:
             self._news.append(AlarmNews(alarm, events))
+
+
+def _gone_on(kept: Alarm, stored: Alarm) -> Alarm:
+    """An alarm as it was kept, with what its newest events have made of it since."""
+    if stored.n_events <= kept.n_events:
+        return kept
+    if stored.identity.kind in JUDGED_WITHOUT_DATA and not is_same_occurrence(kept, stored):
+        return restored(stored)
+    return replace(stored, condition=kept.condition, timers=kept.timers)

@@ -33,3 +33,22 @@ class AlarmMemory:
     stop: tuple[int, int] | None
     is_connected: bool
     link_reason: str | None
+
+    def link_by(self, alarm: Alarm) -> tuple[bool, str | None]:
+        """Whether samples arrive as far as is known, and why not.
+
+        Parameters
+        ----------
+        alarm
+            About the link, by its newest event. What came of it since all this was remembered
+            counts more: a link that was lost then stays lost until samples come.
+        """
+        kept = next((a for a in self.alarms if a.identity == alarm.identity), Alarm(alarm.identity))
+        if is_same_occurrence(kept, alarm):
+            return self.is_connected, self.link_reason
+        return (True, None) if alarm.level is None else (False, alarm.condition.reason)
+
+
+def is_same_occurrence(one: Alarm, other: Alarm) -> bool:
+    """Whether an alarm has neither been raised nor returned between two moments."""
+    return (one.level, one.occurrence) == (other.level, other.occurrence)

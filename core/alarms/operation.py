@@ -7,6 +7,11 @@ from typing import TypeAlias
 from core.alarms.alarm import Alarm, Hold
 from core.alarms.event import AlarmChange, AlarmEvent, changed
 from core.alarms.life_cycle import shown_again, standing_level
+from core.units import NS_PER_S
+
+CLOCK_MARGIN_NS = 60 * NS_PER_S
+"""By how much a clock may be earlier than when an alarm was shelved: hosts differ by less, and NTP
+steps by less."""
 
 
 class ActionRefusedError(ValueError):
@@ -96,15 +101,28 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
 
 
 def expire(alarm: Alarm, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Bring a shelved alarm back when its time is up, by the host's clock."""
+    """Bring a shelved alarm back when its time is up, by the host's clock.
+
+    It comes back as well where that clock is earlier than when it was shelved: the clock was set
+    back, and the end lies as much too far ahead as it was wrong. So it is never hidden from now on
+    for longer than it was shelved for, and a minute.
+    """
     shelf = alarm.shelf
-    if shelf is None or shelf.until_ns is None or shelf.until_ns > now_ns:
+    reason = None if shelf is None else _why_over(shelf, now_ns)
+    if reason is None:
         return alarm, ()
     after = shown_again(replace(alarm, shelf=None))
-    after, event = changed(
-        alarm, after, AlarmChange.UNSHELVED, now_ns, reason="the time it was shelved for is up"
-    )
+    after, event = changed(alarm, after, AlarmChange.UNSHELVED, now_ns, reason=reason)
     return after, (event,)
+
+
+def _why_over(shelf: Hold, now_ns: int) -> str | None:
+    """Why a shelf has ended; None if it has not."""
+    if shelf.until_ns is not None and shelf.until_ns <= now_ns:
+        return "the time it was shelved for is up"
+    if now_ns < shelf.since_ns - CLOCK_MARGIN_NS:
+        return "the clock was set back since it was shelved"
+    return None
 
 
 _Result: TypeAlias = tuple[Alarm, AlarmChange, str] | None

@@ -180,7 +180,8 @@ class UnitAlarms:
             and delays go on.
         """
         stored = list(alarms)
-        kept = memory.alarms if memory else ()
+        # what nothing watches any more is no less gone for having been known to the last
+        kept = [a for a in memory.alarms if a.identity.id in self._board] if memory else []
         known = {alarm.identity.id for alarm in kept}
         self._board.restore((a for a in stored if a.identity.id not in known), host_ns)
         self._board.resume(kept, stored)
@@ -203,6 +204,8 @@ class UnitAlarms:
         self._segment_faults = dict(memory.segment_faults)
         self._state = (memory.state, memory.state_ns)
         self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
+        if self._watched.link is not None:
+            self._link = memory.link_by(self._board.alarm(self._watched.link.id))
 
     def _is_repeated(self, block: SampleBlock) -> bool:
         """Whether the block brings nothing new; where samples are missing, delays stand still."""

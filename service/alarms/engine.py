@@ -122,6 +122,10 @@ class AlarmEngine:
         if self._stream is not None:
             refuse(self._stream, unit, reason)
 
+    def is_connected(self, unit: str) -> bool:
+        """Whether samples of a unit arrive, by what was said last."""
+        return self._units[unit].is_connected
+
     def memory(self, unit: str) -> AlarmMemory:
         """What must be known of the alarms of a unit, beside their events, to go on elsewhere."""
         return self._units[unit].memory
@@ -212,7 +216,7 @@ class AlarmEngine:
             return True
         if alarm.identity.unit not in self._units:
             return alarm.condition.is_known
-        return alarm.condition.is_known and self._units[alarm.identity.unit].is_connected
+        return alarm.condition.is_known and self.is_connected(alarm.identity.unit)
 
     def count(self) -> AlarmCount:
         """How many alarms are on the list."""

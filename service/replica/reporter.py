@@ -84,6 +84,8 @@ class Reporter:
             await asyncio.to_thread(self._write, seen)
         except StoreError as error:
             self._trouble.note(str(error))
+            # it may have been written all the same: no other state ever gets its number
+            self._written |= {s.unit: (s.revision, None) for s in seen if s.state is not None}
             return
         self._trouble.note(None)
         self._written |= {s.unit: (s.revision, s.state) for s in seen if s.state is not None}

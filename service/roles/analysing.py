@@ -96,6 +96,10 @@ class Analyser:
         """Let alarms know whether samples of a unit arrive."""
         self._alarms.link(news.unit, news.is_connected, news.reason)
 
+    def is_connected(self, unit: str) -> bool:
+        """Whether samples of a unit arrive, by what alarms have heard last."""
+        return self._alarms.is_connected(unit)
+
 
 async def _others() -> None:
     """Let all others have their turns: a bearing takes milliseconds, and many may be waiting."""

@@ -61,7 +61,7 @@ class StreamSettings(Settings):
     own rings overrun later."""
 
     silent_after_s: Annotated[float, Field(ge=2.0, le=3600.0)] = 30.0
-    """After how long without a block a unit that was connected counts as lost, s."""
+    """After how long without a block a unit counts as lost, also right after a start; s."""
 
     acquire_port: Annotated[int, Field(ge=0, le=65535)] = 8091
     """Port of the health page of padwatch acquire, on this computer only; 0 takes a free one."""

@@ -69,6 +69,11 @@ class Consumer:
         self.trouble: str | None = "the servers have not been reached yet"
         self.n_pending: dict[str, int] = {}
 
+    @property
+    def waiting(self) -> frozenset[str]:
+        """Units of which messages wait here to be taken in, as while nothing can be stored."""
+        return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
+
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Feed for ever, over one connection after the other."""
         async with asyncio.TaskGroup() as tasks:

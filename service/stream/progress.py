@@ -23,6 +23,9 @@ from service.stream.wire_errors import WireError
 
 log = structlog.get_logger()
 
+MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
+"""States in which nobody has said yet that samples do not."""
+
 
 class UnitProgress:
     """Takes the messages of one unit in, in order and each once.
@@ -61,9 +64,9 @@ class UnitProgress:
         self._window = Window()
         self._stored = stored
         self._memory = None if stored is None else memory
-        self._heard_s: float | None = None
         self._is_rewound = False
         self._done = done
+        self._heard_s = clock.monotonic_s()
         self._why_refused: str | None = None
         self.sequence = 0
         self.behind_s = 0.0
@@ -130,9 +133,11 @@ class UnitProgress:
         trouble
             Why nothing can come, where that is known.
         """
-        if self._heard_s is None or self._clock.monotonic_s() - self._heard_s <= after_s:
+        if self._clock.monotonic_s() - self._heard_s <= after_s:
             return
-        if self._live.status(self.unit).state is LinkState.CONNECTED:
+        if self._live.status(self.unit).state in MAY_ARRIVE or self._analyser.is_connected(
+            self.unit
+        ):
             silence = f"no block for {after_s:g} s: is `padwatch acquire` running?"
             reason = trouble or self._why_refused or silence
             self._hear(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
@@ -185,7 +190,9 @@ class UnitProgress:
             self._hear(message)
             self.sequence = sequence
             return
-        if self._live.status(self.unit).state is not LinkState.CONNECTED:
+        # what was seen once more told nobody of the link, nor does a stored alarm know of it
+        is_known = self._analyser.is_connected(self.unit)
+        if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
             self._hear(LinkNews(self.unit, LinkState.CONNECTED))
         findings = await self._analyser.learn(message.block, self._sampled_s(message))
         self.sequence = sequence

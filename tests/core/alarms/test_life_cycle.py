@@ -17,6 +17,7 @@ from core.alarms.operation import (
     Unshelve,
     expire,
 )
+from core.units import NS_PER_S
 
 Make = Callable[..., Any]
 
@@ -203,6 +204,26 @@ def test_what_is_raised_and_returns_on_the_shelf_still_waits_to_be_seen(life: Ma
 def test_shelving_needs_a_time_that_is_still_to_come(life: Make) -> None:
     with pytest.raises(ActionRefusedError, match="has passed already"):
         life().ask(Shelve("A. Name", "too late", 50), 50)
+
+
+@pytest.mark.parametrize(
+    ("set_by_s", "is_hidden"), [(0, True), (-59, True), (-61, False), (-365 * 86_400, False)]
+)
+def test_a_clock_that_was_ahead_when_an_alarm_was_shelved_does_not_hide_it_for_longer(
+    life: Make, set_by_s: int, is_hidden: bool
+) -> None:
+    alarm, now_ns = life(), 1_767_225_600 * NS_PER_S
+    alarm.find(ALERT, now_ns)
+    alarm.ask(Acknowledge("A. Name", 1), now_ns)
+    alarm.ask(Shelve("A. Name", "test of the probes", now_ns + 8 * 3600 * NS_PER_S), now_ns)
+
+    after, events = expire(alarm.alarm, now_ns + set_by_s * NS_PER_S)
+
+    if is_hidden:
+        assert (after, events) == (alarm.alarm, ())
+    else:
+        assert after.state is AlarmState.UNACKNOWLEDGED
+        assert [event.reason for event in events] == ["the clock was set back since it was shelved"]
 
 
 def test_out_of_service_hides_more_than_the_shelf_and_ends_only_by_hand(life: Make) -> None:

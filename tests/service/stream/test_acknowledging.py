@@ -62,7 +62,7 @@ async def publish(plant: PlantFile, n_times: int = 1) -> None:
 
 
 @asynccontextmanager
-async def analysing(plant: PlantFile) -> AsyncIterator[None]:
+async def analysing(plant: PlantFile) -> AsyncIterator[Analysing]:
     """The analysis of a process, until it is left; what is not stored by then is lost."""
     clock = SystemClock()
     store, live = open_store(plant), live_view(plant, clock)
@@ -73,7 +73,7 @@ async def analysing(plant: PlantFile) -> AsyncIterator[None]:
     process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(live))
     task = asyncio.create_task(process._analyse())
     try:
-        yield
+        yield process
     finally:
         task.cancel()
         await asyncio.wait([task])
@@ -204,6 +204,20 @@ async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_w
         await until(lambda: _is(any("messages_refused" in alarm for alarm, _ in alarms())))
     (reason,) = (reason for alarm, reason in alarms() if alarm == f"{UNIT}:stream:messages_refused")
     assert reason
+
+
+async def test_a_unit_is_known_to_have_blocks_that_wait_while_nothing_can_be_stored(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    async with looking(plant, server) as look, analysing(plant) as process:
+        await until(lambda: _is(process._consumer is not None))
+        consumer = process._consumer
+        assert consumer is not None
+        async with busy_database(plant):
+            await publish(plant)
+            await until(lambda: _is(consumer.waiting == {UNIT}))
+        await until(lambda: _is(look.stored() == N_BLOCKS))
+        assert consumer.waiting == set()
 
 
 @pytest.mark.planted("acknowledged before the commit")

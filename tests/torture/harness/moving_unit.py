@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.clock import SystemClock
+from acquisition.clock import Clock, SystemClock
 from service.bus import Bus
 from service.delivery.facts import Around
 from service.heartbeats import Heartbeats
@@ -62,9 +62,12 @@ class MovingUnit:
     ----------
     plant_file
         Its data folder holds the database.
+    clock
+        The host's own if none is given.
     """
 
-    def __init__(self, plant_file: Path) -> None:
+    def __init__(self, plant_file: Path, clock: Clock | None = None) -> None:
+        self._clock = clock or SystemClock()
         self.plant: PlantFile = load_plant_file(plant_file)
         self.database = Path(self.plant.service.data_folder) / "padwatch.sqlite3"
         self.identity = identity_of(self.plant, self.plant.unit[0])
@@ -80,7 +83,7 @@ class MovingUnit:
             All of them, and an end in good order, where it is None.
         """
         with ExitStack() as stack:
-            life = await self._begun(messages[-1][0], stack)
+            life = await self.begun(messages[-1][0], stack)
             life.progress.reaches_back(messages[0][0])
             wanted = [each for each in messages if each[0] >= life.progress.first_needed]
             await life.take(wanted[:n], rng)
@@ -92,8 +95,15 @@ class MovingUnit:
             await analysis.tape.close()
             analysis.recordings.close()
 
-    async def _begun(self, newest: int, stack: ExitStack) -> Life:
-        plant, clock = self.plant, SystemClock()
+    async def begun(self, newest: int, stack: ExitStack) -> Life:
+        """Start anew where the database says; the stack closes the database.
+
+        Parameters
+        ----------
+        newest
+            Number of the newest message on the stream.
+        """
+        plant, clock = self.plant, self._clock
         unit = plant.unit[0]
         store, live = SqliteStore(self.database), live_view(plant, clock)
         stack.callback(store.close)

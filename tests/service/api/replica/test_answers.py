@@ -4,9 +4,11 @@ from typing import Any
 
 import pytest
 
+from core.alarms.alarm import AlarmLevel, AlarmState
 from service.live import LinkState
 from service.replica.live import NOBODY, SILENT_AFTER_S
 from service.roles.replica import replica_on
+from service.store.port import StoreError
 
 SAME = [
     "/api/v1/overview",
@@ -21,6 +23,7 @@ SAME = [
     "/api/v1/alarms/plant:store:results_not_stored",
     "/api/v1/delivery",
 ]
+LINK = "U1:link:link_lost"
 ELSEWHERE = {"captures", "evidence", "refresh_s"}
 """Of the overview: what lies with the process that analyses, and what the test rounds."""
 
@@ -154,3 +157,30 @@ async def test_a_report_of_another_version_is_no_sign_of_life(
     await pair.told()
 
     assert not pair.replica.live.is_alive("U1")
+
+
+@pytest.mark.parametrize("is_written", [True, False])
+async def test_what_follows_a_report_whose_fate_nobody_knew_is_shown(
+    pair: Any, monkeypatch: pytest.MonkeyPatch, is_written: bool
+) -> None:
+    stored, alarms = pair.service.store.unit_states, pair.service.alarms
+    write = stored.report
+
+    def without_an_answer(*told: Any) -> None:
+        if is_written:
+            write(*told)
+        raise StoreError("the answer got lost")
+
+    alarms.link("U1", True)
+    alarms.link("U1", False, "cut")
+    pair.pass_time(20.0)
+    alarms.tick()
+    with monkeypatch.context() as patched:
+        patched.setattr(stored, "report", without_an_answer)
+        await pair.told()
+    assert pair.replica.alarms.alarm(LINK).level is (AlarmLevel.ALERT if is_written else None)
+
+    alarms.link("U1", True)
+    await pair.told()
+    shown = pair.replica.alarms.alarm(LINK)
+    assert (shown.level, shown.state) == (None, AlarmState.RETURNED_UNACKNOWLEDGED)
