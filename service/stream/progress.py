@@ -6,6 +6,7 @@ from dataclasses import replace
 import structlog
 
 from acquisition.clock import Clock
+from core.misfit import BlockMisfitError
 from core.units import s_from_ns
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
@@ -15,6 +16,7 @@ from service.roles.unit_memory import UnitMemory
 from service.store.positions_port import StreamPosition
 from service.stream.identity import UnitIdentity
 from service.stream.memory import written
+from service.stream.possible import require_possible
 from service.stream.window import Window
 from service.stream.wire import Taken, decoded
 from service.stream.wire_errors import WireError
@@ -90,6 +92,8 @@ class UnitProgress:
             return True
         try:
             message = decoded(payload, self._identity)
+            if isinstance(message, Taken):
+                self._require_fit(message)
         except WireError as error:
             self._refuse(sequence, error)
             self.sequence = sequence
@@ -101,6 +105,14 @@ class UnitProgress:
             self._settle()
             await self._live_on(sequence, message)
         return True
+
+    def _require_fit(self, message: Taken) -> None:
+        """Refuse a block that no monitor of the unit takes, whatever its marks say."""
+        require_possible(message.block)
+        try:
+            self._analyser.require(message.block)
+        except BlockMisfitError as error:
+            raise WireError("misfit", str(error)) from None
 
     def position(self) -> StreamPosition:
         """How far the unit is; its memory of now goes with it."""
