@@ -15,6 +15,7 @@ from core.overall_results import overall_results, phase_results
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import (
+    NOT_TOLD,
     Quality,
     Reading,
     Reason,
@@ -122,7 +123,7 @@ class BearingResults:
         """Whether speed and load stood still over the averaging window."""
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
-        powers = [segment.slow[power] for segment in self._segments] if power else []
+        powers = [segment.slow.get(power, NOT_TOLD) for segment in self._segments] if power else []
         return stationarity(_numbers(speeds), _numbers(powers), self._settings.sensors)
 
     def _order_line(self, line: int) -> OrderLine:

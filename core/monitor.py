@@ -77,7 +77,7 @@ class UnitMonitor(MonitoredUnit):
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take a block in and hand over what is learnt by it, one bearing at a time."""
-        self._require_own(block)
+        self.require(block)
         for piece in _pieces(block, self._settings.segment_samples):
             self._write(piece)
             yield from self._complete_segments()

@@ -56,13 +56,17 @@ class Monitor(Protocol):
         """Hand over the gaps found since the last call, to be recorded."""
         ...
 
+    def require(self, block: SampleBlock) -> None:
+        """Refuse a block that does not fit the unit, with a `BlockMisfitError`."""
+        ...
+
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take a block in and hand over what is learnt by it, one bearing at a time.
 
         Raises
         ------
-        ValueError
-            If the block does not fit the unit.
+        BlockMisfitError
+            If the block does not fit the unit; nothing is changed then.
         """
         ...
 

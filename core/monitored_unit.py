@@ -8,6 +8,7 @@ from core.adoption import bearings_with_new_references, require_same_machine
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
+from core.misfit import BlockMisfitError
 from core.monitor_state import MonitorState
 from core.outage import Reach, outage, restart
 from core.probe_axes import Growth
@@ -93,7 +94,7 @@ class MonitoredUnit(ABC):
 
         Raises
         ------
-        ValueError
+        BlockMisfitError
             If the block is not of this unit, or has another rate or number of channels; the
             message gives both.
         """
@@ -103,25 +104,35 @@ class MonitoredUnit(ABC):
         gaps, self._gaps = self._gaps, []
         return gaps
 
-    def _require_own(self, block: SampleBlock) -> None:
-        """Refuse a block of another unit or another rate, with a ValueError that gives both."""
+    def require(self, block: SampleBlock) -> None:
+        """Refuse a block that does not fit the unit, before anything has changed.
+
+        Raises
+        ------
+        BlockMisfitError
+            If it is of another unit, rate or number of channels; the message gives both.
+        """
         if block.unit != self.unit.id:
-            raise ValueError(f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}")
+            raise BlockMisfitError(
+                f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}"
+            )
         if block.rate_hz != self.unit.rate_hz:
-            raise ValueError(f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz")
+            raise BlockMisfitError(
+                f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz"
+            )
+        self._ring.require(block)
 
     def _write_to_ring(self, block: SampleBlock) -> None:
         """Take a block in; all that is missing before it is a gap, whoever has refused it."""
-        epoch, stop_index = self._ring.epoch, self._ring.stop_index
+        epoch, n_missing = self._ring.epoch, self._ring.n_missing_before(block)
         self._ring.write(block)
         if epoch is None:
             self._gaps += outage(self._reach, block) if self._reach else []
         elif epoch != block.epoch:
             lost = restart(self._reach, block) if self._reach else None
             self._gaps += [lost] if lost else []
-            stop_index = 0
-        if epoch is not None and block.first_index > stop_index:
-            n_missing = block.first_index - stop_index
-            self._gaps.append(Gap(block.epoch, stop_index, n_missing, block.start_ns))
+        if n_missing:
+            first_index = block.first_index - n_missing
+            self._gaps.append(Gap(block.epoch, first_index, n_missing, block.start_ns))
         if block.stop_index == self._ring.stop_index:
             self._reach = Reach(block.epoch, block.stop_index, block.stop_ns)

@@ -56,8 +56,35 @@ def restart(reach: Reach, block: SampleBlock) -> Gap | None:
     -------
     None if by the device's clock nothing is; what it has counted since is no part of it.
     """
-    lost = _lost(reach, reach.stop_ns, _begin_ns(block), block.rate_hz)
+    stop_ns = _begin_ns(block) if n_missed(reach.stop_ns, block) else block.start_ns
+    lost = _lost(reach, reach.stop_ns, stop_ns, block.rate_hz)
     return lost if lost.n_samples else None
+
+
+def begins_anew(reach: Reach, block: SampleBlock) -> bool:
+    """Whether a block that lies behind what has arrived, by its index, is new by its time.
+
+    Then it is no repetition: the device has begun to count again, in the same epoch.
+    """
+    if block.epoch != reach.epoch or block.first_index >= reach.stop_index:
+        return False
+    return block.start_ns >= reach.stop_ns - TOLERANCE_NS and not _goes_on(reach, block)
+
+
+def n_missed(stop_ns: int, block: SampleBlock) -> int:
+    """Samples of a new count that were not delivered, before the first block of it.
+
+    A count that by its index began before the last sample that arrived says nothing of what is
+    missing: it is of one that was not begun but found, as a counter that went on or has wrapped.
+
+    Parameters
+    ----------
+    stop_ns
+        Time up to which samples have arrived, of counts before.
+    """
+    counted_ns = ns_from_s(block.first_index / block.rate_hz)
+    tolerance_ns = TOLERANCE_NS + DRIFT * counted_ns
+    return block.first_index if _begin_ns(block) >= stop_ns - tolerance_ns else 0
 
 
 def _goes_on(reach: Reach, block: SampleBlock) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 
 from core.machine import Bearing, Measurand, Unit
 from core.probe_axes import Growth, ProbeAxis
-from core.quality import Reading, Reason, mean_reading, missing
+from core.quality import NOT_TOLD, Reading, Reason, mean_reading, missing
 from core.segments import Segment
 from core.shaft_centre import locate_shaft
 from core.uncertainty import Budget
@@ -63,7 +63,7 @@ def mean_slow(segments: Sequence[Segment], channel: str | None) -> Reading:
     """Mean of a slow channel over the segments."""
     if channel is None:
         return missing(Reason.NOT_MEASURED)
-    return mean_reading([segment.slow[channel] for segment in segments])
+    return mean_reading([segment.slow.get(channel, NOT_TOLD) for segment in segments])
 
 
 def probe_axis(

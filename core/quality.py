@@ -101,6 +101,10 @@ def missing(reason: Reason) -> Reading:
     return Reading(None, bad(reason))
 
 
+NOT_TOLD = missing(Reason.NOT_MEASURED)
+"""What a slow channel reads that a block says nothing of."""
+
+
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
     """Mean of the usable readings; when the newest is not usable, nothing is."""
     if readings[-1].value is None:

@@ -1,14 +1,16 @@
 """The ring of the newest samples of one unit, which knows what it does not hold."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from core.account import Gap, SampleAccount
-from core.blocks import SampleBlock
-from core.quality import Level, Quality, Reading, mean_reading, worst
+from core.blocks import Rejection, SampleBlock
+from core.misfit import BlockMisfitError
+from core.outage import n_missed
+from core.quality import NOT_TOLD, Level, Quality, Reading, mean_reading, worst
 from core.units import ns_from_s
 
 
@@ -47,36 +49,51 @@ class Ring:
         self._unit = ""
         self.epoch: int | None = None
         self.stop_index = 0
+        self._stop_ns = 0
         self.account = SampleAccount()
 
     def write(self, block: SampleBlock) -> Gap | None:
         """Take a block in; return the gap before it, if there is one.
 
-        Samples that were already taken are dropped and counted, never joined on again.
+        Samples that were already taken are dropped and counted, never joined on again; so are
+        rejected ones, as far as they are more than the jump in the index.
 
         Raises
         ------
-        ValueError
-            If the block has another number of channels than the ring, or names more rejected
-            samples than the jump in the index leaves room for.
+        BlockMisfitError
+            As `require` does.
         """
-        if block.samples.shape[0] != self._samples.shape[0]:
-            raise ValueError(
-                f"{block.samples.shape[0]} channels offered to a ring of {self._samples.shape[0]}"
-            )
+        self.require(block)
         self._unit = block.unit
         if self.epoch is None:  # what came before padwatch looked was not offered to it
-            block = replace(block, rejected=())
             self.epoch, self.stop_index = block.epoch, block.first_index
             self.contiguous_from = block.first_index
-        gap = self._gap_before(block)
-        self.account = self.account.with_lost(gap, block.rejected)
+        n_missing = self.n_missing_before(block)
+        rejected = tuple(_within(block.rejected, n_missing))
+        n_gap = n_missing - sum(rejection.n_samples for rejection in rejected)
+        gap = _gap(block, n_missing, n_gap) if n_gap else None
+        self.account = self.account.with_lost(gap, rejected)
         if block.epoch != self.epoch:
             self._start_epoch(block.epoch)
         if block.first_index > self.stop_index:
             self.contiguous_from = self.stop_index = block.first_index
         self._take(block)
         return gap
+
+    def require(self, block: SampleBlock) -> None:
+        """Refuse a block of another number of channels, with a `BlockMisfitError`."""
+        if block.samples.shape[0] != self._samples.shape[0]:
+            raise BlockMisfitError(
+                f"{block.samples.shape[0]} channels offered to a ring of {self._samples.shape[0]}"
+            )
+
+    def n_missing_before(self, block: SampleBlock) -> int:
+        """Samples between those that have been taken and a block, whoever has them."""
+        if self.epoch is None:
+            return 0
+        if block.epoch != self.epoch:
+            return n_missed(self._stop_ns, block)
+        return max(block.first_index - self.stop_index, 0)
 
     def holds(self, first_index: int, stop_index: int) -> bool:
         """Whether these samples are all here, without a gap."""
@@ -112,20 +129,10 @@ class Ring:
                 for qualities in zip(*(s.channel_quality for s in stretches), strict=True)
             ),
             slow={
-                id_: mean_reading([s.slow[id_] for s in stretches], n_samples)
+                id_: mean_reading([s.slow.get(id_, NOT_TOLD) for s in stretches], n_samples)
                 for id_ in reference.slow
             },
         )
-
-    def _gap_before(self, block: SampleBlock) -> Gap | None:
-        expected = self.stop_index if block.epoch == self.epoch else 0
-        n_missing = max(block.first_index - expected, 0)
-        n_rejected = sum(rejection.n_samples for rejection in block.rejected)
-        if n_rejected > n_missing:
-            raise ValueError(f"{n_rejected} samples rejected in a jump of {n_missing}")
-        if n_missing == n_rejected:
-            return None
-        return Gap(block.epoch, expected, n_missing - n_rejected, block.start_ns)
 
     def _start_epoch(self, epoch: int) -> None:
         self._stretches.clear()
@@ -152,6 +159,19 @@ class Ring:
                 slow=fresh.slow,
             )
         )
-        self.stop_index = fresh.stop_index
+        self.stop_index, self._stop_ns = fresh.stop_index, fresh.stop_ns
         while self._stretches[0].stop_index <= self.stop_index - self._capacity:
             self._stretches.popleft()
+
+
+def _within(rejected: Iterable[Rejection], n_most: int) -> Iterator[Rejection]:
+    """What of these samples can have been offered in a jump; the rest was offered before."""
+    for rejection in rejected:
+        n_samples = max(0, min(rejection.n_samples, n_most))
+        n_most -= n_samples
+        if n_samples:
+            yield replace(rejection, n_samples=n_samples)
+
+
+def _gap(block: SampleBlock, n_missing: int, n_samples: int) -> Gap:
+    return Gap(block.epoch, block.first_index - n_missing, n_samples, block.start_ns)

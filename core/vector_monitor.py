@@ -79,7 +79,7 @@ class VectorMonitor(MonitoredUnit):
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take rows in, a sample for each poll, and hand over what is learnt, one bearing each."""
-        self._require_own(block)
+        self.require(block)
         epoch, taken_up_to = self._ring.epoch, self._ring.stop_index
         self._write_to_ring(block)
         if block.epoch != epoch:

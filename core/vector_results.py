@@ -13,7 +13,7 @@ from core.machine import Bearing, Unit
 from core.overall_results import OVERALL_NAMES
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
-from core.quality import Level, Quality, Reading, Reason, missing, uncertain, worst
+from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, uncertain, worst
 from core.segments import ORDER1, VORTEX
 from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
@@ -148,7 +148,7 @@ class VectorResults:
     def _steadiness(self) -> Quality:
         power = self._unit.power_channel
         speeds = [poll.speed.rpm.value for poll in self._polls]
-        powers = [poll.slow[power].value for poll in self._polls] if power else []
+        powers = [poll.slow.get(power, NOT_TOLD).value for poll in self._polls] if power else []
         return stationarity(_numbers(speeds), _numbers(powers), self._settings.sensors)
 
     def _quality(self, line: int, *places: int) -> Quality | Reading:

@@ -22,6 +22,9 @@ class Assembler:
         Waveform and slow channels of the unit.
     hold_s
         For how long a message without counter is valid.
+    begun_ns
+        When this life of the adapter began, UTC; 0 where a log is read, which is the same each
+        time.
 
     Attributes
     ----------
@@ -30,17 +33,23 @@ class Assembler:
     """
 
     def __init__(
-        self, plan: Plan, n_channels: int, n_slow: int, rate_hz: float, hold_s: float
+        self,
+        plan: Plan,
+        n_channels: int,
+        n_slow: int,
+        rate_hz: float,
+        hold_s: float,
+        begun_ns: int = 0,
     ) -> None:
         self._plan = plan
         self._hold = max(1, round(hold_s * rate_hz))
         self.refused: RefusalCounts = Counter()
-        self._counted = CountedInstants(plan, rate_hz, self.refused)
-        self._uncounted = UncountedInstants(plan, rate_hz, self.refused)
+        self._counted = CountedInstants(plan, rate_hz, self.refused, begun_ns)
+        self._uncounted = UncountedInstants(plan, rate_hz, self.refused, begun_ns)
         self._builder = RawBlockBuilder(plan, n_channels, n_slow, rate_hz)
         self._early: dict[str | int, float] = {}
         self._ready: list[Instant] = []
-        self._epoch = 0
+        self._epoch = self._counted.epoch
 
     def take(self, frames: Iterable[Frame], arrived_ns: int) -> list[RawBlock]:
         """Take the frames of a batch; return the blocks that this completes, in order.

@@ -6,12 +6,13 @@ from acquisition.can.counter_axis import CounterAxis, Jump, Mark
 from acquisition.can.instants import Instant, PendingInstant, Refusal, RefusalCounts
 from acquisition.can.plan import Counter as PartCounter
 from acquisition.can.plan import Part, Plan
+from acquisition.epochs import Epochs
 
 MAX_PENDING = 64
 """Instants that may be incomplete at the same time."""
 
-_EPOCH_WIDTH = 1 << 32
-"""Restarts that the device does not tell count above what its epoch can say."""
+_WIDE = 1 << 32
+"""A counter of fewer samples than this wraps while nobody looks."""
 
 
 @dataclass(frozen=True)
@@ -38,17 +39,22 @@ class CountedInstants:
     ----------
     refused
         Where refused frames are counted.
+    begun_ns
+        When this life of the adapter began, UTC.
     """
 
-    def __init__(self, plan: Plan, rate_hz: float, refused: RefusalCounts) -> None:
+    def __init__(
+        self, plan: Plan, rate_hz: float, refused: RefusalCounts, begun_ns: int = 0
+    ) -> None:
         self._plan = plan
         self._refused = refused
         self._axis = CounterAxis(rate_hz, plan.samples_per_frame)
         self._tells_epoch = any(
             part.epoch and part.counter for m in plan.messages.values() for part in m.parts.values()
         )
+        is_wide = plan.widest_modulus >= _WIDE
+        self._epochs = Epochs(begun_ns, trusts_device=self._tells_epoch and is_wide)
         self._told_epoch: int | None = None
-        self._n_restarts = 0
         self._doubted: list[_Doubted] = []
         self._incomplete = 0
         self._unusable: list[int] = []
@@ -56,8 +62,8 @@ class CountedInstants:
 
     @property
     def epoch(self) -> int:
-        """What the device told, and how often it began anew without telling."""
-        return (self._told_epoch or 0) + self._n_restarts * _EPOCH_WIDTH
+        """Number of the present count."""
+        return self._epochs.number
 
     @property
     def now(self) -> int | None:
@@ -108,7 +114,9 @@ class CountedInstants:
             if mark.modulus < self._plan.widest_modulus:
                 self._refused[Refusal.BEFORE_START] += 1
                 return []
-            self._told_epoch = frame.epoch if frame.epoch is not None else self._told_epoch
+            if frame.epoch is not None:
+                self._told_epoch = frame.epoch
+                self._epochs.tell(frame.epoch)
             self._axis.anchor(mark.counter, mark.arrived_ns)
             return [Placed(frame.part, frame.data, mark.counter)]
         if self._doubted and self._confirms(frame):
@@ -139,11 +147,13 @@ class CountedInstants:
         epoch = self._epoch_of(frames)
         if epoch != self._told_epoch:
             kind, index = Jump.RESTART, widest.mark.counter
+            self._epochs.begin(epoch)
         elif self._tells_epoch and all(frame.epoch is None for frame in frames):
             kind, index = Jump.GAP, self._axis.gap(widest.mark)
         else:
             kind, index = self._axis.jump(widest.mark, self._tells_epoch)
-            self._n_restarts += kind is Jump.RESTART
+            if kind is Jump.RESTART:
+                self._epochs.begin()
         if kind is Jump.RESTART:
             self._begin()
         self._told_epoch = epoch

@@ -60,6 +60,7 @@ class CanSource:
             n_slow=len(calibration.slow),
             rate_hz=calibration.rate_hz,
             hold_s=settings.hold_s,
+            begun_ns=clock.now_ns(),
         )
 
     @property

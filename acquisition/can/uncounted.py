@@ -2,6 +2,7 @@
 
 from acquisition.can.instants import Instant, Refusal, RefusalCounts
 from acquisition.can.plan import Part, Plan
+from acquisition.epochs import Epochs
 from core.units import NS_PER_S
 
 _MAX_UNSURE_NS = NS_PER_S
@@ -57,13 +58,19 @@ class UncountedInstants:
     ----------
     refused
         Where refused frames are counted.
+    begun_ns
+        When this life of the adapter began, UTC: it counts for the device, so that another life
+        is another count, whatever the device tells.
     """
 
-    def __init__(self, plan: Plan, rate_hz: float, refused: RefusalCounts) -> None:
+    def __init__(
+        self, plan: Plan, rate_hz: float, refused: RefusalCounts, begun_ns: int = 0
+    ) -> None:
         self._plan = plan
         self._refused = refused
         self._rate_hz = rate_hz
-        self.epoch = 0
+        self._epochs = Epochs(begun_ns, trusts_device=False)
+        self._told: int | None = None
         self._begin()
 
     def _begin(self) -> None:
@@ -79,15 +86,21 @@ class UncountedInstants:
         self._pending_loss = 0
 
     @property
+    def epoch(self) -> int:
+        """Number of the present count."""
+        return self._epochs.number
+
+    @property
     def next_index(self) -> int:
         """First sample that has not been completed."""
         return self._next
 
     def set_epoch(self, epoch: int) -> bool:
         """Take over an epoch that the device told; return whether it began to count anew."""
-        if epoch == self.epoch:
+        if epoch == self._told:
             return False
-        self.epoch = epoch
+        self._told = epoch
+        self._epochs.begin(epoch)
         self._begin()
         return True
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from acquisition.epochs import Epochs
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.profile import RingHeader
 from acquisition.modbus.ring_layout import U32, RingLayout
@@ -27,9 +28,11 @@ class RingFollower:
     ----------
     n_channels, rate_hz, n_slow
         What the device must offer.
+    begun_ns
+        When this life of the adapter began, UTC.
     """
 
-    def __init__(self, n_channels: int, rate_hz: float, n_slow: int) -> None:
+    def __init__(self, n_channels: int, rate_hz: float, n_slow: int, begun_ns: int) -> None:
         self._expected = {
             "n_channels": n_channels,
             "rate in mHz": round(rate_hz * 1000.0),
@@ -38,6 +41,8 @@ class RingFollower:
         self._n_slow = n_slow
         self._header: RingHeader | None = None
         self._timeline: Timeline
+        self._n_resets = 0
+        self._epochs = Epochs(begun_ns, trusts_device=True)
         self._handled = 0
         self._rejected: Counter[Refusal] = Counter()
 
@@ -96,12 +101,14 @@ class RingFollower:
         before = self._header
         if before is None:
             self._timeline = Timeline(header.layout)
+            self._epochs.tell(header.epoch)
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
             await self._require_again(reader, header)
             slot = await self._newest_slot(reader, header)
-            n_resets = self._timeline.n_resets + 1 if before.epoch == header.epoch else 0
-            self._timeline = Timeline(header.layout, n_resets)
+            self._timeline = Timeline(header.layout, self._timeline.n_resets)
+            self._n_resets = self._timeline.n_resets
+            self._epochs.begin(header.epoch if before.epoch != header.epoch else None)
             if slot is not None:
                 self._timeline.anchor(slot)
             self._go_back_to_start(slot, header)
@@ -187,8 +194,11 @@ class RingFollower:
     ) -> RawBlock:
         rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
+        if self._timeline.n_resets != self._n_resets:  # the counters went back, and nobody told
+            self._n_resets = self._timeline.n_resets
+            self._epochs.begin()
         return RawBlock(
-            epoch=header.epoch + self._timeline.n_resets * U32,
+            epoch=self._epochs.number,
             first_index=index,
             start_ns=slot.start_ns,
             rate_hz=header.layout.rate_mhz / 1000.0,

@@ -69,7 +69,10 @@ class ModbusRingSource:
         self._delivery = Delivery(calibration)
         self._clock = clock
         self._follower = RingFollower(
-            len(calibration.channels), calibration.rate_hz, len(calibration.slow)
+            len(calibration.channels),
+            calibration.rate_hz,
+            len(calibration.slow),
+            begun_ns=clock.now_ns(),
         )
         self._fresh_at_s = 0.0
         self._stale_after_s = settings.stale_after_s

@@ -53,6 +53,10 @@ class TimedMonitor:
         """Hand over the gaps found since the last call, to be recorded."""
         return self._monitor.drain_gaps()
 
+    def require(self, block: SampleBlock) -> None:
+        """Refuse a block that does not fit; raises as the monitor does."""
+        self._monitor.require(block)
+
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take a block in, one bearing at a time; raises as the monitor does."""
         steps = self._monitor.steps(block)

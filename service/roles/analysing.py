@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Mapping
 
 from core.blocks import SampleBlock
+from core.counts import Counts
 from core.monitor_port import Monitor
 from core.monitor_state import MonitorState
 from service.alarms.engine import AlarmEngine
@@ -21,7 +22,10 @@ TURNS = 3
 
 
 class Analyser:
-    """Analyses the blocks of all units, one block after the other."""
+    """Analyses the blocks of all units, one block after the other.
+
+    A device that counts the same epoch anew is given another one here, for all that follows.
+    """
 
     def __init__(
         self,
@@ -33,6 +37,11 @@ class Analyser:
     ) -> None:
         self._monitors, self._live, self._recorder = monitors, live, recorder
         self._alarms, self._films = alarms, films
+        self._counts = {unit: Counts() for unit in monitors}
+
+    def require(self, block: SampleBlock) -> None:
+        """Refuse a block that does not fit its unit, with a `BlockMisfitError`."""
+        self._monitors[block.unit].require(block)
 
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
         """Take a block in, and hand over what it has taught.
@@ -49,6 +58,7 @@ class Analyser:
     async def learn(self, block: SampleBlock, sampled_s: float) -> Findings:
         """Take a block in, as `take` does, and return what it has taught."""
         monitor = self._monitors[block.unit]
+        block = self._counts[block.unit].placed(block)
         found = []
         for assessment in monitor.steps(block):
             found.append(assessment)
@@ -66,6 +76,7 @@ class Analyser:
     async def relive(self, block: SampleBlock, sampled_s: float) -> None:
         """Take a block in whose findings are stored already; nobody is told again."""
         monitor = self._monitors[block.unit]
+        block = self._counts[block.unit].again(block)
         for _ in monitor.steps(block):
             await _others()
         monitor.drain_gaps()
@@ -77,12 +88,18 @@ class Analyser:
 
     def memory(self, unit: str) -> UnitMemory:
         """What must be known of a unit beside its newest samples."""
-        return UnitMemory(self.state(unit), self._alarms.memory(unit), self._films.memory(unit))
+        return UnitMemory(
+            self.state(unit),
+            self._alarms.memory(unit),
+            self._films.memory(unit),
+            self._counts[unit].count,
+        )
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
         """Let the monitor of a unit expect its newest samples once more, none of them missing."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
+        self._counts[unit].go_on(memory.count)
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
         """Let the monitor of a unit, after these samples, be as it was."""

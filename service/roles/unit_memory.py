@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from core.alarms.memory import AlarmMemory
+from core.counts import Count
 from core.films.film_memory import FilmMemory
 from core.monitor_state import MonitorState
 
@@ -19,6 +20,8 @@ class UnitMemory:
     ----------
     films
         Where they are watched.
+    count
+        That its blocks are in.
     version
         Of this form.
     """
@@ -26,6 +29,7 @@ class UnitMemory:
     monitor: MonitorState
     alarms: AlarmMemory
     films: FilmMemory | None
+    count: Count | None = None
     version: int = VERSION
 
 

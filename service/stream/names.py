@@ -39,8 +39,12 @@ def consumer_name(unit: str) -> str:
 
 
 def message_id(identity: UnitIdentity, block: SampleBlock) -> str:
-    """The same for the same block, however often it is published, and for no other."""
-    return f"{identity.plant.hex()[:8]}.{block.unit}.{block.epoch}.{block.first_index}"
+    """The same for the same block, however often it is published, and for no other.
+
+    Its time tells it from one of a device that counts the same indices anew.
+    """
+    place = f"{block.epoch}.{block.first_index}.{block.start_ns}"
+    return f"{identity.plant.hex()[:8]}.{block.unit}.{place}"
 
 
 def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:

@@ -7,6 +7,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.blocks import SampleBlock
+from core.misfit import BlockMisfitError
 from core.outage import Reach
 from core.units import s_from_ns
 from service.live import LinkState, LiveView
@@ -17,6 +18,7 @@ from service.roles.unit_memory import UnitMemory
 from service.store.positions_port import StreamPosition
 from service.stream.identity import UnitIdentity
 from service.stream.memory import written
+from service.stream.possible import require_possible
 from service.stream.window import Window
 from service.stream.wire import Taken, decoded
 from service.stream.wire_errors import WireError
@@ -99,6 +101,8 @@ class UnitProgress:
             return True
         try:
             message = decoded(payload, self._identity)
+            if isinstance(message, Taken):
+                self._require_fit(message)
         except WireError as error:
             self._refuse(sequence, error)
             self.sequence = sequence
@@ -113,6 +117,14 @@ class UnitProgress:
             self._settle()
             await self._live_on(sequence, message)
         return True
+
+    def _require_fit(self, message: Taken) -> None:
+        """Refuse a block that no monitor of the unit takes, whatever its marks say."""
+        require_possible(message.block)
+        try:
+            self._analyser.require(message.block)
+        except BlockMisfitError as error:
+            raise WireError("misfit", str(error)) from None
 
     def position(self) -> StreamPosition:
         """How far the unit is; its memory of now goes with it."""
@@ -174,10 +186,12 @@ class UnitProgress:
         Only by that it is known that samples of the window are left: news of links stay on the
         stream when blocks have gone by age, and blocks of another configuration are refused.
         """
-        if self._memory is None or self._is_rewound or block.epoch != self._memory.monitor.epoch:
+        memory = self._memory
+        if memory is None or self._is_rewound:
             return
-        self._analyser.rewind(self.unit, self._memory)
-        self._is_rewound = True
+        if block.epoch == (memory.count.told if memory.count else memory.monitor.epoch):
+            self._analyser.rewind(self.unit, memory)
+            self._is_rewound = True
 
     def _settle(self) -> None:
         """After the last message that was seen once more; without any, as after a stop."""

@@ -10,7 +10,7 @@ from core.monitor_state import MonitorState
 @dataclass(frozen=True)
 class _Seen:
     sequence: int
-    epoch: int
+    epoch: int | None
     stop_index: int
 
 
@@ -21,8 +21,14 @@ class Window:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Take note of a block that was taken in, and let go of what is needed no more."""
-        self._seen.append(_Seen(sequence, block.epoch, block.stop_index))
+        """Take note of a block that was taken in, and let go of what is needed no more.
+
+        Parameters
+        ----------
+        state
+            Behind the block; its epoch is that of the block for the analysis.
+        """
+        self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
 

@@ -17,8 +17,13 @@ from service.stream.wire_errors import WireError
 
 SAMPLE = np.dtype("<f4")
 
-Index = Annotated[int, Field(ge=0, lt=2**63)]
-Ns = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+Epoch = Annotated[int, Field(ge=0, lt=2**63)]
+Index = Annotated[int, Field(ge=0, lt=2**53)]
+"""Exact in recordings, too, where numbers are doubles."""
+
+Ns = Annotated[int, Field(ge=-(2**62), lt=2**62)]
+"""From 1823 to 2116, so that nothing that is worked out from it overflows in a database."""
+
 T = TypeVar("T")
 
 STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
@@ -31,7 +36,7 @@ class BlockHead:
     __pydantic_config__ = STRICT
 
     unit: str
-    epoch: Index
+    epoch: Epoch
     first_index: Index
     start_ns: Ns
     rate_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]

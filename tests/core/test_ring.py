@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from core.account import Gap
 from core.blocks import Rejection, SampleBlock
-from core.quality import GOOD, Reading, Reason, bad
+from core.quality import GOOD, Reading, Reason, bad, missing
 from core.ring import Ring
 
 CAPACITY = 40
@@ -93,7 +93,8 @@ def test_samples_before_the_first_block_were_never_offered() -> None:
 def test_a_restarted_device_begins_a_new_count_without_a_giant_gap() -> None:
     ring = Ring(2, CAPACITY)
     ring.write(block(4_000_000_000, 10))
-    assert ring.write(block(3, 10, epoch=2)) == Gap(2, 0, 3, 3 * 10**7)
+    later_ns = 4_000_000_100 * 10**7
+    assert ring.write(block(3, 10, epoch=2, start_ns=later_ns)) == Gap(2, 0, 3, later_ns)
     assert ring.account.n_restarts == 1
     assert not ring.holds(4_000_000_000, 4_000_000_010)
     np.testing.assert_array_equal(ring.read(3, 13).samples[0], np.arange(3, 13))
@@ -120,11 +121,44 @@ def test_a_window_has_the_worst_quality_and_the_mean_slow_reading_of_its_time() 
     assert ring.read(9, 30).channel_quality == (bad(Reason.CLIPPED), GOOD)
 
 
-def test_more_rejections_than_the_index_leaves_room_for_are_a_bug_in_the_adapter() -> None:
+def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing() -> None:
+    """As of a counter that went on while whoever reads it began again."""
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
-    with pytest.raises(ValueError, match="5 samples rejected in a jump of 2"):
-        ring.write(block(12, 10, rejected=(Rejection("torn", 5),)))
+    late = block(40_000, 10, epoch=2, start_ns=20 * 10**9, rejected=(Rejection("torn", 3),))
+    assert ring.write(late) is None
+    assert (ring.account.n_gap, ring.account.rejected, ring.account.n_restarts) == (0, {}, 1)
+    assert ring.holds(40_000, 40_010)
+
+
+def test_a_block_that_comes_twice_with_what_was_rejected_before_it_counts_once() -> None:
+    ring = Ring(2, CAPACITY)
+    ring.write(block(0, 10))
+    torn = block(15, 10, rejected=(Rejection("torn", 5),))
+    for _ in range(3):
+        ring.write(torn)
+    account = ring.account
+    assert (account.rejected, account.n_gap, account.n_repeated) == ({"torn": 5}, 0, 20)
+    assert account.n_offered == account.n_stored + 5 == 25
+
+
+@pytest.mark.parametrize("refused", [(5,), (1, 4), (2, 7), (9, -1)])
+def test_no_more_is_rejected_than_the_index_leaves_room_for(refused: tuple[int, ...]) -> None:
+    ring = Ring(2, CAPACITY)
+    ring.write(block(0, 10))
+    named = tuple(Rejection(f"reason {n}", count) for n, count in enumerate(refused))
+    assert ring.write(block(12, 10, rejected=named)) is None
+    account = ring.account
+    assert (account.n_gap, sum(account.rejected.values()), account.n_offered) == (0, 2, 22)
+    assert min(account.rejected.values()) > 0
+
+
+def test_a_slow_reading_that_only_some_blocks_have_is_not_measured() -> None:
+    ring = Ring(2, CAPACITY)
+    ring.write(block(0, 10, slow={"oil": Reading(40.0), "power": Reading(1.0)}))
+    ring.write(block(10, 10, slow={"oil": Reading(50.0)}))
+    slow = ring.read(0, 20).slow
+    assert (slow["oil"].value, slow["power"]) == (45.0, missing(Reason.NOT_MEASURED))
 
 
 def test_a_block_with_other_channels_is_refused_naming_both() -> None:

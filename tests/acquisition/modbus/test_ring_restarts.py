@@ -3,12 +3,23 @@
 import numpy as np
 import pytest
 
+from acquisition.clock import SystemClock
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import LinkError
 from core.blocks import Rejection
+
+
+class ShiftedClock(SystemClock):
+    """Shows another time of day."""
+
+    def __init__(self, by_s: int) -> None:
+        self._by_s = by_s
+
+    def now_ns(self) -> int:
+        return super().now_ns() + self._by_s * 10**9
 
 
 def samples_of(blocks) -> np.ndarray:
@@ -124,3 +135,22 @@ async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_n
         blocks.append(await anext(stream))
     assert blocks[1].first_index == blocks[0].stop_index
     assert blocks[1].epoch == blocks[0].epoch
+
+
+async def test_what_another_life_of_the_program_calls_a_restart_that_was_not_told(
+    device, server, source_at, read_until
+):
+    """It is another count, and where the device told all, it is the same one."""
+    found = []
+    for begun_s in (0, 3600):
+        async with source_at(server.port, ShiftedClock(begun_s)).connect() as stream:
+            before = await anext(stream)
+            device.produce(200)
+            await read_until(stream, before.stop_index + 200 * 50)
+            device.restart(next_epoch=False)
+            device.produce(2)
+            after = await read_until(stream, 150)
+        found.append((before.epoch, after[-1].epoch))
+    (first, first_again), (second, second_again) = found
+    assert first == second == device.epoch
+    assert len({first, first_again, second_again}) == 3

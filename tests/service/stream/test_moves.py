@@ -75,9 +75,10 @@ class Device:
             self._next += int(self._rng.choice([2 * SPAN, 2 * SPAN + 100, 10 * SPAN]))
         elif kind < 0.08:
             self._next = max(0, self._next - int(self._rng.choice([1, 100, N_SAMPLES])))
-        elif kind < 0.09:
+        elif kind < 0.10:
             self._begin_ns += round((self._next / self._unit.sampling_hz + 3.0) * NS_PER_S)
-            self._epoch, self._next = self._epoch + 1, int(self._rng.choice([0, 7]))
+            self._epoch += int(kind < 0.09)  # the others are not told
+            self._next = int(self._rng.choice([0, 7]))
 
     def _samples(
         self, t_s: FloatArray, turn_hz: float, vortex_hz: float, size_um: float

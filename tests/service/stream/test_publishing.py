@@ -1,6 +1,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import nats
@@ -100,6 +101,17 @@ async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(
     assert numbers(found) == [0, 1, 2, 3, 4]
     assert found[0] == LinkNews(unit, LinkState.CONNECTED)
     assert found[6:] == [LinkNews(unit, LinkState.NOT_CONNECTED, "away")]
+
+
+async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_block(
+    plant: PlantFile, server: NatsServer
+) -> None:
+    anew = [replace(block(plant, n), start_ns=10**9 + n) for n in (0, 1)]
+    async with running(publisher(plant, server)) as out:
+        for each in (block(plant, 0), block(plant, 1), *anew):
+            await out.publish(each)
+        await drained(out)
+    assert numbers(await kept(plant, server)) == [0, 1, 0, 1]
 
 
 async def test_a_block_that_is_published_twice_is_kept_once(

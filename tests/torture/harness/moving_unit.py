@@ -1,5 +1,6 @@
 """A unit's analysis as `padwatch analyse` does it, moved as often as wanted, without a server."""
 
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -74,13 +75,17 @@ class MovingUnit:
 
     async def live(
         self, messages: Sequence[Message], n: int | None, rng: np.random.Generator
-    ) -> None:
+    ) -> Counter[str]:
         """Start anew where the database says, take messages in, and be killed after `n` of them.
 
         Parameters
         ----------
         n
             All of them, and an end in good order, where it is None.
+
+        Returns
+        -------
+        How many messages were refused, by reason.
         """
         with ExitStack() as stack:
             life = await self.begun(messages[-1][0], stack)
@@ -94,6 +99,7 @@ class MovingUnit:
             await analysis.evidence.close()
             await analysis.tape.close()
             analysis.recordings.close()
+            return life.progress.refused
 
     async def begun(self, newest: int, stack: ExitStack) -> Life:
         """Start anew where the database says; the stack closes the database.

@@ -1,0 +1,87 @@
+"""A program that reads a device begins again: what it goes on with, and what it cannot know."""
+
+import pytest
+
+from acquisition.can.assembly import Assembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
+
+RATE_HZ = 600.0
+NS_PER_S = 1_000_000_000
+START_NS = 1_767_225_600 * NS_PER_S
+LINK = CanLinkSettings(interface="virtual", channel="none")
+DBC = """VERSION ""
+BU_: N
+BO_ 256 M: 8 N
+ SG_ c : 0|{n_bits}@1+ (1,0) [0|0] "" N
+ SG_ e : 32|16@1+ (1,0) [0|0] "" N
+ SG_ x : 48|16@1- (1,0) [0|0] "V" N
+"""
+
+
+@pytest.fixture
+def life(tmp_path, counts_calibration):
+    """Begins to read a device: a counter of some width or none, and whether an epoch is read."""
+
+    def build(begun_s: float, n_bits: int | None, tells: bool) -> Assembler:
+        dbc = tmp_path / "device.dbc"
+        dbc.write_text(DBC.format(n_bits=n_bits or 32))
+        settings = CanSettings(
+            link=LINK,
+            dbc=dbc,
+            channels=(CanChannel("x", "um", ("M.x",)),),
+            counters=("M.c",) if n_bits else (),
+            epoch="M.e" if tells else None,
+        )
+        plan = compile_plan(settings, counts_calibration(n_channels=1, n_slow=0))
+        begun_ns = START_NS + round(begun_s * NS_PER_S)
+        return Assembler(plan, 1, 0, RATE_HZ, 5.0, begun_ns)
+
+    return build
+
+
+def read(assembler: Assembler, first: int, stop: int, n_bits: int | None, epoch: int = 7):
+    """Epochs and indices of what comes of the device's samples."""
+    blocks = []
+    for start in range(first, stop, 6):
+        words = [(n % (1 << (n_bits or 32)), n % 2**15) for n in range(start, start + 6)]
+        frames = [
+            (256, c.to_bytes(4, "little") + epoch.to_bytes(2, "little") + x.to_bytes(2, "little"))
+            for c, x in words
+        ]
+        blocks += assembler.take(frames, START_NS + round((start + 6) / RATE_HZ * NS_PER_S))
+    return sorted({block.epoch for block in blocks}), blocks[0].first_index
+
+
+@pytest.mark.parametrize("tells", [False, True])
+@pytest.mark.parametrize("n_bits", [None, 16, 32])
+def test_each_life_is_a_count_of_its_own_unless_the_device_tells_all(n_bits, tells, life):
+    first, _ = read(life(0.0, n_bits, tells), 0, 6000, n_bits)
+    second, index = read(life(20.0, n_bits, tells), 12_000, 18_000, n_bits)
+    if tells and n_bits == 32:
+        assert (first, second, index) == ([7], [7], 12_000)
+    else:
+        assert not {*first} & {*second}
+
+
+def test_a_restart_that_nobody_tells_is_another_count_in_each_life(life):
+    found = []
+    for begun_s in (0.0, 3600.0):
+        assembler, at = life(begun_s, 32, True), round(begun_s * RATE_HZ)
+        epochs, _ = read(assembler, at + 10**6, at + 10**6 + 600, 32)
+        again, _ = read_anew(assembler, at + 10**6 + 3000)
+        found.append((epochs, again))
+    assert found[0][0] == found[1][0] == [7]
+    assert found[0][1] != found[1][1]
+
+
+def read_anew(assembler: Assembler, at: int):
+    """Samples from 0 on, that come when those with the numbers from `at` on would."""
+    blocks = []
+    for start in range(0, 600, 6):
+        frames = [
+            (256, n.to_bytes(4, "little") + (7).to_bytes(2, "little") + n.to_bytes(2, "little"))
+            for n in range(start, start + 6)
+        ]
+        blocks += assembler.take(frames, START_NS + round((at + start) / RATE_HZ * NS_PER_S))
+    return sorted({block.epoch for block in blocks}), blocks[0].first_index
