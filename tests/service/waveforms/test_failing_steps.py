@@ -17,6 +17,7 @@ from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 from service.store.waveforms import StoredWaveforms
 from service.waveforms import inspection
+from service.waveforms.check import Found, RecordingCheck
 from service.waveforms.keeper import WaveformKeeper
 from service.waveforms.unread import AGAIN_S
 from service.waveforms.watch_keeping import WatchKeeping
@@ -276,6 +277,19 @@ def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str
     rig.caretaker.look()
 
     assert [file.name for file in rig.files()] == [folder.name, other.name]
+
+
+def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
+    rig: Any, refusal: dict[str, OSError]
+) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    refusal[folder.name] = OSError(errno.EIO, "Input/output error")
+    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).verdicts()
+
+    assert (one.name, one.found) == (folder.name, Found.DAMAGED)
+    assert one.reason == "it cannot be read: Input/output error"
+    assert (two.name, two.found) == (other.name, Found.SOUND)
 
 
 def test_memory_that_is_short_makes_nothing_damaged(
