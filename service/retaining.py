@@ -19,8 +19,8 @@ REST_SHARE = 9.0
 class Retaining:
     """Deletes what is old, a little of each bearing in turn, in a thread and with rests between.
 
-    Ages are counted from the newest result where the host's clock is ahead of it: a clock that was
-    set years ahead deletes nothing.
+    Ages are counted from a moment that a day of results lies behind: a clock that is set years
+    ahead makes nothing old before it was believed for a day, though results are stamped by it.
     """
 
     def __init__(self, store: RetentionStore, limits: RetentionLimits, clock: Clock) -> None:
@@ -39,10 +39,10 @@ class Retaining:
         """Delete once of each bearing; whether there was anything to delete."""
         found = False
         try:
-            newest_ns = await asyncio.to_thread(self._store.newest_ns)
-            if newest_ns is None:
+            believed_ns = await asyncio.to_thread(self._store.believed_ns)
+            if believed_ns is None:
                 return False
-            now_ns = min(self._clock.now_ns(), newest_ns)
+            now_ns = min(self._clock.now_ns(), believed_ns)
             for series in await asyncio.to_thread(self._store.series):
                 pulse.beat(LOOK_S)
                 found |= await self._rested(series, now_ns, pulse)

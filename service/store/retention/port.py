@@ -13,8 +13,8 @@ class RetentionStore(Protocol):
         """Numbers of all bearings."""
         ...
 
-    def newest_ns(self) -> int | None:
-        """When the newest result of all was measured; None if there is none."""
+    def believed_ns(self) -> int | None:
+        """The newest time that a day of results lies behind; None if there are not so many."""
         ...
 
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:

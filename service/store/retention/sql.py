@@ -5,7 +5,7 @@ from collections.abc import Callable
 from service.store.database import Connect, Connection
 from service.store.retention.deleting import delete_readings, delete_rollups
 from service.store.retention.limits import RetentionLimits
-from service.store.rollups.widths import NS_PER_S
+from service.store.rollups.widths import HOUR_NS, NS_PER_S
 
 MAX_FILM_READINGS = 5000
 MAX_LETTERS = 500
@@ -26,11 +26,16 @@ OLD_LETTERS = """
 """The last one of each alarm stays: whether it is to be told that it has returned depends on it.
 What happened lately stays, too: a host that began in 1970 has sent it long ago by its clock."""
 
-NEWEST = """
-    SELECT max(time_ns) FROM (SELECT (
-        SELECT max(time_ns) FROM assessment WHERE assessment.series = series.id
-    ) AS time_ns FROM series) AS newest
+BELIEVED = """
+    SELECT max(start_ns) FROM (SELECT (
+        SELECT start_ns FROM rollup_cell
+        WHERE rollup_cell.series = series.id AND width_s = ?
+        GROUP BY start_ns ORDER BY start_ns DESC LIMIT 1 OFFSET ?
+    ) AS start_ns FROM series) AS believed
 """
+BELIEVED_HOURS = (HOUR_NS // NS_PER_S, 23)
+"""The 24th newest whole hour with results of any bearing: each is found at the end of an index.
+Not by DISTINCT: where there are fewer hours SQLite 3.40 has the oldest in place of none then."""
 
 DELETE_LETTER = "DELETE FROM outbox WHERE id = ?"
 
@@ -63,11 +68,11 @@ class SqlRetention:
         with self._reading() as reader:
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
-    def newest_ns(self) -> int | None:
-        """When the newest result of all was measured; None if there is none."""
+    def believed_ns(self) -> int | None:
+        """The newest time that a day of results lies behind; None if there are not so many."""
         with self._reading() as reader:
-            newest: int | None = reader.execute(NEWEST).fetchone()[0]
-        return newest
+            found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
+        return found
 
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
         """Delete some of a bearing; whether there was anything to delete.

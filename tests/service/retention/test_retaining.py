@@ -23,11 +23,11 @@ class OldStore:
         self.left = {1: 3, 2: 1}
         self.done: list[int] = []
         self.trouble: str | None = None
-        self.newest: int | None = clock.now_ns()
+        self.believed: int | None = clock.now_ns()
         self.asked_ns: int | None = None
 
-    def newest_ns(self) -> int | None:
-        return self.newest
+    def believed_ns(self) -> int | None:
+        return self.believed
 
     def series(self) -> Sequence[int]:
         return list(self.left)
@@ -85,11 +85,13 @@ async def test_a_clock_that_is_years_ahead_makes_nothing_old(
 ) -> None:
     stepped_clock.step(20.0 * 365.0 * 86_400.0)  # type: ignore[attr-defined]
     await Retaining(old, LIMITS, stepped_clock).round()
-    assert old.asked_ns == old.newest
+    assert old.asked_ns == old.believed
 
 
-async def test_where_there_is_no_result_nothing_is_old(old: OldStore, stepped_clock: Clock) -> None:
-    old.newest = None
+async def test_where_there_is_no_day_of_results_nothing_is_old(
+    old: OldStore, stepped_clock: Clock
+) -> None:
+    old.believed = None
     assert not await Retaining(old, LIMITS, stepped_clock).round()
     assert old.done == []
 

@@ -11,7 +11,6 @@ from rigs.old_results import (
     NOW_NS,
     T0,
     TIERS,
-    Build,
     asked,
     delete_all,
     require_same_hours,
@@ -142,11 +141,3 @@ def test_a_message_of_what_happened_lately_stays_whatever_the_clock_said_then(
 
     assert n_rows(path, "outbox", "number = 1") == 0
     assert n_rows(path, "outbox") == 2
-
-
-def test_the_newest_result_of_all_is_known(old: SqliteStore, assessment: Build) -> None:
-    newest = old.retention.newest_ns()
-    assert newest is not None
-    assert T0 < newest < NOW_NS
-    old.append([assessment(newest + 5, bearing="LJB", speed_rpm=1.0)], [])
-    assert old.retention.newest_ns() == newest + 5
