@@ -28,6 +28,9 @@ class Retaining:
         self._trouble = TroubleLog(
             "what is old is not being deleted", "what is old is being deleted again"
         )
+        self._held_up = TroubleLog(
+            "some of what is old cannot be deleted", "all of what is old can be deleted again"
+        )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Delete for ever."""
@@ -52,6 +55,7 @@ class Retaining:
             self._trouble.note(str(error))
             return False
         self._trouble.note(None)
+        self._held_up.note(self._store.trouble)
         return found
 
     async def _rested(self, series: int, now_ns: int, pulse: Pulse) -> bool:

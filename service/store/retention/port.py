@@ -9,6 +9,11 @@ from service.store.retention.limits import RetentionLimits
 class RetentionStore(Protocol):
     """Deletes what is old. No others are held up for long, and every piece is all or nothing."""
 
+    @property
+    def trouble(self) -> str | None:
+        """Why some of what is old cannot be deleted; None as far as all can."""
+        ...
+
     def series(self) -> Sequence[int]:
         """Numbers of all bearings."""
         ...

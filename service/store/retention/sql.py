@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from service.store.database import Connect, Connection
-from service.store.retention.deleting import delete_readings, delete_rollups
+from service.store.retention.deleting import Piece, delete_readings, delete_rollups
 from service.store.retention.limits import RetentionLimits
 from service.store.rollups.widths import HOUR_NS, NS_PER_S
 
@@ -62,6 +62,16 @@ class SqlRetention:
         self, writing: Connect, reading: Connect, give_back: Callable[[], bool] = nothing_to_give
     ) -> None:
         self._writing, self._reading, self._give_back = writing, reading, give_back
+        self._held_up: set[tuple[int, int]] = set()
+
+    @property
+    def trouble(self) -> str | None:
+        """Why some of what is old cannot be deleted; None as far as all can."""
+        if not self._held_up:
+            return None
+        series, width_s = min(self._held_up)
+        words = "are damaged, or not what wider ones say: they stay, and later ones, too"
+        return f"roll-ups of {width_s} s of bearing {series} {words} ({len(self._held_up)} such)"
 
     def series(self) -> list[int]:
         """Numbers of all bearings."""
@@ -86,7 +96,11 @@ class SqlRetention:
         for width_s, age_ns in limits.tiers:
             if age_ns is not None:
                 with self._writing() as writer:
-                    found |= _delete_tier(writer, series, width_s, now_ns - age_ns)
+                    piece = _delete_tier(writer, series, width_s, now_ns - age_ns)
+                found |= piece is Piece.DONE
+                self._held_up.discard((series, width_s))
+                if piece is Piece.HELD_UP:
+                    self._held_up.add((series, width_s))
         if limits.films_ns is not None:
             with self._writing() as writer:
                 found |= _delete_films(writer, series, now_ns - limits.films_ns)
@@ -107,7 +121,7 @@ class SqlRetention:
         return self._give_back()
 
 
-def _delete_tier(writer: Connection, series: int, width_s: int, before_ns: int) -> bool:
+def _delete_tier(writer: Connection, series: int, width_s: int, before_ns: int) -> Piece:
     if width_s == 0:
         return delete_readings(writer, series, before_ns)
     return delete_rollups(writer, series, width_s * NS_PER_S, before_ns)
