@@ -145,19 +145,21 @@ class Caretaker:
         for name in sorted(there - known):
             if self._clock.monotonic_s() > until_s:
                 return
-            if self._unread.is_due(kind, name) and is_recording(root / name):
-                self._adopt(kind, root / name)
+            if self._unread.is_due(kind, name):
+                with self._unread.noted(kind, name):
+                    self._adopt(kind, root / name)
 
     def _adopt(self, kind: WaveformKind, folder: Path) -> None:
-        with self._unread.noted(kind, folder.name):
-            file = inspected(folder, self._index.place, kind, self._clock.now_ns())
-            if file.state is WaveformState.DAMAGED:
-                file = replace(file, name=set_aside(folder).name)
-            self._index.put([file])
-            if file.state is WaveformState.DAMAGED:
-                self._tell_damaged(file)
-            else:
-                self.found.n_adopted += 1
+        if not is_recording(folder):
+            return
+        file = inspected(folder, self._index.place, kind, self._clock.now_ns())
+        if file.state is WaveformState.DAMAGED:
+            file = replace(file, name=set_aside(folder).name)
+        self._index.put([file])
+        if file.state is WaveformState.DAMAGED:
+            self._tell_damaged(file)
+        else:
+            self.found.n_adopted += 1
 
     def _make_room(self, troubles: Troubles) -> None:
         rules = self._custody

@@ -7,7 +7,7 @@ from pathlib import Path
 from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recording.writer import INCOMPLETE
 from service.capture.folders import FILES
-from service.continuous.names import DAMAGED, PARTS
+from service.continuous.names import DAMAGED, PARTS, unit_of
 
 REMOVED = ".removed"
 """Ending of the name while a recording is being taken away."""
@@ -31,11 +31,21 @@ def finished(root: Path) -> Iterator[str]:
 
 
 def is_recording(folder: Path) -> bool:
-    """Whether a folder holds a recording or what is left of one, and nothing else."""
+    """Whether a folder holds a recording or what is left of one, and nothing else.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses; a folder that has no name of ours may be closed to us.
+    """
     try:
         names = {path.name for path in folder.iterdir()}
     except FileNotFoundError:
         return False
+    except PermissionError:
+        if unit_of(folder.name) is None:
+            return False  # such as lost+found
+        raise
     return bool(names & {MANIFEST, BLOCKS, SAMPLES}) and names <= set(FILES)
 
 

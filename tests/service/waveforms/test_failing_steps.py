@@ -2,7 +2,7 @@
 
 import errno
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -226,6 +226,31 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Refusing
 
     assert look().recording_error is None
     keeper.close()
+
+
+def test_a_folder_that_is_closed_holds_up_no_other(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = Path.iterdir
+
+    def refused(folder: Path) -> Iterator[Path]:
+        if folder.name in closed:
+            raise PermissionError(errno.EACCES, "Permission denied", str(folder))
+        return listed(folder)
+
+    closed = {"lost+found"}
+    monkeypatch.setattr(Path, "iterdir", refused)
+    for name in ("U1-20250101T000000.000Z-continuous", "lost+found"):
+        (rig.roots[CONTINUOUS] / name).mkdir()
+    rig.make(0)
+    rig.caretaker.look()
+    assert len(rig.files()) == 1
+    closed.add("U1-20250101T000000.000Z-continuous")
+    new, _ = rig.make(1), rig.hire()
+    with pytest.raises(OSError, match="Permission denied: 'U1-2025"):
+        rig.caretaker.look()
+
+    assert new.name in [file.name for file in rig.files()]
 
 
 @pytest.fixture
