@@ -19,14 +19,17 @@ REST_SHARE = 9.0
 class Retaining:
     """Deletes what is old, a little of each bearing in turn, in a thread and with rests between.
 
-    Ages are counted from the newest result where the host's clock is ahead of it: a clock that was
-    set years ahead deletes nothing.
+    Ages are counted from a moment that a day of results lies behind: a clock that is set years
+    ahead makes nothing old before it was believed for a day, though results are stamped by it.
     """
 
     def __init__(self, store: RetentionStore, limits: RetentionLimits, clock: Clock) -> None:
         self._store, self._limits, self._clock = store, limits, clock
         self._trouble = TroubleLog(
             "what is old is not being deleted", "what is old is being deleted again"
+        )
+        self._held_up = TroubleLog(
+            "some of what is old cannot be deleted", "all of what is old can be deleted again"
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -39,10 +42,10 @@ class Retaining:
         """Delete once of each bearing; whether there was anything to delete."""
         found = False
         try:
-            newest_ns = await asyncio.to_thread(self._store.newest_ns)
-            if newest_ns is None:
+            believed_ns = await asyncio.to_thread(self._store.believed_ns)
+            if believed_ns is None:
                 return False
-            now_ns = min(self._clock.now_ns(), newest_ns)
+            now_ns = min(self._clock.now_ns(), believed_ns)
             for series in await asyncio.to_thread(self._store.series):
                 pulse.beat(LOOK_S)
                 found |= await self._rested(series, now_ns, pulse)
@@ -52,6 +55,7 @@ class Retaining:
             self._trouble.note(str(error))
             return False
         self._trouble.note(None)
+        self._held_up.note(self._store.trouble)
         return found
 
     async def _rested(self, series: int, now_ns: int, pulse: Pulse) -> bool:

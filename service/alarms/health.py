@@ -45,7 +45,8 @@ class ServiceHealth:
     captures_error
         Why samples around alarms are not kept; None if they are.
     recording_error
-        Why not all samples are recorded that should be; None if they are.
+        Why not all samples are recorded that should be, or recordings are not looked after, so that
+        there may soon be no room for more; None if all is well.
     n_recordings_damaged
         Recordings that were found damaged or missing since the start.
     refused
@@ -118,7 +119,7 @@ def health_of(
             waiting_share=bus.depth / bus.capacity,
             analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
             captures_error=captures.trouble,
-            recording_error=tape.trouble if tape else None,
+            recording_error=_recording_error(tape, recordings),
             n_recordings_damaged=recordings.n_lost if recordings else 0,
             refused=load.words if load else None,
             stored_trouble=soundness.trouble if soundness else None,
@@ -128,3 +129,8 @@ def health_of(
         )
 
     return look
+
+
+def _recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
+    now = tape.trouble if tape else None
+    return now or (recordings.lasting_trouble if recordings else None)

@@ -5,7 +5,7 @@ from pathlib import Path
 from acquisition.errors import ConfigError
 from acquisition.recording.manifest import read_manifest
 from acquisition.recording.reader import open_recording
-from service.continuous.names import KIND
+from service.continuous.names import KIND, unit_of
 
 MAX_TRIED = 3
 """Newest recordings that are looked at, should the newest be damaged."""
@@ -13,8 +13,9 @@ MAX_TRIED = 3
 
 def last_end(root: Path, unit: str) -> tuple[int, int] | None:
     """Epoch and index after the last sample that is recorded of a unit; None if none is known."""
-    names = sorted(root.glob(f"{unit}-*-{KIND}*"), reverse=True)
-    for folder in names[:MAX_TRIED]:
+    # another unit may have a name that begins like that of this one
+    of_unit = (path for path in root.glob(f"{unit}-*-{KIND}*") if unit_of(path.name) == unit)
+    for folder in sorted(of_unit, reverse=True)[:MAX_TRIED]:
         try:
             if read_manifest(folder).unit == unit:
                 return _end_of(folder)

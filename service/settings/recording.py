@@ -34,7 +34,8 @@ class RecordingSettings(Settings):
     channels at 600 Hz take about half a GB a day."""
 
     max_days: Annotated[float, Field(gt=0.0, le=36_500.0)] = 30.0
-    """Those are removed that are older than the newest one by more than this, days."""
+    """Those are removed that are older than this, days, counted from the moment that a day of
+    recordings of the unit lies behind: no clock makes anything old before."""
 
     def require_units(self, units: Sequence[str]) -> None:
         """Refuse a unit that the plant does not have.

@@ -1,5 +1,7 @@
 """`Caretaker`: looks through the folders of recordings, in the thread of the keeper."""
 
+import errno
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,20 +11,22 @@ import structlog
 
 from acquisition.clock import Clock
 from core.units import NS_PER_S
-from service.space.disk import Measure
-from service.space.limits import SpaceLimits
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 from service.waveforms.folders import (
     being_removed,
+    empty,
+    finish_removal,
     finished,
     is_recording,
     put_out_of_sight,
     set_aside,
-    take_away,
 )
+from service.waveforms.gauge import Gauge
 from service.waveforms.index import Index
 from service.waveforms.inspection import again, inspected
-from service.waveforms.room import Bound, Need, RoomLimits, to_remove
+from service.waveforms.room import Bound, RoomLimits, make_room
+from service.waveforms.troubles import Troubles
+from service.waveforms.unread import Unread
 
 log = structlog.get_logger()
 
@@ -64,25 +68,21 @@ class Custody:
 
     roots: Mapping[WaveformKind, Path]
     room: RoomLimits
-    space: SpaceLimits
+    gauge: Gauge
     bound: Bound
-    measure: Measure
 
 
 class Caretaker:
     """Brings index and folders together; the folders are what counts.
 
-    Attributes
-    ----------
-    is_full
-        Whether so little room is left on the disk that nothing more is to be recorded.
+    Whatever fails, the rest is done: above all room is made while nothing can be written any more.
     """
 
     def __init__(self, custody: Custody, index: Index, clock: Clock) -> None:
         self._custody, self._index, self._clock = custody, index, clock
         self._check_from_s = self._forgot_s = -1.0
+        self._unread = Unread(clock)
         self.found = Findings()
-        self.is_full = False
 
     @property
     def on_disk(self) -> Sequence[WaveformFile]:
@@ -105,94 +105,131 @@ class Caretaker:
             If the index cannot be written.
         """
         until_s = self._clock.monotonic_s() + MAX_LOOK_S
+        troubles = Troubles()
         for kind, root in self._custody.roots.items():
-            self._finish_removals(kind, root)
-            self._survey(kind, root, until_s)
-        self._make_room()
-        self._check_one()
-        self._forget()
+            with troubles.borne():
+                self._go_on_removing(kind, root, troubles)
+            with troubles.borne():
+                self._survey(kind, root, until_s)
+        with troubles.borne():
+            self._make_room(troubles)
+        with troubles.borne():
+            self._finish_removals(troubles)
+        with troubles.borne():
+            self._check_one()
+        with troubles.borne():
+            self._forget()
+        with troubles.borne():
+            self._unread.tell()
+        troubles.tell()
 
-    def _finish_removals(self, kind: WaveformKind, root: Path) -> None:
+    def _go_on_removing(self, kind: WaveformKind, root: Path, troubles: Troubles) -> None:
         for name in being_removed(root):
             known = self._index.get(kind, name)
             if known is not None and not (root / name).exists():
                 self._note_removed(known, "its removal was interrupted")
-            take_away(root / name)
+            with troubles.borne():
+                empty(root / name)
 
     def _survey(self, kind: WaveformKind, root: Path, until_s: float) -> None:
         known, there = self._index.names(kind), set(finished(root))
         if known and not root.is_dir():
             raise OSError(f"{root}: the folder of {len(known)} recordings is not there")
+        self._unread.keep(kind, there)
         lost = [file for name in known - there if (file := self._index.get(kind, name))]
         if lost:
-            self.found.n_missing += len(lost)
-            log.error("recordings are missing", names=[file.name for file in lost[:10]])
             now_ns = self._clock.now_ns()
             self._index.mark(lost, WaveformState.MISSING, "it is not in its folder", now_ns)
+            self.found.n_missing += len(lost)
+            log.error("recordings are missing", names=[file.name for file in lost[:10]])
         for name in sorted(there - known):
             if self._clock.monotonic_s() > until_s:
                 return
-            if is_recording(root / name):
-                self._adopt(kind, root / name)
+            if self._unread.is_due(kind, name):
+                with self._unread.noted(kind, name):
+                    self._adopt(kind, root / name)
 
     def _adopt(self, kind: WaveformKind, folder: Path) -> None:
+        if not is_recording(folder):
+            return
         file = inspected(folder, self._index.place, kind, self._clock.now_ns())
         if file.state is WaveformState.DAMAGED:
             file = replace(file, name=set_aside(folder).name)
+        self._index.put([file])
+        if file.state is WaveformState.DAMAGED:
             self._tell_damaged(file)
         else:
             self.found.n_adopted += 1
-        self._index.put([file])
 
-    def _make_room(self) -> None:
-        files, need = self._index.on_disk, self._need()
-        now_ns, rules = self._clock.now_ns(), self._custody
-        for file, reason in to_remove(files, rules.room, now_ns, need, rules.bound):
+    def _make_room(self, troubles: Troubles) -> None:
+        rules = self._custody
+        with troubles.borne():
+            rules.gauge.measure()
+
+        def remove(file: WaveformFile, reason: str) -> bool:
             folder = rules.roots[file.kind] / file.name
-            put_out_of_sight(folder)
-            self._note_removed(file, reason)
-            take_away(folder)
+            with troubles.borne():
+                put_out_of_sight(folder)
+                self._note_removed(file, reason)
+                empty(folder)
+                return True
+            return False
 
-    def _need(self) -> Need:
-        """What is short on each disk; nothing is removed for the sake of another one."""
-        soft = hard = 0
-        for kind, root in self._custody.roots.items():
-            space = self._custody.measure(root)
-            limits = self._custody.space.of(space.total_bytes)
-            # more than the alarm needs, so that recordings never raise it
-            alert = (limits.alert_below or 0.0) + limits.deadband
-            danger = limits.danger_below or 0.0
-            if kind is WaveformKind.CONTINUOUS:
-                soft = round(alert * space.total_bytes) - space.free_bytes
-                self.is_full = space.free_share < danger
-            else:
-                hard = round(danger * space.total_bytes) - space.free_bytes
-        return Need(max(soft, 0), max(hard, 0))
+        need, now_ns = rules.gauge.need, self._clock.now_ns()
+        make_room(self._index.on_disk, rules.room, now_ns, need, rules.bound, remove)
 
     def _note_removed(self, file: WaveformFile, reason: str) -> None:
         self.found.n_removed[file.kind.value] += 1
         log.info("a recording is removed", name=file.name, reason=reason)
-        self._index.mark([file], WaveformState.REMOVED, reason, self._clock.now_ns())
+        self._index.remove(file, reason, self._clock.now_ns())
+
+    def _finish_removals(self, troubles: Troubles) -> None:
+        """Remove the folders of what the index knows to be gone.
+
+        As long as it cannot be told, an empty folder says so to the next start.
+        """
+        self._index.settle()
+        for root in self._custody.roots.values():
+            with troubles.borne():
+                for name in being_removed(root):
+                    with troubles.borne():
+                        left = finish_removal(root / name)
+                        if left is not None:
+                            words = "a removed recording leaves a folder with files of others"
+                            log.warning(words, folder=left.name)
 
     def _check_one(self) -> None:
         """Read what was not read for the longest time, in a small share of all time."""
-        start_s, file = self._clock.monotonic_s(), self._index.longest_unchecked()
+        start_s = self._clock.monotonic_s()
+        due = (f for f in self._index.whole if self._unread.is_due(f.kind, f.name))
+        file = min(due, key=lambda file: file.checked_ns, default=None)
         if file is None or start_s < self._check_from_s:
             return
         if self._clock.now_ns() - file.checked_ns < CHECK_EVERY_NS:
             return
-        self.check(file)
+        with self._unread.noted(file.kind, file.name):
+            self.check(file)
         took_s = self._clock.monotonic_s() - start_s
         self._check_from_s = start_s + took_s / CHECK_SHARE
 
     def check(self, file: WaveformFile) -> WaveformFile:
-        """Read all of a recording once more, and note what it is found to be."""
+        """Read all of a recording once more, and note what it is found to be.
+
+        Raises
+        ------
+        OSError
+            If the disk refuses, or all of them are away: that says nothing of the recording.
+        StoreError
+            If it cannot be noted.
+        """
         folder = self._custody.roots[file.kind] / file.name
+        if not folder.is_dir():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
         found = again(file, folder, self._clock.now_ns())
         self.found.n_checked += 1
+        self._index.put([found])
         if found.state is WaveformState.DAMAGED:
             self._tell_damaged(found)
-        self._index.put([found])
         return found
 
     def _tell_damaged(self, file: WaveformFile) -> None:
@@ -202,5 +239,5 @@ class Caretaker:
     def _forget(self) -> None:
         now_s = self._clock.monotonic_s()
         if self._forgot_s < 0.0 or now_s - self._forgot_s > DAY_NS / NS_PER_S:
-            self._forgot_s = now_s
             self._index.forget(self._clock.now_ns() - REMEMBERED_NS)
+            self._forgot_s = now_s

@@ -79,10 +79,13 @@ class RecordingCheck:
 
     def _read(self, kind: WaveformKind, name: str) -> Verdict:
         folder, known = self._roots[kind] / name, self._known.get((kind, name))
-        if known is None or not known.checksum or name.endswith(DAMAGED):
-            found = inspected(folder, "", kind, self._now_ns)
-        else:
-            found = again(known, folder, self._now_ns)
+        try:
+            if known is None or not known.checksum or name.endswith(DAMAGED):
+                found = inspected(folder, "", kind, self._now_ns)
+            else:
+                found = again(known, folder, self._now_ns)
+        except OSError as error:  # nothing comes of it here but that somebody looks
+            return Verdict(kind, name, Found.DAMAGED, f"it cannot be read: {error.strerror}")
         if found.state is WaveformState.DAMAGED:
             return Verdict(kind, name, Found.DAMAGED, found.reason)
         if known is None:

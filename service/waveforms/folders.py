@@ -7,7 +7,7 @@ from pathlib import Path
 from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recording.writer import INCOMPLETE
 from service.capture.folders import FILES
-from service.continuous.names import DAMAGED, PARTS
+from service.continuous.names import DAMAGED, PARTS, unit_of
 
 REMOVED = ".removed"
 """Ending of the name while a recording is being taken away."""
@@ -31,50 +31,85 @@ def finished(root: Path) -> Iterator[str]:
 
 
 def is_recording(folder: Path) -> bool:
-    """Whether a folder holds a recording or what is left of one, and nothing else."""
+    """Whether a folder holds a recording or what is left of one, and nothing else.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses; a folder that has no name of ours may be closed to us.
+    """
     try:
         names = {path.name for path in folder.iterdir()}
     except FileNotFoundError:
         return False
+    except PermissionError:
+        if unit_of(folder.name) is None:
+            return False  # such as lost+found
+        raise
     return bool(names & {MANIFEST, BLOCKS, SAMPLES}) and names <= set(FILES)
 
 
 def being_removed(root: Path) -> list[str]:
-    """Names of recordings whose removal a crash has interrupted."""
+    """Names of recordings that are being taken away."""
     return sorted(p.name.removesuffix(REMOVED) for p in root.glob(f"*{REMOVED}") if p.is_dir())
 
 
 def put_out_of_sight(folder: Path) -> None:
     """Begin to take a recording away: from now on there is none of that name."""
-    folder.rename(folder.with_name(folder.name + REMOVED))
+    folder.rename(_hidden(folder))
 
 
-def take_away(folder: Path) -> None:
-    """Finish what `put_out_of_sight` has begun; may be done again.
+def empty(folder: Path) -> None:
+    """Delete the files of a recording that was put out of sight; may be done again.
 
     Raises
     ------
     OSError
         If the disk refuses.
     """
-    hidden = folder.with_name(folder.name + REMOVED)
-    if not hidden.is_dir():
-        return
     for name in FILES:
-        (hidden / name).unlink(missing_ok=True)
-    hidden.rmdir()
+        (_hidden(folder) / name).unlink(missing_ok=True)
+
+
+def finish_removal(folder: Path) -> Path | None:
+    """Remove what `empty` has left; where it is from now on if it holds what is not ours.
+
+    That gets a name like a recording again and is none: nobody tries to remove it any more.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    hidden = _hidden(folder)
+    names = {path.name for path in hidden.iterdir()}
+    if names & set(FILES):
+        return None  # it was not emptied, which was told
+    if not names:
+        hidden.rmdir()
+        return None
+    return _renamed(hidden, folder.name)
 
 
 def set_aside(folder: Path) -> Path:
     """Give what cannot be read a name that says so; return where it is then."""
     if folder.name.endswith(DAMAGED):
         return folder
-    aside, n = folder.with_name(folder.name + DAMAGED), 1
-    while os.path.lexists(aside):
+    return _renamed(folder, folder.name, DAMAGED)
+
+
+def _hidden(folder: Path) -> Path:
+    return folder.with_name(folder.name + REMOVED)
+
+
+def _renamed(folder: Path, stem: str, ending: str = "") -> Path:
+    """Give a folder a name that is free."""
+    wanted, n = folder.with_name(f"{stem}{ending}"), 1
+    while os.path.lexists(wanted):
         n += 1
-        aside = folder.with_name(f"{folder.name}-{n}{DAMAGED}")
-    folder.rename(aside)
-    return aside
+        wanted = folder.with_name(f"{stem}-{n}{ending}")
+    folder.rename(wanted)
+    return wanted
 
 
 def n_bytes_of(folder: Path) -> int:

@@ -1,4 +1,7 @@
-"""`Index`: the entries of one place in memory and in the store; the store is told first."""
+"""`Index`: the entries of one place in memory and in the store.
+
+The store is told first, but of what is removed: that is gone whether the store can be told or not.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -16,6 +19,7 @@ class Index:
     def __init__(self, store: WaveformStore, place: str) -> None:
         self._store, self.place = store, place
         self._files = {(file.kind, file.name): file for file in store.files(place)}
+        self._owed: dict[Key, WaveformFile] = {}
 
     def get(self, kind: WaveformKind, name: str) -> WaveformFile | None:
         """The entry of a recording."""
@@ -43,15 +47,30 @@ class Index:
         StoreError
             If none was written.
         """
-        found = list(files)
-        if not found:
-            return
-        self._store.put(found)
-        for file in found:
-            if file.state is WaveformState.REMOVED:
-                self._files.pop((file.kind, file.name), None)
-            else:
-                self._files[file.kind, file.name] = file
+        found = {(file.kind, file.name): file for file in files}
+        if found:
+            self._store.put(list(found.values()))
+            self._files |= found
+            for key in found:
+                self._owed.pop(key, None)  # there is one of that name again
+
+    def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
+        """Strike out what is gone; `settle` tells the store."""
+        gone = replace(file, state=WaveformState.REMOVED, reason=reason, changed_ns=now_ns)
+        self._files.pop((file.kind, file.name), None)
+        self._owed[file.kind, file.name] = gone
+
+    def settle(self) -> None:
+        """Tell the store what is gone; what it does not take is told the next time.
+
+        Raises
+        ------
+        StoreError
+            If it takes nothing.
+        """
+        if self._owed:
+            self._store.put(list(self._owed.values()))
+            self._owed.clear()
 
     def mark(
         self, files: Iterable[WaveformFile], state: WaveformState, reason: str, now_ns: int
@@ -65,10 +84,10 @@ class Index:
         """
         self.put(replace(f, state=state, reason=reason, changed_ns=now_ns) for f in files)
 
-    def longest_unchecked(self) -> WaveformFile | None:
-        """What was not read for the longest time, among what is whole."""
-        whole = (f for f in self._files.values() if f.state is WaveformState.PRESENT)
-        return min(whole, key=lambda file: file.checked_ns, default=None)
+    @property
+    def whole(self) -> Sequence[WaveformFile]:
+        """Recordings that are there and not known to be damaged."""
+        return [f for f in self._files.values() if f.state is WaveformState.PRESENT]
 
     def forget(self, before_ns: int) -> None:
         """Drop what has long been gone.

@@ -9,9 +9,10 @@ import structlog
 
 from acquisition.clock import Clock
 from service.heartbeats import UNHEARD, Pulse
-from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind
 from service.waveforms.caretaker import Caretaker, Findings
+from service.waveforms.gauge import Gauge
+from service.waveforms.troubles import Troubles
 from service.waveforms.watch_keeping import WatchKeeping
 
 log = structlog.get_logger()
@@ -24,6 +25,9 @@ SHARE = 0.02
 MAX_LOOK_S = 600.0
 """Longest that a look may take: a large recording is read from end to end."""
 
+TOLD_AFTER_S = 60.0
+"""For how long something has to fail before an alarm tells of it: what passes is done next time."""
+
 NONE_DAMAGED: Mapping[str, str] = MappingProxyType({})
 
 
@@ -32,6 +36,8 @@ class WaveformKeeper:
 
     Parameters
     ----------
+    gauge
+        Says how much room is left, whoever looks after the recordings, and if nobody can.
     hire
         Makes the caretaker; called in the thread, and again while the store or the disk refuses.
     watch
@@ -44,10 +50,13 @@ class WaveformKeeper:
     n_files, n_bytes
         Recordings on the disk, by kind.
     trouble
-        Why the last look failed; None if it did not.
+        Why something of the last look failed; None if nothing did.
     """
 
-    def __init__(self, hire: Callable[[], Caretaker], clock: Clock, watch: WatchKeeping) -> None:
+    def __init__(
+        self, gauge: Gauge, hire: Callable[[], Caretaker], clock: Clock, watch: WatchKeeping
+    ) -> None:
+        self._gauge = gauge
         self._hire, self._clock, self._watch = hire, clock, watch
         self._caretaker: Caretaker | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="waveforms")
@@ -55,6 +64,7 @@ class WaveformKeeper:
         self.n_files: Mapping[WaveformKind, int] = {}
         self.n_bytes: Mapping[WaveformKind, int] = {}
         self.trouble: str | None = None
+        self._trouble_from_s: float | None = None
 
     @property
     def found(self) -> Findings:
@@ -66,9 +76,18 @@ class WaveformKeeper:
         """Recordings that were found damaged or missing since the start."""
         return self.found.n_damaged + self.found.n_missing
 
+    @property
+    def lasting_trouble(self) -> str | None:
+        """Why recordings are not looked after as they should be, if that goes on for a minute."""
+        if self.trouble is None or self._trouble_from_s is None:
+            return None
+        if self._clock.monotonic_s() - self._trouble_from_s < TOLD_AFTER_S:
+            return None
+        return f"recordings are not looked after: {self.trouble}"
+
     def is_full(self) -> bool:
         """Whether there is no room for more of what can be done without."""
-        return self._caretaker is not None and self._caretaker.is_full
+        return self._gauge.is_full
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Look for ever."""
@@ -88,13 +107,14 @@ class WaveformKeeper:
 
     def look(self) -> None:
         """Look once; in the thread."""
-        try:
+        troubles = Troubles()
+        with troubles.borne():
+            self._gauge.measure()  # first of all: what comes then may take long, or fail
+        with troubles.borne():
             if self._watch.take():
                 self._caretaker = self._caretaker or self._hire()
                 self._caretaker.look()
-            self._tell(None)
-        except (OSError, StoreError) as error:
-            self._tell(str(error))
+        self._tell(None if troubles.first is None else str(troubles.first))
         if self._caretaker is not None:
             self._count(self._caretaker)
 
@@ -107,4 +127,8 @@ class WaveformKeeper:
     def _tell(self, trouble: str | None) -> None:
         if trouble is not None and trouble != self.trouble:
             log.error("recordings are not looked after", reason=trouble)
+        if trouble is None:
+            self._trouble_from_s = None
+        elif self._trouble_from_s is None:
+            self._trouble_from_s = self._clock.monotonic_s()
         self.trouble = trouble

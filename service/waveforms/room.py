@@ -1,10 +1,11 @@
 """Which recordings have to go: the oldest first, continuous ones before captures."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from core.units import ns_from_s
 from service.store.waveform_port import WaveformFile, WaveformKind
+from service.waveforms.ages import NotOldFrom
 
 S_PER_DAY = 86_400.0
 
@@ -18,7 +19,7 @@ class RoomLimits:
     continuous_bytes, capture_bytes
         Of all of a kind together.
     continuous_days
-        Continuous recordings go that are older than the newest by more than this.
+        Continuous recordings go that are older than this; see `service.waveforms.ages`.
     """
 
     continuous_bytes: int = 100_000_000_000
@@ -45,46 +46,59 @@ class Need:
 Bound = Callable[[], frozenset[str]]
 """Names of captures that evidence of an alarm refers to; asked only when captures have to go."""
 
+Remove = Callable[[WaveformFile, str], bool]
+"""Removes a recording and says why; whether it is gone. The next one goes in place of one that
+is not."""
 
-def to_remove(
-    files: Iterable[WaveformFile], limits: RoomLimits, now_ns: int, need: Need, bound: Bound
-) -> list[tuple[WaveformFile, str]]:
-    """What has to go and why, in this order."""
+
+def make_room(
+    files: Iterable[WaveformFile],
+    limits: RoomLimits,
+    now_ns: int,
+    need: Need,
+    bound: Bound,
+    remove: Remove,
+) -> None:
+    """Have removed what has to go, in this order.
+
+    Raises
+    ------
+    OSError
+        If it cannot be found out what evidence refers to; continuous recordings have gone then.
+    """
     by_age = sorted(files, key=lambda file: (_stop_ns(file), file.name))
     continuous = [file for file in by_age if file.kind is WaveformKind.CONTINUOUS]
     captures = [file for file in by_age if file.kind is WaveformKind.CAPTURE]
-    removed = list(_continuous(continuous, limits, now_ns, need.soft_bytes))
-    n_freed = sum(file.n_bytes for file, _ in removed)
+    n_freed = _continuous(continuous, limits, now_ns, need.soft_bytes, remove)
     over = sum(file.n_bytes for file in captures) - limits.capture_bytes
     short = need.hard_bytes - n_freed
     if over > 0 or short > 0:
-        removed += _captures(captures, over, short, bound())
-    return removed
+        _captures(captures, over, short, bound(), remove)
 
 
 def _continuous(
-    by_age: Sequence[WaveformFile], limits: RoomLimits, now_ns: int, short: int
-) -> Iterator[tuple[WaveformFile, str]]:
+    by_age: Sequence[WaveformFile], limits: RoomLimits, now_ns: int, short: int, remove: Remove
+) -> int:
+    """Remove continuous ones; how many bytes became free."""
     over = sum(file.n_bytes for file in by_age) - limits.continuous_bytes
-    # a clock that has jumped ahead makes nothing old: then the newest recording is
-    newest_ns = max((_stop_ns(file) for file in by_age), default=now_ns)
-    since_ns = min(now_ns, newest_ns) - ns_from_s(limits.continuous_days * S_PER_DAY)
+    not_old = NotOldFrom(by_age, now_ns, ns_from_s(limits.continuous_days * S_PER_DAY))
+    n_freed = 0
     for file in by_age:
-        if over > 0:
+        if over > n_freed:
             why = "all together are over max_gb"
-        elif short > 0:
+        elif short > n_freed:
             why = "the disk is nearly full"
-        elif _stop_ns(file) < since_ns:
+        elif not_old.is_old(file):
             why = "it is older than max_days"
         else:
             continue
-        over, short = over - file.n_bytes, short - file.n_bytes
-        yield file, why
+        n_freed += file.n_bytes if remove(file, why) else 0
+    return n_freed
 
 
 def _captures(
-    by_age: Sequence[WaveformFile], over: int, short: int, bound: frozenset[str]
-) -> Iterator[tuple[WaveformFile, str]]:
+    by_age: Sequence[WaveformFile], over: int, short: int, bound: frozenset[str], remove: Remove
+) -> None:
     """The newest stays in any case; what evidence refers to goes last, and never for the disk."""
     older = by_age[:-1]
     for file in sorted(older, key=lambda file: file.name in bound):
@@ -94,8 +108,8 @@ def _captures(
             why = "the disk is nearly full"
         else:
             return
-        over, short = over - file.n_bytes, short - file.n_bytes
-        yield file, why
+        if remove(file, why):
+            over, short = over - file.n_bytes, short - file.n_bytes
 
 
 def _stop_ns(file: WaveformFile) -> int:

@@ -10,6 +10,7 @@ from service.space.disk import measure_disk
 from service.store.port import Store
 from service.store.waveform_port import WaveformKind
 from service.waveforms.caretaker import Caretaker, Custody
+from service.waveforms.gauge import Gauge
 from service.waveforms.index import Index
 from service.waveforms.keeper import WaveformKeeper
 from service.waveforms.place import place_of
@@ -23,12 +24,12 @@ from service.wiring.tapes import recordings_folder
 
 def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKeeper:
     """Looks after the recordings of a live plant."""
+    data, custody = Path(plant.service.data_folder), custody_of(plant)
 
     def hire() -> Caretaker:
-        index = Index(store.waveforms, place_of(Path(plant.service.data_folder)))
-        return Caretaker(custody_of(plant), index, clock)
+        return Caretaker(custody, Index(store.waveforms, place_of(data)), clock)
 
-    return WaveformKeeper(hire, clock, WatchKeeping(Path(plant.service.data_folder)))
+    return WaveformKeeper(custody.gauge, hire, clock, WatchKeeping(data))
 
 
 def custody_of(plant: PlantFile) -> Custody:
@@ -39,13 +40,13 @@ def custody_of(plant: PlantFile) -> Custody:
         capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
         continuous_days=plant.recording.max_days,
     )
+    roots = {
+        WaveformKind.CAPTURE: data / CAPTURES,
+        WaveformKind.CONTINUOUS: recordings_folder(plant),
+    }
     return Custody(
-        roots={
-            WaveformKind.CAPTURE: data / CAPTURES,
-            WaveformKind.CONTINUOUS: recordings_folder(plant),
-        },
+        roots=roots,
         room=room,
-        space=space_limits(plant.space),
+        gauge=Gauge(roots, space_limits(plant.space), measure_disk),
         bound=partial(captures_in_use, data / EVIDENCE),
-        measure=measure_disk,
     )

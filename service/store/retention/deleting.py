@@ -4,6 +4,7 @@ Nothing is deleted that has not been computed anew and found in all wider tiers:
 that is not so is gathered anew while its readings are there, and looked at again.
 """
 
+from enum import Enum
 from itertools import pairwise
 
 import numpy as np
@@ -39,34 +40,46 @@ REDONE = "SELECT start_ns FROM rollup_redo WHERE series = ? AND start_ns >= ? AN
 REDO = "INSERT INTO rollup_redo VALUES (?, ?) ON CONFLICT DO NOTHING"
 
 
-def delete_readings(writer: Connection, series: int, before_ns: int) -> bool:
-    """Delete the next old single readings of a bearing; whether there were any that could be."""
+class Piece(Enum):
+    """What became of a piece of work: there was none, it was done, or it cannot be done."""
+
+    NONE = "none"
+    DONE = "done"
+    HELD_UP = "held_up"
+
+
+def delete_readings(writer: Connection, series: int, before_ns: int) -> Piece:
+    """Delete the next old single readings of a bearing."""
     gone = select_gone(writer, series)
     limit_ns = _floor(min(before_ns, select_mark(writer, series)))
     span = _next_readings(writer, series, (gone.readings_ns, limit_ns))
     end_ns = _fit_until(writer, series, span)
     if end_ns <= span[0]:
-        return False
+        return Piece.NONE
     writer.execute(DELETE_READINGS, (series, span[0], end_ns))
     set_gone(writer, series, SINGLE_S, end_ns)
-    return True
+    return Piece.DONE
 
 
-def delete_rollups(writer: Connection, series: int, width_ns: int, before_ns: int) -> bool:
-    """Delete the next old roll-ups of a width; whether there were any that could be."""
+def delete_rollups(writer: Connection, series: int, width_ns: int, before_ns: int) -> Piece:
+    """Delete the next old roll-ups of a width.
+
+    Those that wider ones do not say the same as stay, and hold up what is behind them: what is
+    finer is gone, so nothing can be gathered anew, and up to when all is gone is one time.
+    """
     width_s, gone = width_ns // NS_PER_S, select_gone(writer, series)
     finer_s = {wider // NS_PER_S: finer // NS_PER_S for finer, wider in pairwise((0, *WIDTHS_NS))}
     limit_ns = _floor(min(before_ns, gone.of(finer_s[width_s])))
     span = _next_cells(writer, series, width_s, (gone.of(width_s), limit_ns))
     if span[0] >= span[1] or writer.execute(REDONE, (series, *span)).fetchone():
-        return False  # late readings are merged first
+        return Piece.NONE  # late readings are merged first
     fine = select_cells(writer, series, width_ns, span, rolled_columns())
     wider_ns = [wider for wider in WIDTHS_NS if wider > width_ns]
     if fine is None or not all(_stands_in(writer, series, fine, w, span) for w in wider_ns):
-        return False
+        return Piece.HELD_UP
     forget_width(writer, series, width_ns, span)
     set_gone(writer, series, width_s, span[1])
-    return True
+    return Piece.DONE
 
 
 def _next_readings(writer: Connection, series: int, within: Span) -> Span:

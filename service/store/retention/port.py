@@ -9,12 +9,17 @@ from service.store.retention.limits import RetentionLimits
 class RetentionStore(Protocol):
     """Deletes what is old. No others are held up for long, and every piece is all or nothing."""
 
+    @property
+    def trouble(self) -> str | None:
+        """Why some of what is old cannot be deleted; None as far as all can."""
+        ...
+
     def series(self) -> Sequence[int]:
         """Numbers of all bearings."""
         ...
 
-    def newest_ns(self) -> int | None:
-        """When the newest result of all was measured; None if there is none."""
+    def believed_ns(self) -> int | None:
+        """The newest time that a day of results lies behind; None if there are not so many."""
         ...
 
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from service.store.database import Connect, Connection
-from service.store.retention.deleting import delete_readings, delete_rollups
+from service.store.retention.deleting import Piece, delete_readings, delete_rollups
 from service.store.retention.limits import RetentionLimits
-from service.store.rollups.widths import NS_PER_S
+from service.store.rollups.widths import HOUR_NS, NS_PER_S
 
 MAX_FILM_READINGS = 5000
 MAX_LETTERS = 500
@@ -26,11 +26,16 @@ OLD_LETTERS = """
 """The last one of each alarm stays: whether it is to be told that it has returned depends on it.
 What happened lately stays, too: a host that began in 1970 has sent it long ago by its clock."""
 
-NEWEST = """
-    SELECT max(time_ns) FROM (SELECT (
-        SELECT max(time_ns) FROM assessment WHERE assessment.series = series.id
-    ) AS time_ns FROM series) AS newest
+BELIEVED = """
+    SELECT max(start_ns) FROM (SELECT (
+        SELECT start_ns FROM rollup_cell
+        WHERE rollup_cell.series = series.id AND width_s = ?
+        GROUP BY start_ns ORDER BY start_ns DESC LIMIT 1 OFFSET ?
+    ) AS start_ns FROM series) AS believed
 """
+BELIEVED_HOURS = (HOUR_NS // NS_PER_S, 23)
+"""The 24th newest whole hour with results of any bearing: each is found at the end of an index.
+Not by DISTINCT: where there are fewer hours SQLite 3.40 has the oldest in place of none then."""
 
 DELETE_LETTER = "DELETE FROM outbox WHERE id = ?"
 
@@ -57,17 +62,27 @@ class SqlRetention:
         self, writing: Connect, reading: Connect, give_back: Callable[[], bool] = nothing_to_give
     ) -> None:
         self._writing, self._reading, self._give_back = writing, reading, give_back
+        self._held_up: set[tuple[int, int]] = set()
+
+    @property
+    def trouble(self) -> str | None:
+        """Why some of what is old cannot be deleted; None as far as all can."""
+        if not self._held_up:
+            return None
+        series, width_s = min(self._held_up)
+        words = "are damaged, or not what wider ones say: they stay, and later ones, too"
+        return f"roll-ups of {width_s} s of bearing {series} {words} ({len(self._held_up)} such)"
 
     def series(self) -> list[int]:
         """Numbers of all bearings."""
         with self._reading() as reader:
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
-    def newest_ns(self) -> int | None:
-        """When the newest result of all was measured; None if there is none."""
+    def believed_ns(self) -> int | None:
+        """The newest time that a day of results lies behind; None if there are not so many."""
         with self._reading() as reader:
-            newest: int | None = reader.execute(NEWEST).fetchone()[0]
-        return newest
+            found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
+        return found
 
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
         """Delete some of a bearing; whether there was anything to delete.
@@ -81,7 +96,11 @@ class SqlRetention:
         for width_s, age_ns in limits.tiers:
             if age_ns is not None:
                 with self._writing() as writer:
-                    found |= _delete_tier(writer, series, width_s, now_ns - age_ns)
+                    piece = _delete_tier(writer, series, width_s, now_ns - age_ns)
+                found |= piece is Piece.DONE
+                self._held_up.discard((series, width_s))
+                if piece is Piece.HELD_UP:
+                    self._held_up.add((series, width_s))
         if limits.films_ns is not None:
             with self._writing() as writer:
                 found |= _delete_films(writer, series, now_ns - limits.films_ns)
@@ -102,7 +121,7 @@ class SqlRetention:
         return self._give_back()
 
 
-def _delete_tier(writer: Connection, series: int, width_s: int, before_ns: int) -> bool:
+def _delete_tier(writer: Connection, series: int, width_s: int, before_ns: int) -> Piece:
     if width_s == 0:
         return delete_readings(writer, series, before_ns)
     return delete_rollups(writer, series, width_s * NS_PER_S, before_ns)

@@ -9,6 +9,7 @@ import pytest
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.summary import summary_of
 from service.continuous import tape, unit_tape
+from service.continuous.last import last_end
 from service.continuous.pieces import Shed
 
 BLOCK = 10
@@ -46,6 +47,17 @@ async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete
         assert sum(not part.name.endswith(".incomplete") for part in parts.iterdir()) == 2
         rig.clock.s = 3.0
         await rig.until(lambda: rig.tape.n_written == 250)  # old enough, if not long enough
+
+
+async def test_how_far_a_unit_is_recorded_is_not_hidden_by_one_whose_name_begins_alike(
+    running: Any, root: Path
+) -> None:
+    async with running(root, ("pump", "pump-b")) as rig:
+        rig.send(0, 20, "pump")
+        rig.send(0, 200, "pump-b")  # four recordings, all of which sort behind those of "pump"
+
+    assert last_end(root, "pump") == (1, 200)
+    assert last_end(root, "pump-b") == (1, 2000)
 
 
 async def test_two_units_are_recorded_side_by_side(

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 from pydantic import ValidationError
+from structlog.testing import capture_logs
 
 from acquisition.clock import Clock
 from service.retaining import LOOK_S, PERIOD_S, REST_SHARE, Retaining
@@ -22,20 +23,25 @@ class OldStore:
         self._clock, self._step = clock, step
         self.left = {1: 3, 2: 1}
         self.done: list[int] = []
-        self.trouble: str | None = None
-        self.newest: int | None = clock.now_ns()
+        self.refusal: str | None = None
+        self.held_up: str | None = None
+        self.believed: int | None = clock.now_ns()
         self.asked_ns: int | None = None
 
-    def newest_ns(self) -> int | None:
-        return self.newest
+    @property
+    def trouble(self) -> str | None:
+        return self.held_up
+
+    def believed_ns(self) -> int | None:
+        return self.believed
 
     def series(self) -> Sequence[int]:
         return list(self.left)
 
     def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
         assert (limits, now_ns <= self._clock.now_ns()) == (LIMITS, True)
-        if self.trouble:
-            raise StoreError(self.trouble)
+        if self.refusal:
+            raise StoreError(self.refusal)
         self.asked_ns = now_ns
         self._step(1.0)
         self.left[series] -= 1
@@ -74,10 +80,20 @@ async def test_it_rests_longer_than_it_works(old: OldStore, stepped_clock: Clock
 
 async def test_a_store_that_fails_is_asked_again(old: OldStore, stepped_clock: Clock) -> None:
     retaining = Retaining(old, LIMITS, stepped_clock)
-    old.trouble = "disk full"
+    old.refusal = "disk full"
     assert not await retaining.round()
-    old.trouble = None
+    old.refusal = None
     assert await retaining.round()
+
+
+async def test_what_cannot_be_deleted_is_told_once(old: OldStore, stepped_clock: Clock) -> None:
+    retaining = Retaining(old, LIMITS, stepped_clock)
+    old.held_up = "roll-ups are damaged"
+    with capture_logs() as lines:
+        for _ in range(3):
+            await retaining.round()
+
+    assert [line["event"] for line in lines] == ["some of what is old cannot be deleted"]
 
 
 async def test_a_clock_that_is_years_ahead_makes_nothing_old(
@@ -85,11 +101,13 @@ async def test_a_clock_that_is_years_ahead_makes_nothing_old(
 ) -> None:
     stepped_clock.step(20.0 * 365.0 * 86_400.0)  # type: ignore[attr-defined]
     await Retaining(old, LIMITS, stepped_clock).round()
-    assert old.asked_ns == old.newest
+    assert old.asked_ns == old.believed
 
 
-async def test_where_there_is_no_result_nothing_is_old(old: OldStore, stepped_clock: Clock) -> None:
-    old.newest = None
+async def test_where_there_is_no_day_of_results_nothing_is_old(
+    old: OldStore, stepped_clock: Clock
+) -> None:
+    old.believed = None
     assert not await Retaining(old, LIMITS, stepped_clock).round()
     assert old.done == []
 

@@ -17,6 +17,7 @@ from service.space.limits import SpaceLimits
 from service.store.sqlite import SqliteStore
 from service.store.waveform_port import WaveformFile, WaveformKind
 from service.waveforms.caretaker import Caretaker, Custody
+from service.waveforms.gauge import Gauge
 from service.waveforms.index import Index
 from service.waveforms.room import RoomLimits
 
@@ -33,8 +34,10 @@ class Clock(StandingClock):
         self.s += duration_s
 
 
-def recording(folder: Path, start_ns: int, unit: str = "U1", **files: str) -> Path:
-    """A recording of ten seconds; channel a is the number of the sample."""
+def recording(
+    folder: Path, start_ns: int, unit: str = "U1", step_ns: int = 10**9, **files: str
+) -> Path:
+    """Ten blocks of a second, one every so often; channel a is the number of the sample."""
     limits = {"full_scale_v": 10.0, "unit_per_v": 1.0, "ok_min_v": -10.0, "ok_max_v": 10.0}
     channels = tuple(
         RecordedChannel(id=id_, measurand=Measurand.DISPLACEMENT_UM, **limits) for id_ in "ab"
@@ -45,7 +48,7 @@ def recording(folder: Path, start_ns: int, unit: str = "U1", **files: str) -> Pa
     with RecordingWriter(folder, recorded, "a test") as writer:
         for first in range(0, N_SAMPLES, 50):
             counts = np.array([index, -index])[:, first : first + 50]
-            stamp = start_ns + first * 20_000_000
+            stamp = start_ns + first // 50 * step_ns
             writer.write(RawBlock(1, first, stamp, RATE_HZ, counts, (True, True), ()))
     for name, text in files.items():
         (folder / name).with_suffix(".json").write_text(text)
@@ -67,18 +70,24 @@ class Rig:
 
     def hire(self) -> None:
         """As after a restart."""
-        custody = Custody(
-            roots=self.roots,
-            room=self.room,
-            space=SpaceLimits(0.1, 0.05, 0, 0),
-            bound=lambda: self.bound,
-            measure=lambda _: self.space,
-        )
+        self.gauge = Gauge(self.roots, SpaceLimits(0.1, 0.05, 0, 0), self.measured)
+        custody = Custody(self.roots, self.room, self.gauge, lambda: self.bound)
         self.caretaker = Caretaker(custody, Index(self.store.waveforms, "here"), self.clock)
+
+    def measured(self, _: Path) -> DiskSpace:
+        return self.space
 
     def make(self, hours: int, kind: WaveformKind = CONTINUOUS, unit: str = "U1") -> Path:
         name = f"{unit}-{hours:03d}-{kind.value}"
         return recording(self.roots[kind] / name, T0 + hours * HOUR_NS, unit)
+
+    def make_day(self, hours: int, unit: str = "U1") -> list[str]:
+        """Recordings of an hour each."""
+        names = [f"{unit}-{hour:03d}-continuous" for hour in range(hours, hours + 24)]
+        for hour, name in enumerate(names, hours):
+            start_ns = T0 + hour * HOUR_NS
+            recording(self.roots[CONTINUOUS] / name, start_ns, unit, HOUR_NS // 9)
+        return names
 
     def files(self) -> list[WaveformFile]:
         return self.store.waveforms.files("here")

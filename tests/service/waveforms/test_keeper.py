@@ -18,7 +18,7 @@ def keeper_of(rig: Any) -> WaveformKeeper:
         found: Caretaker = rig.caretaker
         return found
 
-    return WaveformKeeper(hire, rig.clock, WatchKeeping(rig.root))
+    return WaveformKeeper(rig.gauge, hire, rig.clock, WatchKeeping(rig.root))
 
 
 def test_what_there_is_is_counted_and_what_is_damaged_is_named(rig: Any) -> None:

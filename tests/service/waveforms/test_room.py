@@ -24,13 +24,15 @@ def test_the_oldest_go_when_all_together_are_too_large(rig: Any) -> None:
 
 
 def test_what_is_too_old_goes_however_much_room_there_is(rig: Any) -> None:
-    old, young = rig.make(0), rig.make(30)
+    old = rig.make(0)
     rig.limit(continuous_days=1.0)
-    rig.clock.s = 26 * 3600.0
+    rig.caretaker.look()
+    young = rig.make_day(8)
+    rig.clock.s = 32 * 3600.0
     rig.caretaker.look()
 
     assert not old.exists()
-    assert rig.names() == [young.name]
+    assert rig.names() == young
 
 
 def test_captures_have_a_limit_of_their_own_and_evidence_stays_longest(rig: Any) -> None:
@@ -54,7 +56,7 @@ def test_a_disk_that_is_nearly_full_costs_continuous_recordings_only(rig: Any) -
 
     assert rig.names() == kept[2:]
     assert rig.names(CAPTURE) == captures
-    assert not rig.caretaker.is_full
+    assert not rig.gauge.is_full
 
 
 def test_a_full_disk_costs_captures_too_but_no_evidence_and_not_the_newest(rig: Any) -> None:
@@ -67,7 +69,7 @@ def test_a_full_disk_costs_captures_too_but_no_evidence_and_not_the_newest(rig: 
 
     assert rig.names() == []
     assert rig.names(CAPTURE) == [captures[0], captures[3]]
-    assert rig.caretaker.is_full
+    assert rig.gauge.is_full
 
 
 def test_what_cannot_be_read_is_not_the_oldest_for_that(rig: Any) -> None:
@@ -80,9 +82,38 @@ def test_what_cannot_be_read_is_not_the_oldest_for_that(rig: Any) -> None:
 
 
 def test_a_clock_that_has_jumped_to_another_century_costs_nothing(rig: Any) -> None:
-    kept = [rig.make(hour).name for hour in range(3)]
+    kept = rig.make_day(0)
     rig.limit(continuous_days=1.0)
     rig.clock.s = 80 * 366 * 86_400.0
     rig.caretaker.look()
 
     assert rig.names() == kept
+
+
+def test_a_clock_that_stamps_recordings_too_is_believed_after_a_day_of_them(rig: Any) -> None:
+    kept = rig.make_day(0)
+    rig.limit(continuous_days=1.0)
+    rig.caretaker.look()
+    rig.clock.s = 366 * 86_400.0
+    rig.make(365 * 24)
+    rig.caretaker.look()
+    assert rig.names() == [*kept, "U1-8760-continuous"]
+    ahead = rig.make_day(365 * 24 + 1)
+    rig.caretaker.look()
+
+    assert rig.names() == ["U1-8760-continuous", *ahead]
+
+
+def test_what_a_device_records_in_the_year_2000_is_kept_as_long_as_all_else(rig: Any) -> None:
+    rig.limit(continuous_days=1.0)
+    rig.make_day(0)
+    rig.clock.s = 86_400.0
+    rig.caretaker.look()
+    begun_anew = rig.make(-26 * 366 * 24)
+    rig.caretaker.look()
+    assert begun_anew.exists()
+    rig.make_day(48)
+    rig.clock.s = 3 * 86_400.0
+    rig.caretaker.look()
+
+    assert not begun_anew.exists()

@@ -11,7 +11,6 @@ from rigs.old_results import (
     NOW_NS,
     T0,
     TIERS,
-    Build,
     asked,
     delete_all,
     require_same_hours,
@@ -72,6 +71,24 @@ def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
     assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
     for minutes in (2, 10, 60):
         require_same_hours(old.trend(asked(minutes)), plain.trend(asked(minutes)))
+
+
+def test_a_roll_up_that_is_damaged_when_nothing_finer_is_left_is_told(
+    old: SqliteStore, path: Path
+) -> None:
+    delete_all(old, TIERS[0][0])
+    assert old.retention.trouble is None
+    n_before = n_rows(path, "rollup_cell", "width_s = 60")
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(
+            "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE width_s = 60"
+            " AND start_ns = (SELECT min(start_ns) FROM rollup_cell WHERE width_s = 60)"
+        )
+    delete_all(old, TIERS[1][0])
+
+    assert n_rows(path, "rollup_cell", "width_s = 60") == n_before
+    assert old.retention.trouble is not None
+    assert "roll-ups of 60 s of bearing 1 are damaged" in old.retention.trouble
 
 
 def test_deleting_twice_changes_nothing(old: SqliteStore, path: Path) -> None:
@@ -142,11 +159,3 @@ def test_a_message_of_what_happened_lately_stays_whatever_the_clock_said_then(
 
     assert n_rows(path, "outbox", "number = 1") == 0
     assert n_rows(path, "outbox") == 2
-
-
-def test_the_newest_result_of_all_is_known(old: SqliteStore, assessment: Build) -> None:
-    newest = old.retention.newest_ns()
-    assert newest is not None
-    assert T0 < newest < NOW_NS
-    old.append([assessment(newest + 5, bearing="LJB", speed_rpm=1.0)], [])
-    assert old.retention.newest_ns() == newest + 5

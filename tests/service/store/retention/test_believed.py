@@ -1,0 +1,73 @@
+"""Ages count from a moment that a day of results lies behind, in both databases."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+
+import pytest
+from harness.places import Place
+from rigs.old_results import HOUR_NS, SECOND_NS, T0, Build, asked
+from rigs.rolled_trends import gather_all
+
+from acquisition.clock import Clock
+from service.retaining import Retaining
+from service.store.retention.limits import DAY_NS, RetentionLimits
+from service.store.sql_store import SqlStore
+
+YEAR_NS = 365 * DAY_NS
+
+
+@pytest.fixture
+def store(store_place: Place) -> Iterator[SqlStore]:
+    with closing(store_place.open()) as opened:
+        yield opened
+
+
+def measure(
+    store: SqlStore, assessment: Build, times_ns: Sequence[int], bearing: str = "UJB"
+) -> None:
+    """Results of these times, gathered; and one more, so that the last hour is complete."""
+    all_ns = [*times_ns, times_ns[-1] + HOUR_NS]
+    store.append([assessment(at, bearing=bearing, speed_rpm=90.0) for at in all_ns], [])
+    gather_all(store)
+
+
+def hours(first: int, n: int) -> list[int]:
+    """A result in each of some hours."""
+    return [T0 + hour * HOUR_NS + SECOND_NS for hour in range(first, first + n)]
+
+
+def n_single(store: SqlStore) -> int:
+    """How many single results there are."""
+    wide = asked(start_ns=0, end_ns=1 << 61, is_page=True, max_points=1000)
+    return len(store.trend(wide).time_ns)
+
+
+def test_where_there_is_no_day_of_results_there_is_nothing_to_count_from(
+    store: SqlStore, assessment: Build
+) -> None:
+    assert store.retention.believed_ns() is None
+    measure(store, assessment, hours(0, 22))
+    # more in an hour that has some is no more time, nor is the same hour of another bearing
+    measure(store, assessment, [T0 + 60 * SECOND_NS, T0 + 90 * SECOND_NS])
+    measure(store, assessment, hours(50, 20), "LJB")
+    assert store.retention.believed_ns() is None
+    measure(store, assessment, [hours(30, 1)[0] + SECOND_NS])
+
+    assert store.retention.believed_ns() == T0
+
+
+async def test_a_clock_a_year_ahead_makes_results_old_after_a_day_of_them(
+    store: SqlStore, assessment: Build, stepped_clock: Clock
+) -> None:
+    limits = RetentionLimits(readings_ns=30 * DAY_NS)
+    measure(store, assessment, hours(0, 48))
+    step_s = (T0 + 2 * YEAR_NS - stepped_clock.now_ns()) / SECOND_NS
+    stepped_clock.step(step_s)  # type: ignore[attr-defined]
+    ahead = [at + YEAR_NS for at in hours(48, 24)]
+    measure(store, assessment, ahead[:1])
+    await Retaining(store.retention, limits, stepped_clock).round()
+    assert n_single(store) == 51
+    measure(store, assessment, ahead[1:])
+    await Retaining(store.retention, limits, stepped_clock).round()
+
+    assert n_single(store) == 25

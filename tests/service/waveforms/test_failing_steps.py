@@ -1,0 +1,330 @@
+"""Whatever fails, room is made, and what is left to be told is told later."""
+
+import errno
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from acquisition.errors import ConfigError
+from acquisition.recording.reader import open_recording
+from service.alarms.health import health_of
+from service.space.disk import DiskSpace
+from service.store.port import StoreError
+from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
+from service.store.waveforms import StoredWaveforms
+from service.waveforms import inspection
+from service.waveforms.check import Found, RecordingCheck
+from service.waveforms.keeper import WaveformKeeper
+from service.waveforms.unread import AGAIN_S
+from service.waveforms.watch_keeping import WatchKeeping
+
+CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
+FULL = DiskSpace(1, 10**12, 0)
+DAY_S = 86_400.0
+
+
+class Refusing:
+    """A store that takes nothing while it is away."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.is_away, put = False, StoredWaveforms.put
+
+        def refused(stored: StoredWaveforms, files: Sequence[WaveformFile]) -> None:
+            if self.is_away:
+                raise StoreError("database or disk is full")
+            put(stored, files)
+
+        monkeypatch.setattr(StoredWaveforms, "put", refused)
+
+
+@pytest.fixture
+def index(monkeypatch: pytest.MonkeyPatch) -> Refusing:
+    return Refusing(monkeypatch)
+
+
+def files_in(root: Path) -> list[str]:
+    return sorted(path.parent.name for path in root.rglob("samples.parquet"))
+
+
+def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig: Any, index: Refusing) -> None:
+    for hour in range(3):
+        rig.make(hour)
+    rig.caretaker.look()
+    new = rig.make(3)
+    rig.space, index.is_away = FULL, True
+    for _ in range(2):
+        with pytest.raises(StoreError, match="disk is full"):
+            rig.caretaker.look()
+
+    assert rig.gauge.is_full
+    assert files_in(rig.roots[CONTINUOUS]) == [new.name]  # not in the index yet
+    assert rig.caretaker.found.n_removed == {"continuous": 3}
+
+    rig.space, index.is_away = DiskSpace(1, 10**12, 10**12), False
+    rig.caretaker.look()
+    assert not rig.gauge.is_full
+    assert rig.names() == [new.name]
+    assert [file.name for file in rig.files()] == [new.name]
+    assert rig.caretaker.found.n_missing == 0
+
+
+def test_what_could_not_be_told_before_a_restart_is_not_taken_for_a_loss(
+    rig: Any, index: Refusing
+) -> None:
+    rig.make(0)
+    rig.caretaker.look()
+    rig.space, index.is_away = FULL, True
+    with pytest.raises(StoreError):
+        rig.caretaker.look()
+    rig.hire()
+    index.is_away = False
+    rig.caretaker.look()
+
+    assert rig.files() == rig.names() == []
+    assert (rig.caretaker.found.n_missing, rig.caretaker.found.n_damaged) == (0, 0)
+
+
+def test_one_that_comes_back_before_its_removal_was_told_is_there(
+    rig: Any, index: Refusing, tmp_path: Path
+) -> None:
+    folder = rig.make(0)
+    shutil.copytree(folder, tmp_path / "copy")
+    rig.caretaker.look()
+    rig.space, index.is_away = FULL, True
+    with pytest.raises(StoreError):
+        rig.caretaker.look()
+    rig.space, index.is_away = DiskSpace(1, 10**12, 10**12), False
+    shutil.copytree(tmp_path / "copy", folder)
+    rig.caretaker.look()
+
+    assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
+    assert rig.names() == [folder.name]
+
+
+def test_files_of_others_in_a_removed_folder_stay_and_stop_nothing(rig: Any) -> None:
+    annotated, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    (annotated / "notes.txt").write_text("to be kept")
+    rig.space = FULL
+    rig.caretaker.look()
+    assert rig.names() == [annotated.name]
+    assert not other.exists()
+    assert [path.name for path in annotated.iterdir()] == ["notes.txt"]
+
+    rig.caretaker.look()
+    assert rig.names() == [annotated.name]
+    assert rig.files() == []
+
+
+def test_a_folder_that_is_away_stops_nothing_in_another(rig: Any, tmp_path: Path) -> None:
+    rig.make(0, CAPTURE)
+    rig.make(0)
+    rig.caretaker.look()
+    rig.roots[CAPTURE].rename(tmp_path / "unmounted")
+    new = rig.make(1)
+    rig.clock.s = 2 * DAY_S
+    with pytest.raises(OSError, match="captures: the folder of 1 recordings is not there"):
+        rig.caretaker.look()
+    assert new.name in [file.name for file in rig.files()]
+    assert not rig.caretaker.faults  # the capture that is away was to be read, and was not
+    rig.space = FULL
+    with pytest.raises(OSError, match="captures: the folder of 1 recordings is not there"):
+        rig.caretaker.look()
+
+    assert rig.gauge.is_full
+    assert rig.names() == []
+
+
+def test_one_that_cannot_be_removed_costs_the_next_one(rig: Any) -> None:
+    stuck, old, young = (rig.make(hour) for hour in range(3))
+    rig.caretaker.look()
+    size = max(file.n_bytes for file in rig.files())
+    shutil.copytree(stuck, stuck.with_name(f"{stuck.name}.removed"))
+    (stuck.with_name(f"{stuck.name}.removed") / "manifest.json").unlink()
+    (stuck.with_name(f"{stuck.name}.removed") / "manifest.json").mkdir()
+    rig.limit(continuous_bytes=round(2.5 * size))
+    with pytest.raises(OSError, match=r"manifest\.json"):
+        rig.caretaker.look()
+
+    assert (stuck.exists(), old.exists(), young.exists()) == (True, False, True)
+
+
+def test_evidence_that_cannot_be_read_costs_no_room_for_continuous_ones(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(_: object) -> frozenset[str]:
+        raise OSError(errno.EIO, "Input/output error")
+
+    for hour in range(2):
+        rig.make(hour, CAPTURE)
+        rig.make(hour)
+    rig.caretaker.look()
+    monkeypatch.setattr(type(rig), "bound", property(refused), raising=False)
+    rig.space = FULL
+    with pytest.raises(OSError, match="Input/output error"):
+        rig.caretaker.look()
+
+    assert rig.names() == []
+    assert len(rig.names(CAPTURE)) == 2
+
+
+def test_room_is_measured_though_nobody_can_look_after_the_recordings(rig: Any) -> None:
+    def hire() -> Any:
+        raise StoreError("the database is away")
+
+    rig.space = FULL
+    keeper = WaveformKeeper(rig.gauge, hire, rig.clock, WatchKeeping(rig.root))
+    keeper.look()
+    second = WaveformKeeper(rig.gauge, hire, rig.clock, WatchKeeping(rig.root))
+    assert (keeper.is_full(), second.is_full()) == (True, True)
+    rig.space = DiskSpace(1, 10**12, 10**12)
+    second.look()  # which another process has the watch for
+
+    assert (keeper.trouble, second.trouble) == ("the database is away", None)
+    assert not second.is_full()
+    keeper.close()
+
+
+def test_a_disk_that_does_not_say_leaves_the_others_measured(rig: Any) -> None:
+    def measured(root: Path) -> DiskSpace:
+        if root == rig.roots[CAPTURE]:
+            raise OSError(errno.EIO, "Input/output error")
+        return FULL
+
+    rig.make(0)
+    rig.caretaker.look()
+    rig.measured = measured
+    rig.hire()
+    with pytest.raises(OSError, match="Input/output error"):
+        rig.caretaker.look()
+
+    assert rig.gauge.is_full
+    assert rig.names() == []
+
+
+def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Refusing) -> None:
+    keeper = WaveformKeeper(rig.gauge, lambda: rig.caretaker, rig.clock, WatchKeeping(rig.root))
+    parts: Any = SimpleNamespace(
+        store_error=None, behind_s=0.0, n_unstored=0, depth=0, capacity=1, oldest_wait_s=0.0
+    )
+    parts.trouble = None
+    look = health_of([], parts, parts, parts, parts, recordings=keeper)
+    rig.make(0)
+    index.is_away = True
+    keeper.look()
+    rig.clock.s += 55.0
+    keeper.look()
+    assert look().recording_error is None
+    rig.clock.s += 5.0
+    assert look().recording_error == "recordings are not looked after: database or disk is full"
+    index.is_away = False
+    keeper.look()
+
+    assert look().recording_error is None
+    keeper.close()
+
+
+def test_a_folder_that_is_closed_holds_up_no_other(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = Path.iterdir
+
+    def refused(folder: Path) -> Iterator[Path]:
+        if folder.name in closed:
+            raise PermissionError(errno.EACCES, "Permission denied", str(folder))
+        return listed(folder)
+
+    closed = {"lost+found"}
+    monkeypatch.setattr(Path, "iterdir", refused)
+    for name in ("U1-20250101T000000.000Z-continuous", "lost+found"):
+        (rig.roots[CONTINUOUS] / name).mkdir()
+    rig.make(0)
+    rig.caretaker.look()
+    assert len(rig.files()) == 1
+    closed.add("U1-20250101T000000.000Z-continuous")
+    new, _ = rig.make(1), rig.hire()
+    with pytest.raises(OSError, match="Permission denied: 'U1-2025"):
+        rig.caretaker.look()
+
+    assert new.name in [file.name for file in rig.files()]
+
+
+@pytest.fixture
+def refusal(monkeypatch: pytest.MonkeyPatch) -> dict[str, OSError]:
+    """What the system says when a recording of that name is opened."""
+    refused: dict[str, OSError] = {}
+
+    def tried(folder: Path) -> Any:
+        if folder.name in refused:
+            raise ConfigError(f"{folder}: no") from refused[folder.name]
+        return open_recording(folder)
+
+    monkeypatch.setattr(inspection, "open_recording", tried)
+    return refused
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.ENOMEM])
+def test_a_passing_error_makes_nothing_damaged(
+    rig: Any, refusal: dict[str, OSError], number: int
+) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    refusal[folder.name] = OSError(number, "not now")
+    rig.clock.s = DAY_S + 1.0
+    with pytest.raises(OSError, match="not now"):
+        rig.caretaker.look()
+    with pytest.raises(OSError, match="not now"):  # it is told until it can be read
+        rig.caretaker.look()
+    checked = {file.name: file.checked_ns for file in rig.files()}
+    assert checked[other.name] > checked[folder.name]  # it holds up no other
+    assert not rig.caretaker.faults
+    del refusal[folder.name]
+    rig.clock.s += AGAIN_S
+    rig.caretaker.look()
+
+    assert [file.state for file in rig.files()] == [WaveformState.PRESENT] * 2
+    assert len({file.checked_ns for file in rig.files()} & set(checked.values())) == 1
+
+
+def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str, OSError]) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    refusal[folder.name] = OSError(errno.EMFILE, "Too many open files")
+    with pytest.raises(OSError, match=f"Too many open files: '{folder.name}'"):
+        rig.caretaker.look()
+    assert rig.names() == [folder.name, other.name]
+    assert [file.name for file in rig.files()] == [other.name]
+    refusal.clear()
+    rig.clock.s += AGAIN_S
+    rig.caretaker.look()
+
+    assert [file.name for file in rig.files()] == [folder.name, other.name]
+
+
+def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
+    rig: Any, refusal: dict[str, OSError]
+) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    refusal[folder.name] = OSError(errno.EIO, "Input/output error")
+    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).verdicts()
+
+    assert (one.name, one.found) == (folder.name, Found.DAMAGED)
+    assert one.reason == "it cannot be read: Input/output error"
+    assert (two.name, two.found) == (other.name, Found.SOUND)
+
+
+def test_memory_that_is_short_makes_nothing_damaged(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def short(_: Path) -> Any:
+        raise ConfigError("no") from MemoryError()
+
+    folder = rig.make(0)
+    monkeypatch.setattr(inspection, "open_recording", short)
+    with pytest.raises(OSError, match="Cannot allocate memory"):
+        rig.caretaker.look()
+    assert rig.names() == [folder.name]
