@@ -15,6 +15,7 @@ from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkEr
 from acquisition.modbus.framing import ReadOnlyFramer, Reply, RtuFramer, TcpFramer
 from acquisition.modbus.refusals import refusal_error
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
+from acquisition.stopping import let_stop_through
 
 _RECEIVE_LIMIT_BYTES = 1 << 20  # the framer judges every byte; pymodbus' own limit drops silently
 _CLOSED = "the device closed the connection"
@@ -32,17 +33,6 @@ def foreign_errors_renamed(where: str) -> Iterator[None]:
         raise LinkError(f"{where}: {exc or type(exc).__name__}") from exc
     except ModbusException as exc:
         raise FrameError(f"{where}: {exc}") from exc
-
-
-def _let_stop_through() -> None:
-    """End a task that was told to stop while pymodbus waited.
-
-    Its `asyncio.wait_for` loses the cancellation, before Python 3.12, if the reply arrives at the
-    same moment (CPython issue 86296); the task would then go on reading for ever.
-    """
-    task = asyncio.current_task()
-    if task is not None and task.cancelling():
-        raise asyncio.CancelledError
 
 
 class Connection:
@@ -83,7 +73,7 @@ class Connection:
         self._framer.forget()
         with foreign_errors_renamed(self._where):
             connected = await self._connect()
-            _let_stop_through()
+            let_stop_through()
             if not connected:
                 limit = f"no connection within {self._settings.timeout_s} s"
                 raise LinkError(f"{self._where}: {self._refusal or limit}")
@@ -139,7 +129,7 @@ class Connection:
             if self._framer.awaiting:
                 raise LinkError(f"{self._where}: {self._no_answer()}") from None
             raise
-        _let_stop_through()
+        let_stop_through()
         if reply.fault:
             raise FrameError(f"{self._where}: {reply.fault}")
         return reply

@@ -13,6 +13,7 @@ from nats.js.client import JetStreamContext
 from nats.js.errors import NotFoundError
 
 from acquisition.clock import Clock
+from acquisition.stopping import let_stop_through
 from service.heartbeats import UNHEARD, Pulse
 from service.recorder import Findings, Recorder
 from service.settings.plant import PlantFile
@@ -134,7 +135,9 @@ class Consumer:
         )
         puller = await stream.pull_subscribe_bind(durable, name)
         while True:
-            for message in await _fetched(puller):
+            messages = await _fetched(puller)
+            let_stop_through()
+            for message in messages:
                 await self._offer(unit, message)
 
     async def _offer(self, unit: str, message: Msg) -> None:

@@ -11,6 +11,7 @@ from nats.js.client import JetStreamContext
 from nats.js.errors import APIError, NoStreamResponseError
 
 from acquisition.clock import Clock
+from acquisition.stopping import let_stop_through
 from core.blocks import SampleBlock
 from core.units import ns_from_s
 from service.heartbeats import UNHEARD, Pulse
@@ -117,7 +118,9 @@ class Publisher:
             pulse.rest()
             message = await self.waiting.first(unit)
             pulse.beat(self._settings.ack_timeout_s)
-            if await self._sent(stream, where, message):
+            is_sent = await self._sent(stream, where, message)
+            let_stop_through()
+            if is_sent:
                 await self.waiting.published(unit)
             else:
                 self.n_repeated += 1

@@ -1,0 +1,81 @@
+"""Who is told to stop while the library waits does stop, though the library does not hear it."""
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from acquisition.clock import SystemClock
+from service.settings.plant import PlantFile
+from service.settings.stream import StreamSettings
+from service.stream.consumer import Consumer
+from service.stream.identity import UnitIdentity
+from service.stream.outbound import Outgoing
+from service.stream.publisher import Publisher
+
+SETTINGS = StreamSettings(servers=("nats://127.0.0.1:9",))
+
+
+class DeafStream:
+    """One whose waits end as if what they wait for had come, when they are cancelled."""
+
+    def __init__(self) -> None:
+        self.is_waiting = asyncio.Event()
+
+    async def wait(self, *_: Any, **__: Any) -> Any:
+        self.is_waiting.set()
+        try:
+            await asyncio.sleep(3600.0)
+        except asyncio.CancelledError:
+            self.is_waiting.clear()
+        return self
+
+    def __iter__(self) -> Any:
+        return iter(())
+
+    def __getitem__(self, _: int) -> Any:
+        return SimpleNamespace(metadata=SimpleNamespace(num_pending=0))
+
+    @property
+    def duplicate(self) -> bool:
+        return False
+
+    async def delete_consumer(self, *_: Any) -> None: ...
+
+    async def add_consumer(self, *_: Any) -> None: ...
+
+    async def pull_subscribe_bind(self, *_: Any) -> Any:
+        return SimpleNamespace(fetch=self.wait)
+
+    publish = wait
+
+
+async def require_it_stops(task: asyncio.Task[None], stream: DeafStream) -> None:
+    await stream.is_waiting.wait()
+    task.cancel()
+    done, _ = await asyncio.wait([task], timeout=30.0)
+    assert done
+    assert task.cancelled()
+
+
+@pytest.fixture
+def stream() -> Any:
+    return DeafStream()
+
+
+async def test_a_consumer_that_waits_for_messages(plant: PlantFile, stream: Any) -> None:
+    consumer = Consumer(plant, SETTINGS, Any, Any, SystemClock())  # type: ignore[arg-type]
+    consumer._fetched["U1"] = 0
+    await require_it_stops(asyncio.create_task(consumer._fetch_unit(stream, "U1")), stream)
+
+
+async def test_a_publisher_that_waits_for_the_servers(
+    plant: PlantFile, identity: UnitIdentity, stream: Any
+) -> None:
+    publisher = Publisher(plant, SETTINGS, {"U1": identity}, SystemClock())
+    publisher.waiting.add("U1", Outgoing("1", b"a block"))
+    publisher.waiting.add("U1", Outgoing("2", b"another"))
+    pulse = SimpleNamespace(beat=lambda *_: None, rest=lambda: None)
+    task = asyncio.create_task(publisher._send_unit(stream, "U1", pulse))  # type: ignore[arg-type]
+    await require_it_stops(task, stream)
