@@ -101,13 +101,18 @@ def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
     """The stretches up to the block that no gap of this count covers."""
     at = reach.stop_index
     for gap in sorted(reach.gaps, key=lambda gap: gap.first_index):
-        if gap.is_estimated or gap.epoch != reach.epoch:
+        if gap.is_estimated or gap.epoch != reach.epoch or _is_older(gap, reach):
             continue
         if at < gap.first_index < block.first_index:
             yield _piece(block, at, gap.first_index)
         at = max(at, gap.first_index + gap.n_samples)
     if at < block.first_index:
         yield _piece(block, at, block.first_index)
+
+
+def _is_older(gap: Gap, reach: Reach) -> bool:
+    """Whether a gap is of an earlier count of the same epoch, that had come farther."""
+    return gap.stop_ns < reach.stop_ns - TOLERANCE_NS
 
 
 def _piece(block: SampleBlock, start: int, stop: int) -> Gap:

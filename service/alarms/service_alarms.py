@@ -21,10 +21,14 @@ LOOK_EVERY_NS = 10 * NS_PER_S
 
 
 class SampleLoss:
-    """Which share of a unit's samples got lost or was refused in the last ten minutes."""
+    """Which share of a unit's samples got lost or was refused in the last ten minutes.
+
+    Where more is dropped as repeated than is new, that is lost, too: nothing repeats itself for
+    minutes but a device that counts anew and has its clock put back, of which nobody would hear.
+    """
 
     def __init__(self) -> None:
-        self._seen: deque[tuple[int, int, int]] = deque()
+        self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
         """Take in the unit's account; ask once in a while."""
@@ -33,11 +37,13 @@ class SampleLoss:
         if self._seen and offered < self._seen[-1][1]:
             self._seen.clear()  # the account begins anew
         if not self._seen or now_ns - self._seen[-1][0] >= LOOK_EVERY_NS:
-            self._seen.append((now_ns, offered, lost))
+            self._seen.append((now_ns, offered, lost, account.n_repeated))
         while len(self._seen) > 1 and now_ns - self._seen[0][0] > LOSS_NS:
             self._seen.popleft()
-        _, offered_then, lost_then = self._seen[0]
-        return (lost - lost_then) / max(offered - offered_then, 1)
+        _, offered_then, lost_then, repeated_then = self._seen[0]
+        n_new, n_repeated = offered - offered_then, account.n_repeated - repeated_then
+        n_dropped = n_repeated if n_repeated > n_new else 0
+        return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
 
 class ServiceAlarms:

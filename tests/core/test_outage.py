@@ -52,6 +52,12 @@ def test_what_is_recorded_already_is_not_recorded_twice() -> None:
     assert outage(replace(KEPT, gaps=[*gaps, *found]), at(2000)) == []
 
 
+def test_a_gap_of_an_earlier_count_of_the_same_epoch_covers_nothing() -> None:
+    earlier = Gap(7, 50_000, 60_000, T0 - 3600 * 10**9)
+
+    assert outage(replace(KEPT, gaps=[earlier]), at(60_000)) == outage(KEPT, at(60_000))
+
+
 def test_whatever_was_recorded_before_all_records_together_are_the_hole() -> None:
     rng = np.random.default_rng(5)
     for _ in range(200):

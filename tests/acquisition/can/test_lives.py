@@ -1,10 +1,13 @@
 """A program that reads a device begins again: what it goes on with, and what it cannot know."""
 
+import can
 import pytest
 
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
+from acquisition.can.source import CanSource
+from acquisition.clock import SystemClock
 
 RATE_HZ = 600.0
 NS_PER_S = 1_000_000_000
@@ -17,6 +20,16 @@ BO_ 256 M: 8 N
  SG_ e : 32|16@1+ (1,0) [0|0] "" N
  SG_ x : 48|16@1- (1,0) [0|0] "V" N
 """
+
+
+class StoppedClock(SystemClock):
+    """Shows one time of day."""
+
+    def __init__(self, at_ns: int) -> None:
+        self._at_ns = at_ns
+
+    def now_ns(self) -> int:
+        return self._at_ns
 
 
 @pytest.fixture
@@ -62,6 +75,24 @@ def test_each_life_is_a_count_of_its_own_unless_the_device_tells_all(n_bits, tel
         assert (first, second, index) == ([7], [7], 12_000)
     else:
         assert not {*first} & {*second}
+
+
+@pytest.mark.parametrize("begun_s", [0, 3600])
+async def test_the_life_of_a_source_begins_when_it_is_made(
+    begun_s, tmp_path, counts_calibration, fake_bus
+):
+    dbc = tmp_path / "device.dbc"
+    dbc.write_text(DBC.format(n_bits=32))
+    settings = CanSettings(link=LINK, dbc=dbc, channels=(CanChannel("x", "um", ("M.x",)),))
+    begin_ns = START_NS + begun_s * NS_PER_S
+    calibration = counts_calibration(n_channels=1, n_slow=0)
+    source = CanSource(settings, calibration, StoppedClock(begin_ns), lambda *_: fake_bus)
+    async with source.connect() as stream:
+        for number in range(100):
+            data = bytes(6) + number.to_bytes(2, "little")
+            fake_bus.messages.put(can.Message(arbitration_id=256, is_extended_id=False, data=data))
+        block = await anext(stream)
+    assert (block.epoch, block.first_index) == (begin_ns // NS_PER_S, 0)
 
 
 def test_a_restart_that_nobody_tells_is_another_count_in_each_life(life):

@@ -114,6 +114,19 @@ def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_
     ]
 
 
+def test_a_device_whose_samples_all_pass_for_repeated_ones_loses_them(watched: Watched) -> None:
+    def account(n_stored: int, n_repeated: int) -> dict[str, Any]:
+        return {"accounts": {"U1": SampleAccount(n_stored=n_stored, n_repeated=n_repeated)}}
+
+    watched.after(0.5, **account(60_000, 90_000))  # repeated before anybody looked
+    assert watched.after(100.0, **account(120_000, 95_000)) == []
+    quiet = [watched.after(100.0, **account(180_000, 95_000 + n * 60_000)) for n in range(2)]
+    assert quiet == [[], []]
+    assert watched.after(100.0, **account(180_000, 275_000)) == ["plant:U1:samples_lost raised"]
+    later = [watched.after(100.0, **account(180_000 + n * 60_000, 275_000)) for n in range(1, 9)]
+    assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
+
+
 @pytest.fixture
 def stored(
     database: Callable[[], Path], host: Any, tools: Any
