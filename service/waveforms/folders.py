@@ -12,6 +12,9 @@ from service.continuous.names import DAMAGED, PARTS, unit_of
 REMOVED = ".removed"
 """Ending of the name while a recording is being taken away."""
 
+LEFT = ".left"
+"""Ending of what is left of one that is gone: files of others, which are none of our business."""
+
 UNFINISHED = (INCOMPLETE, PARTS, REMOVED)
 
 
@@ -27,7 +30,8 @@ def finished(root: Path) -> Iterator[str]:
         return
     with os.scandir(root) as entries:
         names = [e.name for e in entries if e.is_dir(follow_symlinks=False)]
-    yield from (name for name in names if not name.endswith(UNFINISHED) and name[0] != ".")
+    others = (*UNFINISHED, LEFT)
+    yield from (name for name in names if not name.endswith(others) and name[0] != ".")
 
 
 def is_recording(folder: Path) -> bool:
@@ -74,7 +78,7 @@ def empty(folder: Path) -> None:
 def finish_removal(folder: Path) -> Path | None:
     """Remove what `empty` has left; where it is from now on if it holds what is not ours.
 
-    That gets a name like a recording again and is none: nobody tries to remove it any more.
+    That gets a name by which nobody takes it for a recording or tries to remove it again.
 
     Raises
     ------
@@ -88,7 +92,7 @@ def finish_removal(folder: Path) -> Path | None:
     if not names:
         hidden.rmdir()
         return None
-    return _renamed(hidden, folder.name)
+    return _renamed(hidden, folder.name, LEFT)
 
 
 def set_aside(folder: Path) -> Path:
@@ -102,7 +106,7 @@ def _hidden(folder: Path) -> Path:
     return folder.with_name(folder.name + REMOVED)
 
 
-def _renamed(folder: Path, stem: str, ending: str = "") -> Path:
+def _renamed(folder: Path, stem: str, ending: str) -> Path:
     """Give a folder a name that is free."""
     wanted, n = folder.with_name(f"{stem}{ending}"), 1
     while os.path.lexists(wanted):

@@ -12,6 +12,7 @@ import pytest
 from acquisition.errors import ConfigError
 from acquisition.recording.reader import open_recording
 from service.alarms.health import health_of
+from service.recordings.shelf import Shelf
 from service.space.disk import DiskSpace
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
@@ -111,13 +112,15 @@ def test_files_of_others_in_a_removed_folder_stay_and_stop_nothing(rig: Any) -> 
     (annotated / "notes.txt").write_text("to be kept")
     rig.space = FULL
     rig.caretaker.look()
-    assert rig.names() == [annotated.name]
+    left = annotated.with_name(f"{annotated.name}.left")
+    assert rig.names() == [left.name]
     assert not other.exists()
-    assert [path.name for path in annotated.iterdir()] == ["notes.txt"]
+    assert [path.name for path in left.iterdir()] == ["notes.txt"]
 
     rig.caretaker.look()
-    assert rig.names() == [annotated.name]
+    assert rig.names() == [left.name]
     assert rig.files() == []
+    assert Shelf((rig.roots[CONTINUOUS],)).newest(10) == []
 
 
 def test_a_folder_that_is_away_stops_nothing_in_another(rig: Any, tmp_path: Path) -> None:
