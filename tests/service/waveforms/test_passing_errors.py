@@ -1,0 +1,94 @@
+"""An error of the system that passes says nothing of the recording that was read."""
+
+import errno
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.errors import ConfigError
+from acquisition.recording.reader import open_recording
+from service.store.waveform_port import WaveformKind, WaveformState
+from service.waveforms import inspection
+from service.waveforms.check import Found, RecordingCheck
+from service.waveforms.unread import AGAIN_S
+
+CONTINUOUS = WaveformKind.CONTINUOUS
+DAY_S = 86_400.0
+
+
+@pytest.fixture
+def refusal(monkeypatch: pytest.MonkeyPatch) -> dict[str, OSError]:
+    """What the system says when a recording of that name is opened."""
+    refused: dict[str, OSError] = {}
+
+    def tried(folder: Path) -> Any:
+        if folder.name in refused:
+            raise ConfigError(f"{folder}: no") from refused[folder.name]
+        return open_recording(folder)
+
+    monkeypatch.setattr(inspection, "open_recording", tried)
+    return refused
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.ENOMEM])
+def test_a_passing_error_makes_nothing_damaged(
+    rig: Any, refusal: dict[str, OSError], number: int
+) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    refusal[folder.name] = OSError(number, "not now")
+    rig.clock.s = DAY_S + 1.0
+    with pytest.raises(OSError, match="not now"):
+        rig.caretaker.look()
+    with pytest.raises(OSError, match="not now"):  # it is told until it can be read
+        rig.caretaker.look()
+    checked = {file.name: file.checked_ns for file in rig.files()}
+    assert checked[other.name] > checked[folder.name]  # it holds up no other
+    assert not rig.caretaker.faults
+    del refusal[folder.name]
+    rig.clock.s += AGAIN_S
+    rig.caretaker.look()
+
+    assert [file.state for file in rig.files()] == [WaveformState.PRESENT] * 2
+    assert len({file.checked_ns for file in rig.files()} & set(checked.values())) == 1
+
+
+def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str, OSError]) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    refusal[folder.name] = OSError(errno.EMFILE, "Too many open files")
+    with pytest.raises(OSError, match=f"Too many open files: '{folder.name}'"):
+        rig.caretaker.look()
+    assert rig.names() == [folder.name, other.name]
+    assert [file.name for file in rig.files()] == [other.name]
+    refusal.clear()
+    rig.clock.s += AGAIN_S
+    rig.caretaker.look()
+
+    assert [file.name for file in rig.files()] == [folder.name, other.name]
+
+
+def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
+    rig: Any, refusal: dict[str, OSError]
+) -> None:
+    folder, other = rig.make(0), rig.make(1)
+    rig.caretaker.look()
+    refusal[folder.name] = OSError(errno.EIO, "Input/output error")
+    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).verdicts()
+
+    assert (one.name, one.found) == (folder.name, Found.DAMAGED)
+    assert one.reason == "it cannot be read: Input/output error"
+    assert (two.name, two.found) == (other.name, Found.SOUND)
+
+
+def test_memory_that_is_short_makes_nothing_damaged(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def short(_: Path) -> Any:
+        raise ConfigError("no") from MemoryError()
+
+    folder = rig.make(0)
+    monkeypatch.setattr(inspection, "open_recording", short)
+    with pytest.raises(OSError, match="Cannot allocate memory"):
+        rig.caretaker.look()
+    assert rig.names() == [folder.name]
