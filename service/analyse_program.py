@@ -13,7 +13,7 @@ from core.alarms.alarm import PLANT
 from core.monitor_port import Monitor
 from core.outage import Reach
 from service.alarms.gone_alarms import SHARED
-from service.alarms.health import StreamLook
+from service.alarms.health import StreamLook, recording_error
 from service.bus import Bus
 from service.delivery.facts import Around
 from service.health.page import Health
@@ -267,7 +267,7 @@ def _of_this_host(analysis: Analysis) -> dict[str, str]:
     troubles = {
         "stored data": analysis.soundness.trouble,
         "captures": analysis.captures.trouble,
-        "recordings": analysis.tape.trouble,
+        "recordings": recording_error(analysis.tape, analysis.recordings),
     }
     return {"disk": str(analysis.space), **{name: why or "ok" for name, why in troubles.items()}}
 

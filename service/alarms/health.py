@@ -119,7 +119,7 @@ def health_of(
             waiting_share=bus.depth / bus.capacity,
             analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
             captures_error=captures.trouble,
-            recording_error=_recording_error(tape, recordings),
+            recording_error=recording_error(tape, recordings),
             n_recordings_damaged=recordings.n_lost if recordings else 0,
             refused=load.words if load else None,
             stored_trouble=soundness.trouble if soundness else None,
@@ -131,6 +131,7 @@ def health_of(
     return look
 
 
-def _recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
+def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
+    """Why not all samples are recorded, or recordings not looked after; None if all is well."""
     now = tape.trouble if tape else None
     return now or (recordings.lasting_trouble if recordings else None)
