@@ -88,6 +88,10 @@ class SimulatedUnit:
             slow=slow,
         )
 
+    def begin_at(self, start_ns: int) -> None:
+        """Move the time of sample 0, because making a plant of many machines takes its time."""
+        self._start_ns = start_ns
+
     def truth(self) -> UnitTruth:
         """Tell what is really so at the next sample."""
         return unit_truth(

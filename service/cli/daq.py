@@ -1,5 +1,6 @@
 """`padwatch daq`: simulated or recorded units behind a real DAQ."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -60,7 +61,7 @@ def daq(
         fail(f"padwatch daq: {error.args[0]}")
 
 
-def _feeds(plant: PlantFile, recordings: list[Path]) -> dict[str, RawFeed]:
+def _feeds(plant: PlantFile, recordings: list[Path]) -> Mapping[str, RawFeed]:
     if recordings:
         played = recordings_by_unit(recordings, plant)
         return {u.id: recorded_feed(played[u.id], u) for u in plant.unit if u.id in played}
@@ -68,4 +69,7 @@ def _feeds(plant: PlantFile, recordings: list[Path]) -> dict[str, RawFeed]:
     feeds = {unit.id: simulated_feed(unit, clock) for unit in plant.unit if unit.simulation}
     if not feeds:
         raise LookupError("no unit of this plant file has a [unit.simulation] table")
+    now_ns = clock.now_ns()  # the first of them was made seconds ago
+    for feed in feeds.values():
+        feed.begin_at(now_ns)
     return feeds

@@ -1,7 +1,6 @@
 """The simulated machines behind simulated sources and DAQs."""
 
 from acquisition.clock import Clock
-from acquisition.raw import RawFeed
 from acquisition.simulated.scenario import (
     BearingScenario,
     HydraulicNoise,
@@ -17,7 +16,7 @@ from service.settings.units import UnitSettings
 from service.wiring.simulated_lives import course_of_life
 
 
-def simulated_feed(unit: UnitSettings, clock: Clock) -> RawFeed:
+def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
     """The simulated machine of a unit, its first sample now.
 
     Raises
