@@ -8,6 +8,7 @@ import pytest
 
 from acquisition.clock import Clock
 from core.blocks import SampleBlock
+from service.heartbeats import Unheard
 from service.metrics.acquired import MAX_REASONS, bounded
 from service.metrics.durations import Durations
 from service.metrics.polls import PollClock, TimedSource
@@ -137,3 +138,19 @@ async def test_a_source_that_is_connected_again_begins_anew(clock: SetClock) -> 
 
     assert source.polls.seen().n_up_to[-1] == 4
     assert source.polls.seen().sum_s == pytest.approx(4 * 0.25)
+
+
+async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(clock: SetClock) -> None:
+    """As that of a CAN bus does; it says nothing of the task that reads the source."""
+    heard: list[float] = []
+
+    class Heard(Unheard):
+        def beat(self, after_s: float = 0.0) -> None:
+            heard.append(after_s)
+
+    polls = PollClock(clock)
+    polls.listen(Heard())
+    assert await asyncio.to_thread(polls.monotonic_s) == clock.monotonic_s()
+    assert heard == []
+    polls.monotonic_s()
+    assert heard == [0.0]

@@ -1,0 +1,113 @@
+"""Every kind of source in the running service, each behind the DAQ that `padwatch daq` makes."""
+
+import asyncio
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+RECORDED_PLANT = Path(__file__).parents[1] / "recordings" / "plant.toml"
+CHANNELS = ("ujb_shaft_x", "ujb_shaft_y", "ujb_bearing_x", "ujb_bearing_y")
+SLOW = ("speed", "active_power", "ujb_oil_temperature")
+FAST_LINE = "baudrate = 4_000_000"
+"""A pseudo-terminal has no speed; this is what spares it the silence between frames."""
+
+N_BLOCKS = 20
+POLLED_EACH_S = 0.05
+POLLED_UP_TO_HZ = 8.0
+
+
+def register_map(**of_channels: str) -> str:
+    """A map of floats for all channels and slow values."""
+    more = "".join(f"{key} = {value!r}\n" for key, value in of_channels.items())
+    values = [f"channel = '{id_}'\n{more}" for id_ in CHANNELS]
+    values += [f"channel = '{id_}'\n" for id_ in SLOW]
+    return "".join(
+        f"[[unit.source.map.value]]\n{value}address = {100 + 2 * n}\ntype = 'float32'\n"
+        for n, value in enumerate(values)
+    )
+
+
+def sources(folder: Path) -> dict[str, str]:
+    """A unit's source for each kind and each wire, before it is known where the DAQ is."""
+    tcp = "host = '127.0.0.1'\nport = 0\ntimeout_s = 5.0\n"
+
+    def line(name: str) -> str:
+        return f"device = '{folder / name}'\n{FAST_LINE}\ntimeout_s = 5.0\n"
+
+    polled = f"kind = 'modbus_polled'\npoll_period_s = {POLLED_EACH_S}\n"
+    vector = "kind = 'modbus_vector'\npoll_period_s = 0.2\nn_polls = 20\nhop_polls = 10\n"
+    vectors = register_map(quantity="order1_amplitude", detector="pp")
+    fifo = "kind = 'modbus_fifo'\naddresses = [1000]\npoll_period_s = 0.01\n"
+    ring = "kind = 'modbus_ring'\n"
+    can = "kind = 'can'\ninterface = 'slcan'\nprofile = 'padwatch_int16'\n"
+    on_tcp, on_line = "channel = 'socket://127.0.0.1:0'\n", f"channel = '{folder / 'can'}'\n"
+    return {
+        "RING_TCP": ring + tcp,
+        "RING_RTU": ring + line("ring"),
+        "FIFO_TCP": fifo + tcp,
+        "FIFO_RTU": fifo + line("fifo"),
+        "POLLED_TCP": polled + tcp + register_map(),
+        "POLLED_RTU": polled + line("polled") + register_map(),
+        "VECTOR_TCP": vector + tcp + vectors,
+        "VECTOR_RTU": vector + line("vector") + vectors,
+        "CAN_TCP": can + on_tcp,
+        "CAN_FD_TCP": can + "fd = true\n" + on_tcp,
+        "CAN_LINE": can + on_line,
+    }
+
+
+def plant_file(folder: Path, found: dict[str, dict[str, Any]] | None = None) -> Path:
+    """The first recorded unit once for each source; its slow values come with the waveforms."""
+    head, unit, _ = RECORDED_PLANT.read_text(encoding="utf-8").split("[[unit]]\n")
+    before, _, after = unit.partition("[unit.source]")
+    after = after[after.index("[[unit.channel]]") :]
+    text = head.replace("[analysis]", f"[analysis]\nmax_frequency_hz = {POLLED_UP_TO_HZ}")
+    for id_, source in sources(folder).items():
+        if found and "port" in found[id_]:
+            source = source.replace("port = 0", f"port = {found[id_]['port']}")
+        if found and str(found[id_].get("channel", "")).startswith("socket"):
+            source = source.replace("socket://127.0.0.1:0", str(found[id_]["channel"]))
+        text += "[[unit]]\n" + before.replace('id = "U1"', f'id = "{id_}"')
+        text += f"[unit.source]\n{source}\n{after}"
+    path = folder / "plant.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+async def test_the_service_reads_every_kind_of_source_over_every_wire(
+    start: Callable, tmp_path: Path
+) -> None:
+    daq = await start("daq", str(plant_file(tmp_path)))
+    found = json.loads(await daq.process.stdout.readline())
+    program = await start("run", str(plant_file(tmp_path, found)), "--port", "0")
+    await program.wait_for_url()
+
+    def all_deliver(units: list[dict[str, Any]]) -> bool:
+        return all(source["n_stored"] >= N_BLOCKS for source in units)
+
+    read = {s["unit"]: s for s in await program.until("/api/v1/sources", all_deliver)}
+    assert set(read) == set(sources(tmp_path))
+    for id_, source in read.items():
+        assert (source["state"], source["reason"], source["rejected"]) == ("connected", None, {}), (
+            id_
+        )
+        assert source["n_failed"] == 0, id_
+    await asyncio.gather(*(speed_is_right(program, id_) for id_ in read))
+    assert await program.end() == 0
+    assert "Traceback" not in program.errors
+    assert await daq.end() == 0
+
+
+async def speed_is_right(program: Any, unit: str) -> None:
+    """A slow value comes along, whatever the wire; a queue has none."""
+    if unit.startswith("FIFO"):
+        return
+    latest = await program.until(
+        f"/api/v1/units/{unit}/bearings/UJB/latest",
+        lambda found: found["readings"].get("speed_rpm", {}).get("value") is not None,
+    )
+    assert latest["readings"]["speed_rpm"]["value"] == pytest.approx(92.3, rel=0.02)
