@@ -191,7 +191,8 @@ class Connection:
             raise
         except termios.error as exc:  # comes from a port that exists but cannot be set up so
             kind = ConfigError if exc.args[0] == errno.EINVAL else LinkError
-            raise kind(f"{self._where}: the port refuses its settings: {exc.args[-1]}") from exc
+            error = kind(f"{self._where}: the port refuses its settings: {exc.args[-1]}")
+        raise error  # not in its except: what holds the cause keeps the port open, and locked
 
     def _connection_changed(self, connected: bool) -> None:
         """Tell the waiting request at once that the link is gone; pymodbus lets it time out."""
@@ -202,6 +203,8 @@ class Connection:
 
 def _reason(exc: OSError) -> str:
     """Why no connection could be made, without what event loop and pyserial wrap around it."""
+    if exc.errno == errno.EWOULDBLOCK:
+        return "another program has the port"
     if exc.errno is not None and exc.errno > 0:
         return os.strerror(exc.errno)
     return exc.strerror or str(exc)

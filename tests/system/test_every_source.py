@@ -11,11 +11,12 @@ import pytest
 RECORDED_PLANT = Path(__file__).parents[1] / "recordings" / "plant.toml"
 CHANNELS = ("ujb_shaft_x", "ujb_shaft_y", "ujb_bearing_x", "ujb_bearing_y")
 SLOW = ("speed", "active_power", "ujb_oil_temperature")
-FAST_LINE = "baudrate = 4_000_000"
-"""A pseudo-terminal has no speed; this is what spares it the silence between frames."""
+FAST_LINE = "baudrate = 4_000_000\nparity = 'none'"
+"""A pseudo-terminal has neither speed nor parity; a high one spares it silence between frames."""
 
-N_BLOCKS = 20
+MIN_SAMPLES = 20
 POLLED_EACH_S = 0.05
+QUEUE_ON_A_LINE_HZ = 100.0
 POLLED_UP_TO_HZ = 8.0
 
 
@@ -70,7 +71,10 @@ def plant_file(folder: Path, found: dict[str, dict[str, Any]] | None = None) -> 
             source = source.replace("port = 0", f"port = {found[id_]['port']}")
         if found and str(found[id_].get("channel", "")).startswith("socket"):
             source = source.replace("socket://127.0.0.1:0", str(found[id_]["channel"]))
-        text += "[[unit]]\n" + before.replace('id = "U1"', f'id = "{id_}"')
+        mine = before.replace('id = "U1"', f'id = "{id_}"')
+        if id_ == "FIFO_RTU":
+            mine = mine.replace("rate_hz = 600.0", f"rate_hz = {QUEUE_ON_A_LINE_HZ}")
+        text += "[[unit]]\n" + mine
         text += f"[unit.source]\n{source}\n{after}"
     path = folder / "plant.toml"
     path.write_text(text, encoding="utf-8")
@@ -87,7 +91,7 @@ async def test_the_service_reads_every_kind_of_source_over_every_wire(
     await program.wait_for_url()
 
     def all_deliver(units: list[dict[str, Any]]) -> bool:
-        return all(source["n_stored"] >= N_BLOCKS for source in units)
+        return all(source["n_stored"] >= MIN_SAMPLES for source in units)
 
     read = {s["unit"]: s for s in await program.until("/api/v1/sources", all_deliver)}
     assert set(read) == set(sources(tmp_path))
@@ -103,8 +107,8 @@ async def test_the_service_reads_every_kind_of_source_over_every_wire(
 
 
 async def speed_is_right(program: Any, unit: str) -> None:
-    """A slow value comes along, whatever the wire; a queue has none."""
-    if unit.startswith("FIFO"):
+    """A slow value comes along, whatever the wire; queues have none, slow polls no result yet."""
+    if unit.startswith(("FIFO", "POLLED")):
         return
     latest = await program.until(
         f"/api/v1/units/{unit}/bearings/UJB/latest",

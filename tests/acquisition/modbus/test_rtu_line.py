@@ -78,15 +78,16 @@ async def test_a_file_that_is_no_port_is_a_link_error(link_on, tmp_path):
 async def test_two_programs_cannot_read_one_line(hostile_line, link_on):
     first, second = (link_on(hostile_line.path, timeout_s=0.05) for _ in range(2))
     await first.open()
-    with pytest.raises(LinkError, match="line: Resource temporarily unavailable"):
+    with pytest.raises(LinkError, match="line: another program has the port"):
         await second.open()
     first.close()
 
 
 async def test_settings_that_a_port_refuses_are_a_config_error(hostile_line, link_on):
     link = link_on(hostile_line.path, parity="even")  # a pseudo-terminal has no parity
-    with pytest.raises(ConfigError, match="line: the port refuses its settings"):
-        await link.open()
+    for _ in range(2):  # the first try leaves the port to the second
+        with pytest.raises(ConfigError, match="line: the port refuses its settings"):
+            await link.open()
 
 
 def test_a_character_is_as_long_as_its_bits():
