@@ -7,7 +7,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.extras import library
+from acquisition.importing.blf import frames_of_blf
 from acquisition.importing.candump import frames_of_candump
 from acquisition.importing.frames import MAX_DATA, FrameBatch
 from acquisition.importing.job import ImportJob
@@ -43,9 +43,7 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]
 
 
 def _frames(stream: BinaryIO, job: ImportJob) -> Iterator[Any]:
-    if job.format == "candump":
-        return frames_of_candump(stream)
-    return iter(library("can.io", "a BLF log").BLFReader(stream))
+    return frames_of_candump(stream) if job.format == "candump" else frames_of_blf(stream)
 
 
 def _require_possible(frame: Any, number: int) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.importing.candump import CUT_OFF
 from acquisition.importing.job import ImportJob, Place
 from acquisition.importing.rows import Rows, SlowValues
 from acquisition.importing.scaling import counts_are_kept, engineering_units
@@ -55,6 +56,8 @@ class CsvTable:
             self._lines += 1
             if len(line) > MAX_LINE_BYTES:
                 raise self._wrong(f"longer than {MAX_LINE_BYTES} bytes")
+            if not line.endswith(b"\n"):
+                raise self._wrong(CUT_OFF)
             if b"\0" in line:
                 raise self._wrong("has a NUL byte")
             try:

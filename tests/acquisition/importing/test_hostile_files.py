@@ -181,9 +181,10 @@ def test_an_index_file_beside_a_tdms_file_is_not_believed(
 
 
 def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
-    (tmp_path / "run").write_bytes(b"TDSm" + b"\xff" * 100)
+    lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
+    (tmp_path / "run").write_bytes(lead + b"\xff" * 72)
     says = refusal(read, tmp_path / "run", replace(job, format="tdms", slow=()))
-    assert ": not readable as tdms: " in says or "is not there" in says
+    assert ": not readable as tdms: " in says
 
 
 def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: ImportJob) -> None:
