@@ -18,6 +18,8 @@ from core.arrays import FloatArray, RawArray
 MAX_LINE_BYTES = 1_000_000
 MAX_COLUMNS = 4096
 _ROWS = 4096
+_CELLS = 2**20
+"""Rows and cells that are held at once."""
 
 
 class CsvTable:
@@ -89,11 +91,12 @@ class CsvTable:
 
     def _next_rows(self) -> list[list[str]]:
         table: list[list[str]] = []
+        most = max(1, min(_ROWS, _CELLS // max(1, len(self._headings))))
         for row in filter(None, self._checked()):  # without empty lines
             if len(row) != len(self._headings):
                 raise self._wrong(f"{len(row)} columns where the header has {len(self._headings)}")
             table.append(row)
-            if len(table) == _ROWS:
+            if len(table) == most:
                 break
         return table
 

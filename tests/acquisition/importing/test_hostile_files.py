@@ -182,7 +182,7 @@ def test_an_index_file_beside_a_tdms_file_is_not_believed(
 
 def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
     lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
-    (tmp_path / "run").write_bytes(lead + b"\xff" * 72)
+    (tmp_path / "run").write_bytes(lead + struct.pack("<II", 1, 64) + b"\xff" * 64)
     says = refusal(read, tmp_path / "run", replace(job, format="tdms", slow=()))
     assert ": not readable as tdms: " in says
 
