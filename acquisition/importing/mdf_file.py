@@ -15,6 +15,8 @@ from acquisition.importing.times import TimeArray
 _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1
 _NO_CONVERSION, _LINEAR = 0, 1
+_INVALID = 0b11
+"""All samples are invalid, or a bit says which: then there is no count for each of them."""
 
 
 class MdfTable(SeriesTable):
@@ -69,7 +71,7 @@ class _MdfSeries:
         unit = (conversion.unit if conversion is not None else "") or channel.unit
         self.unit: str | None = str(unit or "")
         is_int16 = channel.bit_count == 16 and self._raw(0, 1).dtype == np.int16
-        keeps = is_int16 and is_linear and self._offset == 0.0
+        keeps = is_int16 and is_linear and self._offset == 0.0 and not channel.flags & _INVALID
         self.per_count: float | None = float(self._gain) if keeps else None
 
     def values(self, start: int, stop: int) -> npt.NDArray[Any]:
@@ -95,6 +97,7 @@ class _MdfSeries:
             index=self._index,
             samples_only=True,
             raw=True,
+            ignore_invalidation_bits=True,  # or it leaves out what is invalid, and the rest moves up
             record_offset=start,
             record_count=stop - start,
         )

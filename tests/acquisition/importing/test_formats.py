@@ -265,6 +265,33 @@ def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(
     assert found.blocks[0].start_ns == START_NS + 10_800 * 10**9
 
 
+@pytest.mark.parametrize("of", ["counts", "units_um"])
+def test_samples_that_an_mdf_file_calls_invalid_are_none(
+    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], of: str
+) -> None:
+    invalid = np.isin(run.index, (0, 7, 600))
+    conversion = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
+    values = getattr(run, of)
+    with asammdf.MDF() as mdf:
+        signals = [
+            asammdf.Signal(
+                channel,
+                run.since_start_s,
+                name=f"shaft {axis}",
+                conversion=conversion if of == "counts" else None,
+                invalidation_bits=invalid if axis == "x" else None,
+            )
+            for axis, channel in zip("xy", values, strict=True)
+        ]
+        mdf.append(signals, acq_name="waveforms", common_timebase=True)
+        mdf.save(tmp_path / "run.mf4")
+    found = read(tmp_path / "run.mf4", replace(job_for("mdf4"), slow=()))
+    due = (values * PER_COUNT if of == "counts" else values).astype(np.float32)
+    due[0, invalid] = np.nan
+    np.testing.assert_array_equal(found.samples, due)
+    np.testing.assert_array_equal(found.index, run.index)
+
+
 def test_waveforms_of_different_lengths_or_times_are_refused(
     tmp_path: Path, run: Any, read: Read, job: ImportJob
 ) -> None:
