@@ -113,6 +113,7 @@ class CsvTable:
         return numbers_to_ns(self._numbers(texts), axis, axis.start_ns)
 
     def _integers(self, texts: list[str]) -> np.ndarray:
+        self._require_plain(texts)
         try:
             return np.array(texts, dtype=np.int64)
         except (ValueError, OverflowError) as error:
@@ -140,12 +141,20 @@ class CsvTable:
         return tuple(found)
 
     def _numbers(self, texts: list[str]) -> FloatArray:
+        self._require_plain(texts)
         if self._job.csv.decimal != ".":
             texts = [text.replace(self._job.csv.decimal, ".") for text in texts]
         try:
             return np.array([float(text) if text else math.nan for text in texts])
         except ValueError as error:
             raise self._wrong("or one of those before it: no number", texts) from error
+
+    def _require_plain(self, texts: list[str]) -> None:
+        """Refuse groups of thousands, which `float` would take for decimals, or leave out."""
+        for mark in {"_", "."} - {self._job.csv.decimal}:
+            if mark in "".join(texts):
+                example = next(text for text in texts if mark in text)
+                raise self._wrong(f"or one of those before it: {mark!r} in number {example[:40]!r}")
 
     def _wrong(self, what: str, texts: list[str] | None = None) -> ConfigError:
         example = next((text for text in texts or [] if not _is_number(text)), None)

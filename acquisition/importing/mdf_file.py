@@ -10,7 +10,7 @@ from acquisition.errors import ConfigError
 from acquisition.extras import library
 from acquisition.importing.job import ImportJob, Place
 from acquisition.importing.series import SeriesTable, require_one
-from acquisition.importing.times import TimeArray
+from acquisition.importing.times import TimeArray, utc_ns
 
 _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1
@@ -88,8 +88,7 @@ class _MdfSeries:
         us = np.rint(since_s * 1e6)
         if len(us) != stop - start or not np.all(np.abs(us) < 2**53):
             raise ConfigError("a group without a usable time channel")
-        times_ns: TimeArray = self._start_ns // 1000 * 1000 + us.astype(np.int64) * 1000
-        return times_ns
+        return utc_ns(us.astype(np.int64), self._start_ns)
 
     def _raw(self, start: int, stop: int) -> npt.NDArray[Any]:
         samples, invalid = self._mdf.get(
@@ -97,7 +96,7 @@ class _MdfSeries:
             index=self._index,
             samples_only=True,
             raw=True,
-            ignore_invalidation_bits=True,  # or it leaves out what is invalid, and the rest moves up
+            ignore_invalidation_bits=True,  # else what is invalid is left out, and the rest moves
             record_offset=start,
             record_count=stop - start,
         )

@@ -15,7 +15,7 @@ import pytest
 from asammdf.blocks.v4_blocks import ChannelConversion
 
 from acquisition.errors import ConfigError
-from acquisition.importing.job import CsvLayout, ImportJob, Place, TimeAxis
+from acquisition.importing.job import CsvLayout, ImportJob, TimeAxis
 
 START_NS = 1_767_225_600_000_000_000
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -202,31 +202,6 @@ def test_a_csv_file_may_have_semicolons_decimal_commas_and_lines_before_its_head
     layout = CsvLayout(delimiter=";", decimal=",", header_line=3)
     found = read(tmp_path / "run.mf4", replace(job, csv=layout, slow=()))
     np.testing.assert_array_equal(found.samples, run.units_um)
-
-
-@pytest.mark.parametrize(
-    ("form", "of"),
-    [
-        ("epoch_s", lambda us: f"{us / 1e6:.6f}"),
-        ("epoch_ms", lambda us: f"{us / 1e3:.3f}"),
-        ("epoch_us", str),
-        ("epoch_ns", lambda us: str(us * 1000)),
-        ("iso8601", lambda us: f"{datetime.fromtimestamp(us / 1e6, UTC):%Y-%m-%d %H:%M:%S.%f}"),
-        ("iso8601", lambda us: f"{datetime.fromtimestamp(us / 1e6, UTC).isoformat()}"),
-    ],
-)
-@pytest.mark.parametrize("offset_h", [0, -3])
-def test_time_zones_are_those_of_the_text_or_else_of_the_mapping(
-    tmp_path: Path, read: Read, job: ImportJob, form: Any, of: Callable[[int], str], offset_h: int
-) -> None:
-    stamps = [START_NS // 1000 + n * 10**6 // 600 for n in range(60)]
-    rows = "".join(f"{of(us)},1,2\n" for us in stamps)
-    (tmp_path / "run.mf4").write_text("time,shaft x,shaft y\n" + rows)
-    axis = TimeAxis("column", offset_h * 3600, Place("time"), form)
-    found = read(tmp_path / "run.mf4", replace(job, time=axis, slow=()))
-    has_zone = "+00:00" in rows
-    expected_ns = START_NS - (0 if has_zone else offset_h * 3600 * 10**9)
-    assert [b.start_ns for b in found.blocks] == [expected_ns, expected_ns + 83_333_000]
 
 
 def test_tdms_waveform_properties_are_its_time(
