@@ -30,6 +30,7 @@ class LoggedFrame:
     is_error_frame: bool
     dlc: int
     data: bytearray
+    channel: str | int | None = None
 
 
 def frames_of_candump(stream: BinaryIO) -> Iterator[LoggedFrame]:
@@ -67,4 +68,5 @@ def _frame(match: re.Match[bytes]) -> LoggedFrame:
         is_error_frame=bool(id_ & _ERROR_FLAG),
         dlc=len(data),
         data=data,
+        channel=match["bus"].decode("ascii", "replace"),
     )
