@@ -89,8 +89,8 @@ class RecordingWriter:
             raise ConfigError(f"{folder}: is there already; a recording is never overwritten")
         if os.path.lexists(self._aside):
             raise ConfigError(
-                f"{self._aside}: is there already: being written, or left by a program that was killed;"
-                " delete it then"
+                f"{self._aside}: is there already: being written, or left by a program that was"
+                " killed; delete it then"
             )
         with self._renamed_errors():
             self._aside.mkdir()
