@@ -1,10 +1,11 @@
-"""BLF logs: python-can reads their frames, after it was found that nothing of them is missing.
+"""BLF logs: python-can reads their frames, and it is looked after that none of them is missing.
 
 python-can takes a log that was cut off, or packed in a way it does not know, for one that ends
-there, and an object of no length for one that never ends. So the objects are walked through first.
-Source of the layout: python-can's ``can.io.blf``.
+there, and an object of no length for one that never ends. So the objects are walked through, always
+a container ahead. Source of the layout: python-can's ``can.io.blf``.
 """
 
+import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -38,29 +39,34 @@ def frames_of_blf(stream: BinaryIO) -> Iterator[Any]:
     ConfigError
         If anything of it is missing, or not read by python-can.
     """
-    n_frames = _Count(stream).frames()
-    stream.seek(0)
+    walk = _Walk(stream.fileno())
+    reader = iter(library("can.io", "a BLF log").BLFReader(stream))
     n_read = 0
-    for frame in library("can.io", "a BLF log").BLFReader(stream):
+    while True:
+        walk.go_to(n_read + 1)
+        frame = next(reader, None)
+        if frame is None or n_read == walk.n_frames:
+            break
         n_read += 1
         yield frame
-    if n_read != n_frames:
-        raise ConfigError(f"has {n_frames} frames, of which {n_read} can be read")
+    if frame is not None or n_read != walk.n_frames:
+        raise ConfigError(f"has {walk.n_frames} frames, of which {n_read} can be read")
 
 
-class _Count:
-    """The objects of a log, counted."""
+class _Walk:
+    """The objects of a log, always further on than python-can: it believes what they say.
 
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._size = stream.seek(0, 2)
+    Attributes
+    ----------
+    n_frames
+        Passed so far.
+    """
+
+    def __init__(self, file: int) -> None:
+        self._file, self._size = file, os.fstat(file).st_size
         self._tail = b""
-        self._n_objects = self._n_frames = 0
-
-    def frames(self) -> int:
-        """Go through all of the log."""
-        self._stream.seek(0)
-        magic, n_header, n_bytes, _, n_objects = _FILE.unpack(self._read(0, _FILE.size))
+        self._n_objects = self.n_frames = 0
+        magic, n_header, n_bytes, _, self._n_declared = _FILE.unpack(self._read(0, _FILE.size))
         if magic != b"LOGG":
             raise ConfigError("not a BLF log")
         if n_bytes != self._size:
@@ -68,14 +74,20 @@ class _Count:
                 f"the file has {self._size} bytes, its header says {n_bytes}: cut off, or whatever"
                 " wrote it has not finished it"
             )
-        at = max(n_header, _FILE.size)
-        while at < self._size:
-            at = self._past_container(at)
+        self._at = max(n_header, _FILE.size)
+
+    def go_to(self, n_frames: int) -> None:
+        """Go on until so many frames are passed, or to the end."""
+        while self.n_frames < n_frames and self._at < self._size:
+            self._at = self._past_container(self._at)
+            if self._at >= self._size:
+                self._require_all()
+
+    def _require_all(self) -> None:
         if self._tail:
             raise ConfigError("cut off: it ends within an object")
-        if self._n_objects < n_objects:
-            raise ConfigError(f"{self._n_objects} objects, the header says {n_objects}")
-        return self._n_frames
+        if self._n_objects < self._n_declared:
+            raise ConfigError(f"{self._n_objects} objects, the header says {self._n_declared}")
 
     def _past_container(self, at: int) -> int:
         kind, n_bytes = _head(self._read(at, _OBJECT.size))
@@ -95,7 +107,7 @@ class _Count:
             if found + n_bytes > len(content):
                 break
             self._n_objects += 1
-            self._n_frames += kind in _FRAME_KINDS
+            self.n_frames += kind in _FRAME_KINDS
             at = found + n_bytes
         self._tail = content[at:]
         if found < 0 and len(self._tail) >= _PADDING:
@@ -108,8 +120,7 @@ class _Count:
     def _read(self, at: int, n_bytes: int) -> bytes:
         if at + n_bytes > self._size:
             raise ConfigError(f"cut off: {n_bytes} bytes are needed at {at} of {self._size}")
-        self._stream.seek(at)
-        return self._stream.read(n_bytes)
+        return os.pread(self._file, n_bytes, at)
 
 
 def _head(content: bytes) -> tuple[int, int]:

@@ -13,6 +13,7 @@ from acquisition.importing.job import ImportJob, Place
 from acquisition.importing.rows import Rows, SlowValues
 from acquisition.importing.scaling import counts_are_kept, engineering_units
 from acquisition.importing.times import TimeArray, from_start, numbers_to_ns, text_to_ns
+from acquisition.importing.units import require_unit, unit_in
 from core.arrays import FloatArray, RawArray
 
 MAX_LINE_BYTES = 1_000_000
@@ -32,6 +33,9 @@ class CsvTable:
         self._lines = 0
         self._rows = csv.reader(self._texts(), delimiter=job.csv.delimiter, strict=True)
         self._headings = self._header()
+        units = [(c.place, c.unit) for c in job.channels] + [(c.place, c.unit) for c in job.slow]
+        for place, unit in units:
+            require_unit(place, unit_in(place.name), unit)
         self._channels = [self._column(c.place) for c in job.channels]
         self._slow = [self._column(c.place) for c in job.slow]
         self._time = self._column(job.time.place) if job.time.place else None

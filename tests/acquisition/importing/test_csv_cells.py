@@ -55,3 +55,16 @@ def test_time_zones_are_those_of_the_text_or_else_of_the_mapping(
     has_zone = "+00:00" in rows
     expected_ns = START_NS - (0 if has_zone else offset_h * 3600 * 10**9)
     assert [b.start_ns for b in found.blocks] == [expected_ns, expected_ns + 83_333_000]
+
+
+def test_a_unit_in_a_heading_must_be_the_mapped_one(
+    tmp_path: Path, read: Read, job: ImportJob
+) -> None:
+    (tmp_path / "run").write_text("time,shaft x [mm],shaft y [South]\n0,1,2\n")
+    names = ("shaft x [mm]", "shaft y [South]")
+    channels = tuple(replace(c, place=Place(n)) for c, n in zip(job.channels, names, strict=True))
+    with pytest.raises(ConfigError, match=r"'shaft x \[mm\]' is in 'mm', the mapping says 'um'"):
+        read(tmp_path / "run", replace(job, channels=channels, slow=()))
+    channels = (replace(channels[0], unit="mm", factor=1000.0), channels[1])
+    found = read(tmp_path / "run", replace(job, channels=channels, slow=()))
+    assert found.samples.tolist() == [[1000.0], [2.0]]
