@@ -83,10 +83,15 @@ def confine(memory_bytes: int, cpu_s: int, log_bytes: int) -> None:
     log_bytes
         Most that it may write to a file: its own last words, and no unpacked archives.
     """
-    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
-    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (log_bytes, log_bytes))
+    for kind, limit in (
+        (resource.RLIMIT_AS, memory_bytes),
+        (resource.RLIMIT_CPU, cpu_s),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, log_bytes),
+    ):
+        most = resource.getrlimit(kind)[1]  # of whoever started us, and never to be raised
+        limit = limit if most == resource.RLIM_INFINITY else min(limit, most)
+        resource.setrlimit(kind, (limit, limit))
 
 
 def printable(text: str) -> str:

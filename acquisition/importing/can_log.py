@@ -7,7 +7,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.extras import library
+from acquisition.importing.blf import frames_of_blf
 from acquisition.importing.candump import frames_of_candump
 from acquisition.importing.frames import MAX_DATA, FrameBatch
 from acquisition.importing.job import ImportJob
@@ -26,15 +26,13 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]
     Raises
     ------
     ConfigError
-        If a frame cannot have been on a bus.
+        If a frame cannot have been on a bus, or frames were on several and it is not said which.
     """
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:
         waiting: list[Any] = []
-        for number, frame in enumerate(_frames(stream, job)):
-            _require_possible(frame, number + 1)
-            if not (frame.is_error_frame or frame.is_remote_frame):
-                waiting.append(frame)
+        for frame in _of_one_bus(_data_frames(stream, job), job.bus):
+            waiting.append(frame)
             if len(waiting) == _BATCH:
                 yield _batch(waiting, job), min(stream.tell() / size, 1.0)
                 waiting = []
@@ -42,10 +40,40 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]
             yield _batch(waiting, job), 1.0
 
 
+def _data_frames(stream: BinaryIO, job: ImportJob) -> Iterator[Any]:
+    for number, frame in enumerate(_frames(stream, job)):
+        _require_possible(frame, number + 1)
+        if not (frame.is_error_frame or frame.is_remote_frame):
+            yield frame
+
+
+def _of_one_bus(frames: Iterator[Any], wanted: str) -> Iterator[Any]:
+    """Frames of the same id on two buses come from two devices."""
+    bus, other, n_taken = wanted, "", 0
+    for frame in frames:
+        found = _bus(frame)
+        bus = bus or found
+        if found == bus:
+            n_taken += 1
+            yield frame
+        elif wanted:
+            other = found
+        else:
+            raise ConfigError(
+                f'has frames of bus "{bus}" and of bus "{found}": say by bus = "{bus}" which is'
+                " meant"
+            )
+    if other and not n_taken:
+        raise ConfigError(f'has no frame of bus "{wanted}", but of bus "{other}"')
+
+
+def _bus(frame: Any) -> str:
+    """As a log has it: candump names buses, BLF counts them from 1."""
+    return frame.channel if isinstance(frame.channel, str) else str((frame.channel or 0) + 1)
+
+
 def _frames(stream: BinaryIO, job: ImportJob) -> Iterator[Any]:
-    if job.format == "candump":
-        return frames_of_candump(stream)
-    return iter(library("can.io", "a BLF log").BLFReader(stream))
+    return frames_of_candump(stream) if job.format == "candump" else frames_of_blf(stream)
 
 
 def _require_possible(frame: Any, number: int) -> None:

@@ -7,6 +7,8 @@ from typing import BinaryIO
 
 from acquisition.errors import ConfigError
 
+CUT_OFF = "the file ends within it; if it is whole, put an end to its last line"
+
 _MAX_LINE = 400
 _LINE = re.compile(
     rb"\((?P<time>\d{1,12}\.\d{1,9})\) (?P<bus>\S{1,64}) (?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#"
@@ -28,6 +30,7 @@ class LoggedFrame:
     is_error_frame: bool
     dlc: int
     data: bytearray
+    channel: str | int | None = None
 
 
 def frames_of_candump(stream: BinaryIO) -> Iterator[LoggedFrame]:
@@ -41,6 +44,8 @@ def frames_of_candump(stream: BinaryIO) -> Iterator[LoggedFrame]:
     number = 0
     while line := stream.readline(_MAX_LINE + 1):
         number += 1
+        if not line.endswith(b"\n") and len(line) <= _MAX_LINE:
+            raise ConfigError(f"line {number}: {CUT_OFF}")
         if not line.strip():
             continue
         match = _LINE.fullmatch(line)
@@ -63,4 +68,5 @@ def _frame(match: re.Match[bytes]) -> LoggedFrame:
         is_error_frame=bool(id_ & _ERROR_FLAG),
         dlc=len(data),
         data=data,
+        channel=match["bus"].decode("ascii", "replace"),
     )

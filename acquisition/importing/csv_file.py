@@ -8,15 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.importing.candump import CUT_OFF
 from acquisition.importing.job import ImportJob, Place
 from acquisition.importing.rows import Rows, SlowValues
 from acquisition.importing.scaling import counts_are_kept, engineering_units
 from acquisition.importing.times import TimeArray, from_start, numbers_to_ns, text_to_ns
+from acquisition.importing.units import require_unit, unit_in
 from core.arrays import FloatArray, RawArray
 
 MAX_LINE_BYTES = 1_000_000
 MAX_COLUMNS = 4096
 _ROWS = 4096
+_CELLS = 2**20
+"""Rows and cells that are held at once."""
 
 
 class CsvTable:
@@ -29,6 +33,9 @@ class CsvTable:
         self._lines = 0
         self._rows = csv.reader(self._texts(), delimiter=job.csv.delimiter, strict=True)
         self._headings = self._header()
+        units = [(c.place, c.unit) for c in job.channels] + [(c.place, c.unit) for c in job.slow]
+        for place, unit in units:
+            require_unit(place, unit_in(place.name), unit)
         self._channels = [self._column(c.place) for c in job.channels]
         self._slow = [self._column(c.place) for c in job.slow]
         self._time = self._column(job.time.place) if job.time.place else None
@@ -55,6 +62,8 @@ class CsvTable:
             self._lines += 1
             if len(line) > MAX_LINE_BYTES:
                 raise self._wrong(f"longer than {MAX_LINE_BYTES} bytes")
+            if not line.endswith(b"\n"):
+                raise self._wrong(CUT_OFF)
             if b"\0" in line:
                 raise self._wrong("has a NUL byte")
             try:
@@ -86,11 +95,12 @@ class CsvTable:
 
     def _next_rows(self) -> list[list[str]]:
         table: list[list[str]] = []
+        most = max(1, min(_ROWS, _CELLS // max(1, len(self._headings))))
         for row in filter(None, self._checked()):  # without empty lines
             if len(row) != len(self._headings):
                 raise self._wrong(f"{len(row)} columns where the header has {len(self._headings)}")
             table.append(row)
-            if len(table) == _ROWS:
+            if len(table) == most:
                 break
         return table
 
@@ -107,6 +117,7 @@ class CsvTable:
         return numbers_to_ns(self._numbers(texts), axis, axis.start_ns)
 
     def _integers(self, texts: list[str]) -> np.ndarray:
+        self._require_plain(texts)
         try:
             return np.array(texts, dtype=np.int64)
         except (ValueError, OverflowError) as error:
@@ -134,12 +145,20 @@ class CsvTable:
         return tuple(found)
 
     def _numbers(self, texts: list[str]) -> FloatArray:
+        self._require_plain(texts)
         if self._job.csv.decimal != ".":
             texts = [text.replace(self._job.csv.decimal, ".") for text in texts]
         try:
             return np.array([float(text) if text else math.nan for text in texts])
         except ValueError as error:
             raise self._wrong("or one of those before it: no number", texts) from error
+
+    def _require_plain(self, texts: list[str]) -> None:
+        """Refuse groups of thousands, which `float` would take for decimals, or leave out."""
+        for mark in {"_", "."} - {self._job.csv.decimal}:
+            if mark in "".join(texts):
+                example = next(text for text in texts if mark in text)
+                raise self._wrong(f"or one of those before it: {mark!r} in number {example[:40]!r}")
 
     def _wrong(self, what: str, texts: list[str] | None = None) -> ConfigError:
         example = next((text for text in texts or [] if not _is_number(text)), None)

@@ -69,7 +69,18 @@ class _Hdf5File:
                 f"dataset {str(place)[:200]!r} has shape {dataset.shape} of {dataset.dtype};"
                 " needed is one dimension of numbers"
             )
+        if not self._is_written(dataset):
+            raise ConfigError(
+                f"dataset {str(place)[:200]!r} is longer than what was written of it: whatever"
+                " wrote it has not finished"
+            )
         return dataset
+
+    def _is_written(self, dataset: Any) -> bool:
+        """HDF5 gives zeros, or what it was told to, in the place of what nobody has written."""
+        if dataset.chunks is None:
+            return bool(dataset.size == 0 or dataset.id.get_storage_size())
+        return bool(dataset.id.get_num_chunks() * dataset.chunks[0] >= dataset.shape[0])
 
 
 class _Hdf5Series:

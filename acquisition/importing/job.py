@@ -137,6 +137,8 @@ class ImportJob:
         Of the unit: see :class:`acquisition.calibration.UnitCalibration`.
     channels, slow
         In the order of the unit.
+    bus
+        Whose frames are read, of a CAN log of several; empty if it must be of one.
     """
 
     format: Format
@@ -146,3 +148,4 @@ class ImportJob:
     slow: tuple[SlowColumn, ...] = ()
     block_samples: int = BLOCK_SAMPLES
     csv: CsvLayout = CsvLayout()
+    bus: str = ""

@@ -10,11 +10,13 @@ from acquisition.errors import ConfigError
 from acquisition.extras import library
 from acquisition.importing.job import ImportJob, Place
 from acquisition.importing.series import SeriesTable, require_one
-from acquisition.importing.times import TimeArray
+from acquisition.importing.times import TimeArray, utc_ns
 
 _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1
 _NO_CONVERSION, _LINEAR = 0, 1
+_INVALID = 0b11
+"""All samples are invalid, or a bit says which: then there is no count for each of them."""
 
 
 class MdfTable(SeriesTable):
@@ -69,7 +71,7 @@ class _MdfSeries:
         unit = (conversion.unit if conversion is not None else "") or channel.unit
         self.unit: str | None = str(unit or "")
         is_int16 = channel.bit_count == 16 and self._raw(0, 1).dtype == np.int16
-        keeps = is_int16 and is_linear and self._offset == 0.0
+        keeps = is_int16 and is_linear and self._offset == 0.0 and not channel.flags & _INVALID
         self.per_count: float | None = float(self._gain) if keeps else None
 
     def values(self, start: int, stop: int) -> npt.NDArray[Any]:
@@ -86,8 +88,7 @@ class _MdfSeries:
         us = np.rint(since_s * 1e6)
         if len(us) != stop - start or not np.all(np.abs(us) < 2**53):
             raise ConfigError("a group without a usable time channel")
-        times_ns: TimeArray = self._start_ns // 1000 * 1000 + us.astype(np.int64) * 1000
-        return times_ns
+        return utc_ns(us.astype(np.int64), self._start_ns)
 
     def _raw(self, start: int, stop: int) -> npt.NDArray[Any]:
         samples, invalid = self._mdf.get(
@@ -95,6 +96,7 @@ class _MdfSeries:
             index=self._index,
             samples_only=True,
             raw=True,
+            ignore_invalidation_bits=True,  # else what is invalid is left out, and the rest moves
             record_offset=start,
             record_count=stop - start,
         )

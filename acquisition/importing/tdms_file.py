@@ -1,7 +1,8 @@
 """TDMS files of LabVIEW and its relatives: channels in groups."""
 
+import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,12 @@ from acquisition.importing.times import TimeArray, from_start
 _EPOCH_1904_S = -2_082_844_800
 _UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
 _SCALE = "NI_Scale[0]_"
+
+_LEAD = struct.Struct("<4sL4xQ8x")
+"""Of a segment: magic, table of contents; bytes that follow. Source: NI, TDMS file format."""
+
+_BIG_ENDIAN = 1 << 6
+_UNFINISHED = 2**64 - 1
 
 
 class TdmsTable(SeriesTable):
@@ -30,6 +37,7 @@ class _TdmsFile:
     def __init__(self, path: Path) -> None:
         # an open file, not a path: npTDMS would believe an index file that lies beside it
         self._stream = path.open("rb")
+        _require_whole(self._stream)
         self._file = library("nptdms", "TDMS").TdmsFile.open(self._stream, raw_timestamps=True)
         self._found: dict[Place, _TdmsSeries] = {}
 
@@ -90,6 +98,28 @@ class _TdmsSeries:
         raw = self._channel.read_data(0, 1, scaled=False)
         slope = get(_SCALE + "Linear_Slope")
         return float(slope) if getattr(raw, "dtype", None) == np.int16 and slope else None
+
+
+def _require_whole(stream: BinaryIO) -> None:
+    """Refuse a file that does not end where its last segment does; npTDMS would read the rest."""
+    size = stream.seek(0, 2)
+    at = 0
+    while at < size:
+        stream.seek(at)
+        lead = stream.read(_LEAD.size)
+        if len(lead) < _LEAD.size:
+            raise ConfigError(f"cut off within the segment at {at}")
+        magic, contents, n_bytes = _LEAD.unpack(lead)
+        if contents & _BIG_ENDIAN:  # of all but the table of contents itself
+            n_bytes = int.from_bytes(n_bytes.to_bytes(8, "little"), "big")
+        if magic != b"TDSm":
+            raise ConfigError(f"no TDMS file, or damaged: there is no segment at {at}")
+        if n_bytes == _UNFINISHED:
+            raise ConfigError("whatever wrote it has not finished its last segment")
+        at += _LEAD.size + n_bytes
+    if at > size:
+        raise ConfigError(f"cut off: its last segment ends at {at}, the file at {size}")
+    stream.seek(0)
 
 
 def _stamps_ns(stamps: Any) -> npt.NDArray[np.int64]:

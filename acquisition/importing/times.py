@@ -13,7 +13,8 @@ TimeArray = npt.NDArray[np.int64]
 
 _US_PER = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 _MAX_US = 2**53
-"""285 years; beyond it seconds in a double are not exact to a microsecond."""
+"""285 years; beyond it seconds in a double are not exact to a microsecond, and nanoseconds since
+1970 do not fit 64 bits."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -41,19 +42,32 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
         start_ns = -axis.utc_offset_s * 1_000_000_000
     if start_ns is None:
         raise ConfigError("time counts from a start that neither file nor mapping gives")
-    return _whole_us(values, _US_PER[unit]) + start_ns // 1000 * 1000
+    return utc_ns(_whole_us(values, _US_PER[unit]), start_ns)
+
+
+def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
+    """Turn whole microseconds since a start into UTC.
+
+    Raises
+    ------
+    ConfigError
+        If one is further from 1970 than nanoseconds can count.
+    """
+    found = us + np.int64(start_ns // 1000)
+    wrong = np.abs(found) >= _MAX_US
+    if wrong.any():
+        raise ConfigError(f"a time of {found[wrong][0] / 1e6:.6g} s since 1970 is none")
+    return found * 1000
 
 
 def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
     if values.dtype.kind in "iu" and us_per_unit < 1.0:  # nanoseconds are beyond a double
-        us = (values.astype(np.int64) + 500) // 1000
-    else:
-        exact = np.rint(values.astype(np.float64) * us_per_unit)
-        wrong = ~(np.abs(exact) < _MAX_US)  # written so that NaN is wrong, too
-        if wrong.any():
-            raise ConfigError(f"{values[wrong][0]} in the time column is no time")
-        us = exact.astype(np.int64)
-    return us * 1000
+        return np.asarray(values // 1000 + (values % 1000 >= 500)).astype(np.int64)
+    exact = np.rint(values.astype(np.float64) * us_per_unit)
+    wrong = ~(np.abs(exact) < _MAX_US)  # written so that NaN is wrong, too
+    if wrong.any():
+        raise ConfigError(f"{values[wrong][0]} in the time column is no time")
+    return exact.astype(np.int64)
 
 
 def text_to_ns(texts: list[str], axis: TimeAxis) -> TimeArray:
@@ -65,7 +79,7 @@ def text_to_ns(texts: list[str], axis: TimeAxis) -> TimeArray:
         If one is no time.
     """
     zone = timezone(timedelta(seconds=axis.utc_offset_s))
-    return np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64) * 1000
+    return utc_ns(np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64), 0)
 
 
 def _text_to_us(text: str, zone: timezone) -> int:
@@ -81,4 +95,4 @@ def _text_to_us(text: str, zone: timezone) -> int:
 def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArray:
     """Times of the samples from one index to another, without a gap."""
     number = np.arange(first, stop, dtype=np.float64)
-    return start_ns // 1000 * 1000 + np.floor(number * (1e6 / rate_hz)).astype(np.int64) * 1000
+    return utc_ns(np.floor(number * (1e6 / rate_hz)).astype(np.int64), start_ns)

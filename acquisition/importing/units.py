@@ -1,5 +1,6 @@
 """Units as files write them, and what they are in the units of channels; nothing is guessed."""
 
+import re
 from collections.abc import Iterable
 
 from acquisition.errors import ConfigError
@@ -81,6 +82,12 @@ def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
     if canonical(unit) not in known:
         raise _misfit(unit, channel_unit, known)
     return known[canonical(unit)]
+
+
+def unit_in(heading: str) -> str | None:
+    """The unit that a heading states behind its name, as in ``shaft x [um]``; else None."""
+    found = re.search(r"\[([^\[\]]{1,16})\]\s*$", heading)
+    return found[1] if found and found[1].strip() in _CANONICAL else None
 
 
 def require_unit(place: object, found: str | None, mapped: str) -> None:

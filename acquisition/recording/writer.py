@@ -87,6 +87,11 @@ class RecordingWriter:
         self._blocks: list[RawBlock] = []
         if os.path.lexists(folder):
             raise ConfigError(f"{folder}: is there already; a recording is never overwritten")
+        if os.path.lexists(self._aside):
+            raise ConfigError(
+                f"{self._aside}: is there already: being written, or left by a program that was"
+                " killed; delete it then"
+            )
         with self._renamed_errors():
             self._aside.mkdir()
             self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
@@ -100,10 +105,15 @@ class RecordingWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if kind is None:
-            self.finish()
-        else:
+        if kind is not None:
             self.abandon()
+            return
+        try:
+            self.finish()
+        except ConfigError:
+            with suppress(ConfigError):
+                self.abandon()
+            raise
 
     @property
     def duration_s(self) -> float:

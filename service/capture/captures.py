@@ -4,7 +4,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import structlog
@@ -12,6 +11,7 @@ import structlog
 from acquisition.clock import Clock
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.blocks import SampleBlock
+from service.capture.capture import Capture
 from service.capture.file import CaptureError, CaptureFile, MakeWriter
 from service.capture.folders import clear_leftovers
 from service.capture.history import BlockHistory
@@ -31,41 +31,6 @@ MAX_BUSY_S = 60.0
 
 MAX_PENDING_SAMPLES = 50_000_000
 """Of all channels and captures together that wait for the disk: 200 MB."""
-
-
-@dataclass
-class Capture:
-    """One capture that is being made.
-
-    Parameters
-    ----------
-    alarms
-        The events it is made for; the first has begun it.
-    deadline_s
-        When it is finished with what there is, on the steady clock.
-    pending
-        Blocks that are still to be written; filled on the event loop, emptied in the thread.
-    is_lost
-        Whether the disk was too slow for it.
-    """
-
-    file: CaptureFile
-    span: Span
-    alarms: list[AlarmEvent]
-    deadline_s: float
-    pending: deque[SampleBlock] = field(default_factory=deque)
-    is_lost: bool = False
-
-    def add(self, block: SampleBlock) -> None:
-        """Take a block, if it belongs here."""
-        if self.span.goes_on_to(block) and not self.is_lost:
-            self.pending.append(block)
-            self.span = self.span.with_block(block)
-
-    @property
-    def n_pending_samples(self) -> int:
-        """Samples of all channels that are still to be written."""
-        return len(self.pending) * self.pending[0].samples.size if self.pending else 0
 
 
 class Captures:
@@ -153,6 +118,8 @@ class Captures:
             return
         if running is None:
             running = self._begin(block.unit, events)
+        elif not self._reaches_back(running, block.unit, events):
+            running = self._replace(block.unit, events)
         else:
             self._prolong(running, events)
             if is_new:
@@ -199,6 +166,20 @@ class Captures:
         self._running[unit] = capture
         return capture
 
+    def _reaches_back(self, capture: Capture, unit: str, events: Sequence[AlarmEvent]) -> bool:
+        """Whether it has what belongs before all of these events."""
+        oldest_ns = next(iter(self._histories[unit])).start_ns
+        return not events or capture.span.reaches_back_to(
+            self._span_around(unit, events).start_ns, oldest_ns
+        )
+
+    def _replace(self, unit: str, events: list[AlarmEvent]) -> Capture:
+        """Begin again, from further back, with the alarms that there have been."""
+        before = self._running[unit]
+        before.is_replaced, before.pending = True, deque()
+        self._end(unit)
+        return self._begin(unit, [*before.alarms, *events])
+
     def _span_around(self, unit: str, events: Sequence[AlarmEvent]) -> Span:
         """The span that begins first."""
         spans = (Span.around(event, self._rate_hz[unit], self._settings) for event in events)
@@ -224,8 +205,8 @@ class Captures:
     def _give_up(self, unit: str) -> None:
         """Let go of a capture that the disk cannot keep up with."""
         capture = self._running[unit]
-        capture.is_lost = True
-        capture.pending.clear()
+        # another one, as the thread may be emptying this one
+        capture.is_lost, capture.pending = True, deque()
         self._end(unit)
 
     async def _write(self) -> None:
@@ -236,13 +217,16 @@ class Captures:
             await self._in_thread(self._put, capture, is_last)
             if is_last:
                 self._ended = [each for each in self._ended if each is not capture]
-            if not was_closed and (is_last or capture.file.is_closed):
+            if not was_closed and not capture.is_replaced and (is_last or capture.file.is_closed):
                 self._ready(Outcome(tuple(capture.alarms), capture.file.finished, self.error))
         self._running = {u: c for u, c in self._running.items() if not c.file.is_closed}
 
     def _put(self, capture: Capture, is_last: bool) -> None:
         """Write what is pending; in the thread."""
         try:
+            if capture.is_replaced:
+                capture.file.given_up("another one holds them")
+                return
             capture.file.write(_drained(capture.pending))
             if is_last and not capture.file.is_closed:
                 if capture.is_lost:

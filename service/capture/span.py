@@ -98,6 +98,10 @@ class Span:
         end_ns = time_ns + ns_from_s(settings.post_s)
         return cls(start_ns, end_ns, last_end_ns, round(settings.max_s * rate_hz))
 
+    def reaches_back_to(self, start_ns: int, oldest_ns: int) -> bool:
+        """Whether it begins by a time, or at least with the oldest samples that there are."""
+        return self.start_ns <= max(start_ns, oldest_ns)
+
     def with_alarm(self, time_ns: int, settings: CaptureSettings) -> "Span":
         """The span prolonged by one more alarm, as far as that goes."""
         end_ns = max(self.end_ns, time_ns + ns_from_s(settings.post_s))

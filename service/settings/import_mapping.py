@@ -125,6 +125,10 @@ class ImportMapping(Settings):
     csv: CsvSettings | None = None
     """Only for CSV files."""
 
+    bus: Annotated[str, StringConstraints(max_length=64)] = ""
+    """Only for CAN logs, and needed for those of several buses: which of them. A candump log has
+    its name, a BLF log its number from 1; examples: "can0", "2"."""
+
     channel: Annotated[tuple[MappedChannel, ...], Field(max_length=32)] = ()
     """Waveform channels; none for CAN logs, whose channels are those of the unit's DBC file."""
 
@@ -137,6 +141,8 @@ class ImportMapping(Settings):
         self._check_channels()
         if self.csv is not None and self.format != "csv":
             raise MisfitError(f"is for CSV files, this one is {self.format}", "csv")
+        if self.bus and self.format not in CAN_LOGS:
+            raise MisfitError(f"is for CAN logs, this one is {self.format}", "bus")
         return self
 
     def _check_time(self) -> None:

@@ -63,6 +63,7 @@ def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
         slow=tuple(_slow(slow[c.id], c.unit) for c in unit.slow_channel if c.id in slow),
         block_samples=unit.block_samples,
         csv=csv,
+        bus=mapping.bus,
     )
 
 

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from acquisition.recording.export.rows import UNITS, ExportRows
+from acquisition.recording.export.rows import UNITS, ExportRows, require_free_names
 from acquisition.recording.manifest import Manifest
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
@@ -37,6 +37,7 @@ class ParquetExporter:
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
         time = pa.field("time_utc", pa.timestamp("ns", tz="UTC"))
+        require_free_names([id_ for id_, _ in _columns(manifest)], ("time_utc", "epoch", "index"))
         schema = _schema(manifest, time, [id_ for id_, _ in _columns(manifest)])
         for id_, unit in _columns(manifest):
             at = schema.get_field_index(id_)

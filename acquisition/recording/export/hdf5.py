@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from acquisition.extras import library
-from acquisition.recording.export.rows import UNITS, ExportRows
+from acquisition.recording.export.rows import UNITS, ExportRows, require_free_names
 from acquisition.recording.manifest import Manifest
 
 _CHUNK = 8192
+_OWN = ("time_ns", "epoch", "index")
 
 
 class Hdf5Exporter:
@@ -20,11 +21,13 @@ class Hdf5Exporter:
     """
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
+        require_free_names([c.id for c in manifest.channels], (*_OWN, "slow"))
+        require_free_names([c.id for c in manifest.slow_channels], _OWN[:1])
         self._file = library("h5py", "HDF5").File(path, "w")
         self._file.attrs.update(
             unit=manifest.unit, rate_hz=manifest.rate_hz, made_by=manifest.made_by
         )
-        self._rows = [self._dataset(name, "i8", "") for name in ("time_ns", "epoch", "index")]
+        self._rows = [self._dataset(name, "i8", "") for name in _OWN]
         self._samples = [self._dataset(c.id, "f4", UNITS[c.measurand]) for c in manifest.channels]
         self._slow_time = self._dataset("slow/time_ns", "i8", "")
         self._slow = [self._dataset(f"slow/{c.id}", "f8", c.unit) for c in manifest.slow_channels]

@@ -7,16 +7,19 @@ from typing import Any
 import numpy as np
 
 from acquisition.extras import library
-from acquisition.recording.export.rows import UNITS, ExportRows
+from acquisition.recording.export.rows import UNITS, ExportRows, require_free_names
 from acquisition.recording.manifest import Manifest
 
 WAVEFORMS, SLOW = "waveforms", "slow"
+_OWN = ("time", "epoch", "index")
 
 
 class Mdf4Exporter:
     """Times are seconds since the start that the header has, in UTC."""
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
+        require_free_names([c.id for c in manifest.channels], _OWN)
+        require_free_names([c.id for c in manifest.slow_channels], _OWN[:1])
         self._asammdf = library("asammdf", "MDF4")
         self._path, self._manifest = path, manifest
         self._mdf = self._asammdf.MDF(version="4.10")

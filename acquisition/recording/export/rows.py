@@ -1,12 +1,14 @@
 """A recording as rows: what every exported file has."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from acquisition.calibration import calibrate
+from acquisition.calibration import calibrate, slow_reading
+from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from acquisition.recording.manifest import Manifest
 from acquisition.recording.reader import Recording
@@ -40,7 +42,7 @@ class ExportRows:
     block_rows
         (n_blocks,) first row of each block.
     slow
-        (n_slow, n_blocks) one value for each block; NaN where there was none.
+        (n_slow, n_blocks) one value for each block; NaN where there was none, or none that can be.
     """
 
     times_ns: np.ndarray
@@ -55,6 +57,19 @@ class ExportRows:
         """(n_slow, n) the value of its block for every row."""
         lengths = np.diff([*self.block_rows, len(self.index)])
         return np.repeat(self.slow, lengths, axis=1)
+
+
+def require_free_names(ids: Collection[str], taken: Collection[str]) -> None:
+    """Refuse channels that are called as the file itself calls something else.
+
+    Raises
+    ------
+    ConfigError
+        Naming the first.
+    """
+    for id_ in ids:
+        if id_ in taken:
+            raise ConfigError(f"channel {id_!r} has a name that such a file needs itself; take csv")
 
 
 class Exporter(Protocol):
@@ -89,7 +104,7 @@ def export_rows(recording: Recording) -> Iterator[ExportRows]:
 
 def _rows(blocks: list[RawBlock], manifest: Manifest) -> ExportRows:
     lengths = [block.n_samples for block in blocks]
-    slow = [block.slow for block in blocks]
+    slow = [_slow(block, manifest) for block in blocks]
     return ExportRows(
         times_ns=np.concatenate([_times_ns(block) for block in blocks]),
         epochs=np.repeat([block.epoch for block in blocks], lengths),
@@ -109,3 +124,9 @@ def _samples(block: RawBlock, manifest: Manifest) -> SampleArray:
     calibrated = calibrate(block, manifest.calibration)
     bad = [quality.level is Level.BAD for quality in calibrated.channel_quality]
     return np.where(np.array(bad)[:, np.newaxis], np.float32(np.nan), calibrated.samples)
+
+
+def _slow(block: RawBlock, manifest: Manifest) -> list[float]:
+    channels = manifest.calibration.slow
+    readings = [slow_reading(v, c) for v, c in zip(block.slow, channels, strict=True)]
+    return [math.nan if reading.value is None else reading.value for reading in readings]

@@ -6,16 +6,19 @@ from typing import Any
 import numpy as np
 
 from acquisition.extras import library
-from acquisition.recording.export.rows import UNITS, ExportRows
+from acquisition.recording.export.rows import UNITS, ExportRows, require_free_names
 from acquisition.recording.manifest import Manifest
 
 WAVEFORMS, SLOW = "waveforms", "slow"
+_OWN = ("time_utc", "epoch", "index")
 
 
 class TdmsExporter:
     """Channel ``time_utc`` of both groups has time stamps, which TDMS keeps in UTC."""
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
+        require_free_names([c.id for c in manifest.channels], _OWN)
+        require_free_names([c.id for c in manifest.slow_channels], _OWN[:1])
         self._nptdms = library("nptdms", "TDMS")
         self._manifest = manifest
         self._writer = self._nptdms.TdmsWriter(path)

@@ -90,6 +90,32 @@ def test_a_blf_log_is_in_the_zone_of_the_mapping(
 
 
 @pytest.mark.parametrize(
+    ("kind", "writer", "buses"),
+    [("candump", can.CanutilsLogWriter, ("can0", "can1")), ("blf", can.BLFWriter, ("1", "2"))],
+)
+def test_like_frames_of_two_buses_are_never_mixed(
+    tmp_path: Path,
+    log_job: Callable[..., ImportJob],
+    kind: str,
+    writer: type,
+    buses: tuple[str, str],
+) -> None:
+    with writer(tmp_path / "log") as log:
+        for n in range(100):
+            channel = f"can{n % 2}" if kind == "candump" else n % 2
+            log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes([n]), channel=channel))
+    job = log_job(kind)
+    words = f'has frames of bus "{buses[0]}" and of bus "{buses[1]}": say by bus = "{buses[0]}"'
+    with pytest.raises(ConfigError, match=words):
+        all_frames(tmp_path / "log", job)
+    for n, bus in enumerate(buses):
+        (batch,) = all_frames(tmp_path / "log", replace(job, bus=bus))
+        assert batch.data[:, 0].tolist() == list(range(n, 100, 2))
+    with pytest.raises(ConfigError, match='has no frame of bus "9", but of bus'):
+        all_frames(tmp_path / "log", replace(job, bus="9"))
+
+
+@pytest.mark.parametrize(
     ("lines", "words"),
     [
         (["(1.0) can0 12345678901#00"], "line 1: .* is no frame"),

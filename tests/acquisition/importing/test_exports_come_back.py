@@ -28,8 +28,8 @@ MEASURANDS = {
 SLOW = {"oil": "degC", "speed": "r/min", "power": "MW", "slow_gap": "mm"}
 
 
-@pytest.fixture
-def recording(tmp_path: Path) -> Recording:
+@pytest.fixture(params=["float32", "int16"])
+def recording(tmp_path: Path, request: pytest.FixtureRequest) -> Recording:
     """A minute of four kinds of channels, with gaps on the way and a restart near the end."""
     unit = RecordedUnit(
         unit="U1",
@@ -44,7 +44,7 @@ def recording(tmp_path: Path) -> Recording:
             RecordedSlowChannel(id=id_, unit=u, minimum=-1e6, maximum=1e6)
             for id_, u in SLOW.items()
         ),
-        sample_type="float32",
+        sample_type=request.param,
     )
     chance = np.random.default_rng(5)
     with RecordingWriter(tmp_path / "recording", unit, "a test") as writer:
@@ -54,7 +54,9 @@ def recording(tmp_path: Path) -> Recording:
             epoch, first = (1, 50 * number) if number < 700 else (2, 50 * (number - 700))
             pause_ns = 0 if epoch == 1 else 3_334_166_000
             samples = chance.standard_normal((4, 50)).astype(np.float32)
-            if number == 300:
+            if request.param == "int16":
+                samples = chance.integers(-32767, 32767, (4, 50)).astype(np.int16)
+            elif number == 300:
                 samples[2] = np.nan
             writer.write(
                 RawBlock(

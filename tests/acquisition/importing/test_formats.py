@@ -15,7 +15,7 @@ import pytest
 from asammdf.blocks.v4_blocks import ChannelConversion
 
 from acquisition.errors import ConfigError
-from acquisition.importing.job import CsvLayout, ImportJob, Place, TimeAxis
+from acquisition.importing.job import CsvLayout, ImportJob, TimeAxis
 
 START_NS = 1_767_225_600_000_000_000
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -204,31 +204,6 @@ def test_a_csv_file_may_have_semicolons_decimal_commas_and_lines_before_its_head
     np.testing.assert_array_equal(found.samples, run.units_um)
 
 
-@pytest.mark.parametrize(
-    ("form", "of"),
-    [
-        ("epoch_s", lambda us: f"{us / 1e6:.6f}"),
-        ("epoch_ms", lambda us: f"{us / 1e3:.3f}"),
-        ("epoch_us", str),
-        ("epoch_ns", lambda us: str(us * 1000)),
-        ("iso8601", lambda us: f"{datetime.fromtimestamp(us / 1e6, UTC):%Y-%m-%d %H:%M:%S.%f}"),
-        ("iso8601", lambda us: f"{datetime.fromtimestamp(us / 1e6, UTC).isoformat()}"),
-    ],
-)
-@pytest.mark.parametrize("offset_h", [0, -3])
-def test_time_zones_are_those_of_the_text_or_else_of_the_mapping(
-    tmp_path: Path, read: Read, job: ImportJob, form: Any, of: Callable[[int], str], offset_h: int
-) -> None:
-    stamps = [START_NS // 1000 + n * 10**6 // 600 for n in range(60)]
-    rows = "".join(f"{of(us)},1,2\n" for us in stamps)
-    (tmp_path / "run.mf4").write_text("time,shaft x,shaft y\n" + rows)
-    axis = TimeAxis("column", offset_h * 3600, Place("time"), form)
-    found = read(tmp_path / "run.mf4", replace(job, time=axis, slow=()))
-    has_zone = "+00:00" in rows
-    expected_ns = START_NS - (0 if has_zone else offset_h * 3600 * 10**9)
-    assert [b.start_ns for b in found.blocks] == [expected_ns, expected_ns + 83_333_000]
-
-
 def test_tdms_waveform_properties_are_its_time(
     tmp_path: Path, run: Any, read: Read, job: ImportJob, placed: Placed
 ) -> None:
@@ -263,6 +238,33 @@ def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(
     job = job_for("mdf4")
     found = read(tmp_path / "local.mf4", replace(job, time=replace(job.time, utc_offset_s=-10800)))
     assert found.blocks[0].start_ns == START_NS + 10_800 * 10**9
+
+
+@pytest.mark.parametrize("of", ["counts", "units_um"])
+def test_samples_that_an_mdf_file_calls_invalid_are_none(
+    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], of: str
+) -> None:
+    invalid = np.isin(run.index, (0, 7, 600))
+    conversion = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
+    values = getattr(run, of)
+    with asammdf.MDF() as mdf:
+        signals = [
+            asammdf.Signal(
+                channel,
+                run.since_start_s,
+                name=f"shaft {axis}",
+                conversion=conversion if of == "counts" else None,
+                invalidation_bits=invalid if axis == "x" else None,
+            )
+            for axis, channel in zip("xy", values, strict=True)
+        ]
+        mdf.append(signals, acq_name="waveforms", common_timebase=True)
+        mdf.save(tmp_path / "run.mf4")
+    found = read(tmp_path / "run.mf4", replace(job_for("mdf4"), slow=()))
+    due = (values * PER_COUNT if of == "counts" else values).astype(np.float32)
+    due[0, invalid] = np.nan
+    np.testing.assert_array_equal(found.samples, due)
+    np.testing.assert_array_equal(found.index, run.index)
 
 
 def test_waveforms_of_different_lengths_or_times_are_refused(

@@ -46,6 +46,19 @@ def test_hdf5_values_in_other_files_are_not_read(
     assert says in refusal(read, tmp_path / "virtual", hdf5_job)
 
 
+@pytest.mark.parametrize("chunks", [None, (30,)])
+def test_hdf5_values_that_nobody_has_written_are_not_zeros(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob, chunks: tuple[int, ...] | None
+) -> None:
+    with h5py.File(tmp_path / "run", "w") as file:
+        file["time"] = file["shaft x"] = np.arange(100) / 600.0
+        begun = file.create_dataset("shaft y", (100,), "f4", chunks=chunks)
+        if chunks:
+            begun[:90] = 1.0
+    says = refusal(read, tmp_path / "run", hdf5_job)
+    assert "dataset 'shaft y' is longer than what was written of it" in says
+
+
 @pytest.mark.parametrize(
     ("values", "words"),
     [
@@ -66,17 +79,19 @@ def test_hdf5_values_that_are_no_numbers_in_a_row_are_refused(
 def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(
     tmp_path: Path, hdf5_job: ImportJob
 ) -> None:
+    packed = zlib.compress(bytes(2**20), 1)
     with h5py.File(tmp_path / "declared", "w") as file:
         for name in ("time", "shaft x", "shaft y"):
-            file.create_dataset(name, (2**50,), "f4", chunks=(1024,))
+            made = file.create_dataset(name, (2**30,), "i1", chunks=(2**25,), compression="gzip")
+            for n in range(32):
+                made.id.write_direct_chunk((n * 2**25,), packed)
     own_mb, child_mb, said = measured(tmp_path / "declared", hdf5_job)
-    assert "1125899906842624 samples per channel; 1 to 536870912 can be read" in said
+    assert "1073741824 samples per channel; 1 to 536870912 can be read" in said
     assert max(own_mb, child_mb) < 200
     with h5py.File(tmp_path / "packed", "w") as file:
         for name in ("time", "shaft x", "shaft y"):
             n_rows = 2**29 - 1
             made = file.create_dataset(name, (n_rows,), "f4", chunks=(n_rows,), compression="gzip")
-            packed = zlib.compress(bytes(2**20), 1)
             made.id.write_direct_chunk((0,), packed)
     own_mb, child_mb, said = measured(tmp_path / "packed", hdf5_job)
     assert "'shaft x' has chunks of 2147483644 bytes; up to 67108864 can be read" in said

@@ -14,6 +14,7 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
+from acquisition.recording.export.rows import export_rows
 from acquisition.recording.export.writing import ExportFormat, export_recording
 from acquisition.recording.manifest import RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
@@ -135,6 +136,44 @@ def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
     export_recording(recording, kind, tmp_path / "out", told.append)
     assert sum(told) == 8400
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "recording"]
+
+
+@pytest.mark.parametrize("kind", ExportFormat)
+def test_a_slow_value_that_cannot_be_is_no_number_in_any_file(
+    record: Record, numbered: Numbered, tmp_path: Path, kind: ExportFormat
+) -> None:
+    recording = open_recording(record([numbered(0, 50, slow=(400.0, 45.0))]))
+    export_recording(recording, kind, tmp_path / "run.mf4")
+    (rows,) = export_rows(recording)
+    np.testing.assert_array_equal(rows.slow, [[math.nan], [45.0]])
+    content = (tmp_path / "run.mf4").read_bytes()
+    assert b",400" not in content
+    assert np.float64(400.0).tobytes() not in content
+
+
+@pytest.mark.parametrize("id_", ["time_utc", "time_ns", "time", "epoch", "index", "slow"])
+@pytest.mark.parametrize("kind", ExportFormat)
+@pytest.mark.parametrize("where", ["channels", "slow_channels"])
+def test_a_channel_of_any_name_is_exported_or_refused_by_name(
+    tmp_path: Path,
+    unit: RecordedUnit,
+    numbered: Numbered,
+    kind: ExportFormat,
+    id_: str,
+    where: str,
+) -> None:
+    first, *rest = getattr(unit, where)
+    named = unit.model_copy(update={where: (first.model_copy(update={"id": id_}), *rest)})
+    with RecordingWriter(tmp_path / "recording", named, "a test") as writer:
+        writer.write(numbered(0, 50))
+    recording = open_recording(tmp_path / "recording")
+    try:
+        export_recording(recording, kind, tmp_path / "run.mf4")
+    except ConfigError as error:
+        assert kind is not ExportFormat.CSV
+        assert f"channel '{id_}' has a name that such a file needs itself" in str(error)  # noqa: PT017
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names in (["recording"], ["recording", "run.mf4"])
 
 
 def test_nothing_is_overwritten_or_left_half_done(recording: Recording, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import resource
 import struct
 import tempfile
 from collections.abc import Callable
@@ -157,7 +158,7 @@ def test_a_recording_being_written_is_none_yet(
             ConfigError, match=r"run\.incomplete: no manifest.json, so no recording"
         ):
             open_recording(tmp_path / "run.incomplete")
-        with pytest.raises(ConfigError, match=r"run\.incomplete: File exists"):
+        with pytest.raises(ConfigError, match=r"run\.incomplete: is there already: being"):
             RecordingWriter(folder, unit, "another")
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
@@ -169,6 +170,21 @@ def test_a_recording_is_never_overwritten(
     with pytest.raises(ConfigError, match="is there already"):
         RecordingWriter(folder, unit, "another")
     assert open_recording(folder).manifest.n_samples == 10
+
+
+def test_a_disk_that_is_full_in_the_end_keeps_no_half_recording(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writer = RecordingWriter(tmp_path / "run", unit, "a test")
+    writer.write(numbered(0, 50))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, most))
+    try:
+        with pytest.raises(ConfigError, match=r"run\.incomplete: .*File too large"), writer:
+            pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(

@@ -9,6 +9,7 @@ from rigs.capturing import SECOND, T0, block, numbers, raised, running, samples
 
 from core.alarms.alarm import AlarmKind
 from core.alarms.event import AlarmNews
+from service.capture.outcome import Outcome
 from service.capture.span import CaptureSettings
 
 
@@ -162,3 +163,26 @@ async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root: P
         [recording] = await rig.written(1)
 
     assert samples(recording) == numbers(10, 60)
+
+
+@pytest.mark.parametrize("pause", [False, True])
+async def test_so_it_does_where_the_samples_around_another_alarm_are_being_kept(
+    root: Path, pause: bool
+) -> None:
+    settings = CaptureSettings(pre_s=3.0, post_s=4.0, max_s=14.0, window_s=8.0)
+    film = raised(12.0, AlarmKind.STIFFNESS_X)
+    told: list[Outcome] = []
+    async with running(root, settings) as rig:
+        rig.captures.tell(told.append)
+        rig.send(0, 52, {49: raised(10.0)})
+        if pause:  # a part of it is on the disk already
+            await rig.until(lambda: any(root.glob("*.incomplete")))
+        rig.send(52, 100, {59: film})
+        [recording] = await rig.written(1)
+
+    assert samples(recording) == numbers(20, 80)
+    assert recording.folder.name == "U1-20260101T000010.000Z-order1_shaft_x"
+    alarms = json.loads((recording.folder / "alarm.json").read_text())["alarms"]
+    assert [alarm["time_ns"] for alarm in alarms] == [T0 + 10 * SECOND, T0 + 12 * SECOND]
+    assert [(len(outcome.alarms), outcome.folder) for outcome in told] == [(2, recording.folder)]
+    assert rig.captures.n_failed == 0

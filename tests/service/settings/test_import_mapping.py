@@ -92,6 +92,12 @@ def test_a_right_mapping_is_read(tmp_path: Path, text: str) -> None:
         (CSV, CSV[CSV.index("[[channel]]") :], "", "channel: needs at least one for csv"),
         (CSV, "[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
         (MDF, "[[channel]]", "[csv]\n[[channel]]", "csv: is for CSV files, this one is mdf4"),
+        (
+            MDF,
+            "[time]",
+            'bus = "can0"\n[time]',
+            ":3: bus = 'can0': is for CAN logs, this one is mdf4",
+        ),
         (MDF, "mdf4", "tdms", ":5: time.zone = '-03:00': tdms is in UTC; write"),
         (MDF, "mdf4", "candump", "candump is in UTC"),
         (MDF.replace("-03:00", "UTC"), "mdf4", "candump", "channel: are those of the DBC file for"),

@@ -1,0 +1,23 @@
+"""The process that reads foreign files has little, and less where it is given less."""
+
+import subprocess
+import sys
+
+import pytest
+
+CONFINED = """
+import resource
+from acquisition.reading_process import confine
+
+resource.setrlimit(resource.RLIMIT_AS, ({given}, {given}))
+confine(2**31, 60, 1000)
+print(*(resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE)))
+"""
+
+
+@pytest.mark.parametrize(("given", "memory"), [(2**33, 2**31), (2**30, 2**30)])
+def test_limits_are_never_raised(given: int, memory: int) -> None:
+    script = CONFINED.format(given=given)
+    command = [sys.executable, "-c", script]
+    found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert found.stdout.split() == [str(memory), "1000"]
