@@ -109,6 +109,19 @@ async def test_another_device_at_the_same_address_is_refused(plant) -> None:
             await take(source, 1)
 
 
+@pytest.mark.parametrize(("expected", "is_right"), [(0.1, True), (0.2, False)])
+async def test_a_float_can_be_a_signature(plant, expected: float, is_right: bool) -> None:
+    cell = Cell(address=30, type=NumberType.FLOAT32)
+    registers = map_of(signature=(Signature(cell=cell, expected=0.1),))
+    read_as = map_of(signature=(Signature(cell=cell, expected=expected),))
+    async with plant(registers, read_as=read_as) as (source, *_):
+        if is_right:
+            assert len(await take(source, 1)) == 1
+        else:
+            with pytest.raises(ConfigError, match=r"register 30 is 0\.1, expected 0\.2"):
+                await take(source, 1)
+
+
 @pytest.mark.parametrize(
     ("fault", "error", "said"),
     [

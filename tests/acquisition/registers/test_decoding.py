@@ -109,6 +109,13 @@ def test_an_skf_value_is_its_mantissa_times_its_scale_register() -> None:
     assert state is ValueState.OK
 
 
+def test_a_scale_register_of_zero_gives_no_value_instead_of_zero() -> None:
+    scale = ScaleRegister(cell=Cell(address=610, type=NumberType.INT16))
+    value = MapValue(id="v", cell=Cell(address=609, type=NumberType.INT16), scale_register=scale)
+
+    assert one(value, words(12345, 0))[1] is ValueState.INVALID
+
+
 @pytest.mark.parametrize(
     ("raw", "expected", "state"),
     [
@@ -179,6 +186,28 @@ def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
     assert states == [ValueState.OK, flagged, flagged, ValueState.OK]
 
 
+@pytest.mark.parametrize("cell", [{"function": 2}, {"bit": 7}])
+@pytest.mark.parametrize("good", [True, False])
+@pytest.mark.parametrize(
+    "flag",
+    [
+        {"set_means": Meaning.OK},
+        {"set_means": Meaning.OK, "mask": 1},
+        {"set_means": Meaning.BAD},
+        {"ok_values": (1,)},
+    ],
+)
+def test_a_single_bit_is_a_status_too(cell, good: bool, flag) -> None:
+    is_set = good is (flag.get("set_means") is not Meaning.BAD)
+    status = Cell(address=1, type=NumberType.BIT, **cell)
+    value = MapValue(id="v", cell=Cell(address=0), flags=(FlagCheck(cell=status, **flag),))
+
+    bit = words(is_set << 7) if "bit" in cell else bytes([is_set])
+    content = bit + words(5) if "function" in cell else words(5) + bit
+
+    assert one(value, content) == (5.0, ValueState.OK if good else ValueState.FLAGGED)
+
+
 @pytest.mark.parametrize(
     ("type_", "settings", "raw", "is_valid"),
     [
@@ -193,6 +222,9 @@ def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
         ("float32", {}, math.nan, False),
         ("float32", {}, -math.inf, False),
         ("float32", {"invalid_values": (-9999.0,)}, -9999.0, False),
+        ("float32", {"invalid_values": (-9999.9,)}, -9999.9, False),
+        ("float32", {"invalid_values": (1e300,)}, -9999.9, True),
+        ("float64", {"invalid_values": (-9999.9,)}, -9999.9, False),
         ("int16", {"scale": 100.0, "invalid_values": (100,)}, 1, True),
     ],
 )
