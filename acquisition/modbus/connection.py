@@ -112,8 +112,11 @@ class Connection:
         return reply.pdu
 
     async def _answer(self, request: ModbusPDU) -> Reply:
-        if isinstance(self._settings.transport, SerialTransport):
-            await asyncio.sleep(self._settings.transport.frame_gap_s)
+        match self._settings.transport:
+            case SerialTransport(frame_gap_s=frame_gap_s):
+                await asyncio.sleep(frame_gap_s)
+            case TcpTransport(transactions=transactions):
+                self._client.ctx.next_tid = next(transactions) - 1  # it adds one to it
         if not self._client.connected:
             raise LinkError(f"{self._where}: {_CLOSED}")
         if self._framer.unasked:

@@ -1,6 +1,8 @@
 """Where a Modbus device is: at a TCP address, or on a serial line."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Literal, TypeAlias, get_args
 
 from acquisition.errors import ConfigError
@@ -11,6 +13,9 @@ Parity: TypeAlias = Literal["none", "even", "odd"]
 
 MAX_REGISTERS_PER_READ = 125
 ADDRESS_SPACE = 0x10000
+_N_TRANSACTIONS = 65_000
+"""Ids are 1 to this, as pymodbus has them; some devices answer to 0 as to any."""
+
 _MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
 _MAX_SERIAL_DEVICE_ID = 247
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
@@ -34,15 +39,20 @@ class TcpTransport:
     ----------
     addresses
         Of the host, remembered from one connection to the next.
+    transactions
+        Id of each next request. They go on from one connection to the next: a gateway may pass a
+        late reply on to whoever is connected then.
     """
 
     host: str
     port: int = 502
     addresses: KnownAddresses = field(init=False, repr=False, compare=False)
+    transactions: Iterator[int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         _require("port", self.port, 1, 65535)
         object.__setattr__(self, "addresses", KnownAddresses(self.host, self.port))
+        object.__setattr__(self, "transactions", (1 + n % _N_TRANSACTIONS for n in count()))
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"

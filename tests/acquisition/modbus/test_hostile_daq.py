@@ -97,7 +97,8 @@ COMMON = {
 
 TCP = COMMON | {
     "another transaction": lambda w: [
-        struct.pack(">H", w.random.integers(1000, 65_000)) + w.reply[2:]
+        struct.pack(">H", (int.from_bytes(w.reply[:2]) + w.random.integers(1, 65_536)) % 65_536)
+        + w.reply[2:]
     ],
     "the transaction before": lambda w: [
         struct.pack(">H", int.from_bytes(w.reply[:2], "big") - 1)
