@@ -14,13 +14,16 @@ class MapReader:
         self._link, self._decoder = link, decoder
 
     async def read(self) -> MapReading:
-        """Read everything once.
+        """Read everything once; from the right device, also if connections are not kept.
 
         Raises
         ------
         LinkError, FrameError, ConfigError
             As the link does.
         """
+        if not self._link.is_kept:
+            await self._link.require_device()
+            await self.require_signature()
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:

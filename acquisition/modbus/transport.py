@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 from itertools import count
 from typing import Literal, TypeAlias, get_args
 
@@ -105,6 +106,13 @@ class SerialTransport:
 Transport: TypeAlias = TcpTransport | SerialTransport
 
 
+class ConnectionUse(StrEnum):
+    """For how long a TCP connection is kept."""
+
+    KEPT = "kept"
+    PER_REPLY = "per_reply"
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
     """How to reach a Modbus device, and how it wants to be asked.
@@ -120,6 +128,9 @@ class LinkSettings:
         Most registers in one read, 1 to 125.
     identity
         What the device must answer before anything else is read from it.
+    connection
+        "kept" for as long as it works, or a new one for each request: for devices that close it
+        after each reply or when they are not asked for a while, or that have a single one for all.
     """
 
     transport: Transport
@@ -127,9 +138,12 @@ class LinkSettings:
     timeout_s: float = 1.0
     max_registers: int = MAX_REGISTERS_PER_READ
     identity: Identity | None = None
+    connection: ConnectionUse = ConnectionUse.KEPT
 
     def __post_init__(self) -> None:
         serial = isinstance(self.transport, SerialTransport)
+        if serial and self.connection is not ConnectionUse.KEPT:
+            raise ConfigError("modbus: a serial line is kept, there are no connections on it")
         _require("device_id", self.device_id, 1, _MAX_SERIAL_DEVICE_ID if serial else 255)
         _require("max_registers", self.max_registers, 1, MAX_REGISTERS_PER_READ)
         if not 0 < self.timeout_s < float("inf"):

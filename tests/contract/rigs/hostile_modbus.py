@@ -49,6 +49,10 @@ class HostileServer(Liar):
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
+    def n_connected(self) -> int:
+        return len(self._tasks)
+
+    @property
     def endpoint(self) -> dict[str, str | int]:
         return {"host": "127.0.0.1", "port": self.port}
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.delivery import Delivery
+from acquisition.modbus.transport import ConnectionUse
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
@@ -26,6 +27,7 @@ from service.wiring.register_daqs import fifo_device, modbus_server, polled_devi
 from service.wiring.registers import (
     at_poll_rate,
     fifo_source,
+    polled_settings,
     polled_source,
     vector_monitor,
     vector_source,
@@ -151,3 +153,13 @@ def test_a_queue_that_is_away_is_not_called_each_time_that_it_would_be_read(sett
 
     assert poll_period_s(settings.model_copy(update={"source": queue})) == DEFAULT_RETRY_S
     assert poll_period_s(settings) == settings.source.poll_period_s
+
+
+@pytest.mark.parametrize("use", ConnectionUse)
+def test_how_long_a_connection_is_kept_reaches_the_adapter(use: ConnectionUse) -> None:
+    given = {"kind": "modbus_polled", "host": "192.0.2.1", "poll_period_s": 60.0}
+    given |= {"stale_after_s": 600.0, "map": {"value": [{"channel": "a", "address": 1}]}}
+
+    found = polled_settings(ModbusPolledSettings.model_validate(given | {"connection": use.value}))
+
+    assert found.connection is use
