@@ -8,7 +8,6 @@ from acquisition.joined_source import JoinedSource, only_slow, without_slow
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_slow_values import PolledSlowValues
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
-from acquisition.modbus.transport import ConnectionUse
 from acquisition.source import SampleSource
 from acquisition.vector_calibration import vector_calibration
 from core.machine import Unit
@@ -28,7 +27,6 @@ def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
     """How a mapped device is asked."""
     return PolledSettings(
         **link_fields(device),
-        connection=ConnectionUse(device.connection),
         poll_period_s=device.poll_period_s,
         stale_after_s=device.stale_after_s,
     )

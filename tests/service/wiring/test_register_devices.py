@@ -23,6 +23,7 @@ from service.settings.modbus_sources import (
     ModbusVectorSettings,
 )
 from service.settings.units import UnitSettings
+from service.wiring.probes import link_settings_of
 from service.wiring.register_daqs import fifo_device, modbus_server, polled_device, vector_device
 from service.wiring.registers import (
     at_poll_rate,
@@ -160,6 +161,7 @@ def test_how_long_a_connection_is_kept_reaches_the_adapter(use: ConnectionUse) -
     given = {"kind": "modbus_polled", "host": "192.0.2.1", "poll_period_s": 60.0}
     given |= {"stale_after_s": 600.0, "map": {"value": [{"channel": "a", "address": 1}]}}
 
-    found = polled_settings(ModbusPolledSettings.model_validate(given | {"connection": use.value}))
+    device = ModbusPolledSettings.model_validate(given | {"connection": use.value})
 
-    assert found.connection is use
+    assert polled_settings(device).connection is use
+    assert link_settings_of(device).connection is use
