@@ -101,6 +101,18 @@ async def test_a_clock_too_coarse_for_the_polls_does_not_stamp_them(plant) -> No
     assert blocks[-1].clock.offset_s is None
 
 
+async def test_a_device_whose_clock_has_failed_is_not_said_to_be_in_step(plant) -> None:
+    cells = Cell(address=80, type=NumberType.UINT32), Cell(address=82)
+    at_zero = tuple(Signature(cell=cell, expected=0.0) for cell in cells)
+    time = EpochTime(seconds=cells[0], parts=cells[1], parts_per_s=1000.0)
+    async with plant(map_of(signature=at_zero), read_as=map_of(time=time)) as (source, *_, clock):
+        started_ns = clock.now_ns()
+        blocks = await take(source, 3)
+
+    assert blocks[0].start_ns == started_ns
+    assert blocks[-1].clock.offset_s is None
+
+
 async def test_another_device_at_the_same_address_is_refused(plant) -> None:
     registers = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))
     other = map_of(signature=(Signature(cell=Cell(address=1), expected=43.0),))
