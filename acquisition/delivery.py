@@ -34,7 +34,12 @@ class Delivery:
         self._clock = ClockEstimate()
 
     def take(
-        self, raw: RawBlock, arrived: Arrival | None = None, held_s: float = 0.0
+        self,
+        raw: RawBlock,
+        arrived: Arrival | None = None,
+        held_s: float = 0.0,
+        *,
+        has_stamp: bool = True,
     ) -> list[SampleBlock]:
         """Take the next raw block; return the sample blocks that it completes.
 
@@ -45,12 +50,14 @@ class Delivery:
             the device's clock is not to be judged.
         held_s
             For how long the device had had that sample by then.
+        has_stamp
+            Whether this block has one of the device's stamps, if the device stamps at all.
         """
         raw, fault = self._stamps.check(raw)
         blocks = self._grid.put(raw)
         if arrived is None:
             return [self._sample_block(block, fault) for block in blocks]
-        self._note_arrival(raw, fault, arrived)
+        self._note_arrival(raw, has_stamp and fault is None, arrived)
         clock = self._clock.reading(self._stamps.n_faults)
         sampled_s = arrived.steady_s - held_s
         return [
@@ -79,9 +86,9 @@ class Delivery:
         """What is left when nothing will follow, as at the end of a recording."""
         return [calibrate(raw, self._calibration) for raw in self._grid.flush()]
 
-    def _note_arrival(self, raw: RawBlock, fault: StampFault | None, arrived: Arrival) -> None:
+    def _note_arrival(self, raw: RawBlock, is_good: bool, arrived: Arrival) -> None:
         stop_ns = raw.start_ns + ns_from_s(raw.n_samples / raw.rate_hz)
-        own_stamp = self._stamped and fault is None
+        own_stamp = self._stamped and is_good
         self._clock.add(
             raw.epoch,
             raw.stop_index,

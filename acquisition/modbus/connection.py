@@ -14,7 +14,12 @@ from pymodbus.pdu import ModbusPDU
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import ReadOnlyFramer, Reply, RtuFramer, TcpFramer
 from acquisition.modbus.refusals import refusal_error
-from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
+from acquisition.modbus.transport import (
+    ConnectionUse,
+    LinkSettings,
+    SerialTransport,
+    TcpTransport,
+)
 from acquisition.stopping import let_stop_through
 
 _RECEIVE_LIMIT_BYTES = 1 << 20  # the framer judges every byte; pymodbus' own limit drops silently
@@ -40,12 +45,14 @@ class Connection:
 
     After a wrong or a missing reply it is closed, so that a late reply meets nobody. A TCP
     connection is then another one. A serial line stays the same: when it is opened, whatever comes
-    is thrown away until nothing has come for as long as a reply may take.
+    is thrown away until nothing has come for as long as a reply may take. Where each request has a
+    connection of its own, none is open in between.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
         self._settings = settings
         self._where = str(settings.transport)
+        self._is_kept = settings.connection is ConnectionUse.KEPT
         self._refusal: str | None = None
         self._client, self._framer = _client(settings)
         context = self._client.ctx
@@ -70,6 +77,11 @@ class Connection:
         ConfigError
             If there can be no such host.
         """
+        await self._open()
+        if not self._is_kept:
+            self.close()
+
+    async def _open(self) -> None:
         self._framer.forget()
         with foreign_errors_renamed(self._where):
             connected = await self._connect()
@@ -102,18 +114,25 @@ class Connection:
             If the device says that it can never answer.
         """
         try:
+            if not self._is_kept:
+                await self._open()
             with foreign_errors_renamed(self._where):
                 reply = await self._answer(request)
         except (AcquisitionError, asyncio.CancelledError):
             self.close()
             raise
+        if not self._is_kept:
+            self.close()
         if reply.refusal is not None:
             raise refusal_error(self._where, reply.refusal, intent)
         return reply.pdu
 
     async def _answer(self, request: ModbusPDU) -> Reply:
-        if isinstance(self._settings.transport, SerialTransport):
-            await asyncio.sleep(self._settings.transport.frame_gap_s)
+        match self._settings.transport:
+            case SerialTransport(frame_gap_s=frame_gap_s):
+                await asyncio.sleep(frame_gap_s)
+            case TcpTransport(transactions=transactions):
+                self._client.ctx.next_tid = next(transactions) - 1  # it adds one to it
         if not self._client.connected:
             raise LinkError(f"{self._where}: {_CLOSED}")
         if self._framer.unasked:

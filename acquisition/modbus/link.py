@@ -20,7 +20,7 @@ from acquisition.modbus.replies import (
     fifo_registers,
     identification_objects,
 )
-from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
+from acquisition.modbus.transport import ADDRESS_SPACE, ConnectionUse, LinkSettings
 
 _MAX_BITS_PER_READ = 2000
 _REGISTER_REQUESTS = {
@@ -57,8 +57,23 @@ class ModbusLink:
             If it answers nonsense when it is asked who it is.
         """
         await self._connection.open()
+        await self.require_device()
+
+    async def require_device(self) -> None:
+        """See whether the device is right, if the settings say how to know it.
+
+        Raises
+        ------
+        LinkError, FrameError, ConfigError
+            As `open`.
+        """
         if self._settings.identity is not None:
             await require_identity(self, self._settings.identity)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether one connection serves all requests, so that all go to the same device."""
+        return self._settings.connection is ConnectionUse.KEPT
 
     def close(self) -> None:
         """Close the connection; again is harmless."""

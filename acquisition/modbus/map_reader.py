@@ -2,7 +2,7 @@
 
 from acquisition.errors import ConfigError
 from acquisition.modbus.link import ModbusLink
-from acquisition.registers.cells import BIT_FUNCTIONS
+from acquisition.registers.cells import BIT_FUNCTIONS, reads_as
 from acquisition.registers.decoding import CellDecoder, MapDecoder, MapReading
 from acquisition.registers.read_plan import ReadPlan, plan_signature
 
@@ -14,13 +14,16 @@ class MapReader:
         self._link, self._decoder = link, decoder
 
     async def read(self) -> MapReading:
-        """Read everything once.
+        """Read everything once; from the right device, also if connections are not kept.
 
         Raises
         ------
         LinkError, FrameError, ConfigError
             As the link does.
         """
+        if not self._link.is_kept:
+            await self._link.require_device()
+            await self.require_signature()
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
@@ -40,7 +43,7 @@ class MapReader:
         decoder = CellDecoder([s.cell for s in signature], plan)
         found = decoder.numbers(await self._replies(plan))
         for part, number in zip(signature, found.tolist(), strict=True):
-            if number != part.expected:
+            if not reads_as(number, part.cell.type, part.expected):
                 raise ConfigError(
                     f"{self._link.where}: another device than configured: register"
                     f" {part.cell.address} is {number:g}, expected {part.expected:g}"

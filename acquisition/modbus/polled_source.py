@@ -150,11 +150,11 @@ class PolledSource:
                 reading = await reader.read()
             self._freshness.note(reading.alive, self._clock.monotonic_s())
             self._stamps.add(self._ticks.epoch, tick, polled_ns)
-            start_ns = self._stamps.start_ns(tick)
-            if self._stamped and reading.time_ns is not None:
-                start_ns = reading.time_ns
+            time_ns = reading.time_ns if self._stamped else None
+            start_ns = self._stamps.start_ns(tick) if time_ns is None else time_ns
             raw = self._assembly.block(reading, self._ticks.epoch, tick, start_ns)
-            for block in self._delivery.take(raw, Arrival.now(self._clock)):
+            arrived = Arrival.now(self._clock)
+            for block in self._delivery.take(raw, arrived, has_stamp=time_ns is not None):
                 yield block
 
 

@@ -1,6 +1,9 @@
 """Where a Modbus device is: at a TCP address, or on a serial line."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
+from itertools import count
 from typing import Literal, TypeAlias, get_args
 
 from acquisition.errors import ConfigError
@@ -11,6 +14,9 @@ Parity: TypeAlias = Literal["none", "even", "odd"]
 
 MAX_REGISTERS_PER_READ = 125
 ADDRESS_SPACE = 0x10000
+_N_TRANSACTIONS = 65_000
+"""Ids are 1 to this, as pymodbus has them; some devices answer to 0 as to any."""
+
 _MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
 _MAX_SERIAL_DEVICE_ID = 247
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
@@ -34,15 +40,20 @@ class TcpTransport:
     ----------
     addresses
         Of the host, remembered from one connection to the next.
+    transactions
+        Id of each next request. They go on from one connection to the next: a gateway may pass a
+        late reply on to whoever is connected then.
     """
 
     host: str
     port: int = 502
     addresses: KnownAddresses = field(init=False, repr=False, compare=False)
+    transactions: Iterator[int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         _require("port", self.port, 1, 65535)
         object.__setattr__(self, "addresses", KnownAddresses(self.host, self.port))
+        object.__setattr__(self, "transactions", (1 + n % _N_TRANSACTIONS for n in count()))
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"
@@ -95,6 +106,13 @@ class SerialTransport:
 Transport: TypeAlias = TcpTransport | SerialTransport
 
 
+class ConnectionUse(StrEnum):
+    """For how long a TCP connection is kept."""
+
+    KEPT = "kept"
+    PER_REPLY = "per_reply"
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
     """How to reach a Modbus device, and how it wants to be asked.
@@ -110,6 +128,9 @@ class LinkSettings:
         Most registers in one read, 1 to 125.
     identity
         What the device must answer before anything else is read from it.
+    connection
+        "kept" for as long as it works, or a new one for each request: for devices that close it
+        after each reply or when they are not asked for a while, or that have a single one for all.
     """
 
     transport: Transport
@@ -117,9 +138,12 @@ class LinkSettings:
     timeout_s: float = 1.0
     max_registers: int = MAX_REGISTERS_PER_READ
     identity: Identity | None = None
+    connection: ConnectionUse = ConnectionUse.KEPT
 
     def __post_init__(self) -> None:
         serial = isinstance(self.transport, SerialTransport)
+        if serial and self.connection is not ConnectionUse.KEPT:
+            raise ConfigError("modbus: a serial line is kept, there are no connections on it")
         _require("device_id", self.device_id, 1, _MAX_SERIAL_DEVICE_ID if serial else 255)
         _require("max_registers", self.max_registers, 1, MAX_REGISTERS_PER_READ)
         if not 0 < self.timeout_s < float("inf"):

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from acquisition.errors import ConfigError
 
 REGISTER_FUNCTIONS = (3, 4)
@@ -54,6 +56,24 @@ DTYPES = {
 """As numpy reads them once their bytes are in the order ABCD."""
 
 N_BYTES = {type_: int(name[-1]) for type_, name in DTYPES.items()}
+
+
+FLOATS = (NumberType.FLOAT32, NumberType.FLOAT64)
+INTEGERS = (NumberType.INT16, NumberType.UINT16, NumberType.INT32, NumberType.UINT32)
+
+
+def reads_as(found: float, type_: NumberType, number: float) -> bool:
+    """Whether a number that was read is the one that a manual writes.
+
+    Of integers the bits count, so that 0x8000 is -32768; a float of 32 bits is only the nearest one
+    to what is written.
+    """
+    if type_ in INTEGERS:
+        return number % 1 == 0 and (int(found) - int(number)) % (1 << 8 * N_BYTES[type_]) == 0
+    if type_ is NumberType.FLOAT32:
+        with np.errstate(over="ignore"):
+            return found == float(np.float32(number))
+    return found == number
 
 
 class ByteOrder(StrEnum):

@@ -14,12 +14,11 @@ from acquisition.registers.cells import (
     ByteOrder,
     Cell,
     NumberType,
+    reads_as,
 )
 from acquisition.registers.read_plan import ReadPlan, plan_reads
 from acquisition.registers.register_map import FlagCheck, Meaning, RegisterMap
 from core.arrays import FloatArray
-
-_INTEGERS = (NumberType.INT16, NumberType.UINT16, NumberType.INT32, NumberType.UINT32)
 
 
 class ValueState(IntEnum):
@@ -140,7 +139,7 @@ class MapDecoder:
         for n, value in enumerate(self.map.values):
             if value.scale_register is not None:
                 register = numbers[self._index[value.scale_register.cell]]
-                scaled[n] *= register / value.scale_register.divisor
+                scaled[n] *= register / value.scale_register.divisor if register else np.nan
             elif value.full_scale is not None:
                 span = value.full_scale
                 low, high = (self._end(end, numbers) for end in (span.minimum, span.maximum))
@@ -162,7 +161,7 @@ class MapDecoder:
             span = value.full_scale
             if span is not None and not span.raw_minimum < raw[n] < span.raw_maximum:
                 states[n] = max(states[n], ValueState.CLIPPED)
-            if _is_sentinel(raw[n], value.cell.type, value.invalid_values):
+            if any(reads_as(raw[n], value.cell.type, number) for number in value.invalid_values):
                 states[n] = ValueState.INVALID
             for flag in value.flags:
                 word = int(numbers[self._index[flag.cell]])
@@ -185,7 +184,7 @@ def flag_state(flag: FlagCheck, word: int) -> ValueState:
         return ValueState.FLAGGED if masked else ValueState.OK
     if flag.set_means is Meaning.OK:
         return ValueState.OK if masked == flag.mask else ValueState.FLAGGED
-    number = masked // (flag.mask & -flag.mask)
+    number = masked // flag.lowest_bit
     if number in flag.clipped_values:
         return ValueState.CLIPPED
     return ValueState.OK if number in flag.ok_values else ValueState.FLAGGED
@@ -215,10 +214,3 @@ def _byte_positions(
         ],
         dtype=np.intp,
     )
-
-
-def _is_sentinel(raw: float, type_: NumberType, sentinels: Sequence[float]) -> bool:
-    if type_ not in _INTEGERS:
-        return raw in sentinels
-    modulus = 1 << 8 * N_BYTES[type_]
-    return any((int(raw) - int(sentinel)) % modulus == 0 for sentinel in sentinels)

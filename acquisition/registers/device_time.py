@@ -12,6 +12,9 @@ from core.units import ns_from_s
 CALENDAR_FIELDS = ("year", "month", "day", "hour", "minute", "second")
 _CENTURY = 2000
 
+_LATEST_S = 2.0**33
+"""In the year 2242: nanoseconds since 1970 have 63 bits, and what lies beyond is no time."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class EpochTime:
@@ -45,6 +48,8 @@ class EpochTime:
         if not all(map(math.isfinite, numbers)) or numbers[0] <= 0.0:
             return None
         parts = numbers[1] / self.parts_per_s if self.parts is not None else 0.0
+        if not 0.0 < numbers[0] + parts < _LATEST_S or abs(parts) > _LATEST_S:
+            return None
         return ns_from_s(numbers[0]) + ns_from_s(parts)
 
 
@@ -92,6 +97,8 @@ class CalendarTime:
         try:
             moment = datetime(**part, tzinfo=UTC)
         except ValueError:
+            return None
+        if moment.timestamp() > _LATEST_S:
             return None
         return ns_from_s(moment.timestamp()) - ns_from_s(self.utc_offset_s)
 

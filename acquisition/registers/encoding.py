@@ -7,13 +7,12 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from acquisition.registers.cells import BIT_FUNCTIONS, DTYPES, N_BYTES, Cell, NumberType
+from acquisition.registers.cells import BIT_FUNCTIONS, DTYPES, FLOATS, N_BYTES, Cell, NumberType
 from acquisition.registers.decoding import byte_permutation
 from acquisition.registers.device_time import EpochTime
 from acquisition.registers.register_map import FlagCheck, MapValue, Meaning, RegisterMap
 from core.units import NS_PER_S
 
-_FLOATS = (NumberType.FLOAT32, NumberType.FLOAT64)
 _DEFAULT_RANGE = (-1000.0, 1000.0)
 _OF_CENTURY = 100
 
@@ -99,15 +98,22 @@ class RegisterImage:
 
     def put_flag(self, flag: FlagCheck, good: bool) -> None:
         """Say by a status register whether a value is good."""
+        is_bit = flag.cell.type is NumberType.BIT
         if flag.set_means is not None:
-            self.put_bits(flag.cell, flag.mask, good is (flag.set_means is Meaning.OK))
+            is_set = good is (flag.set_means is Meaning.OK)
+            if is_bit:
+                self.put(flag.cell, is_set)
+            else:
+                self.put_bits(flag.cell, flag.mask, is_set)
             return
         taken = {*flag.ok_values, *flag.clipped_values}
         bad_number = next(n for n in range(len(taken) + 1) if n not in taken)
-        lowest = flag.mask & -flag.mask
-        number = (flag.ok_values[0] if good else bad_number) * lowest
+        number = flag.ok_values[0] if good else bad_number
+        if is_bit:
+            self.put(flag.cell, number)
+            return
         self.put_bits(flag.cell, flag.mask, False)
-        self.put_bits(flag.cell, number & flag.mask, True)
+        self.put_bits(flag.cell, number * flag.lowest_bit & flag.mask, True)
 
     def put_time(self, time_ns: int) -> None:
         """Write the time of the measurement, if the map has one."""
@@ -136,7 +142,7 @@ class RegisterImage:
 def encoded(number: float, cell: Cell) -> bytes:
     """Bytes of a number as they stand in the registers of its cell."""
     dtype = np.dtype(DTYPES[cell.type])
-    if cell.type not in _FLOATS:
+    if cell.type not in FLOATS:
         limits = np.iinfo(dtype)
         number = min(max(round(number), int(limits.min)), int(limits.max))
     straight = np.array(number, dtype).tobytes()
@@ -148,7 +154,7 @@ def encoded(number: float, cell: Cell) -> bytes:
 
 def no_value(value: MapValue) -> float:
     """Raw number by which the device says that there is no value; zero if it cannot say so."""
-    if value.cell.type in _FLOATS:
+    if value.cell.type in FLOATS:
         return math.nan
     if value.invalid_values:
         sentinel, modulus = int(value.invalid_values[0]), 1 << 8 * N_BYTES[value.cell.type]

@@ -8,6 +8,9 @@ from enum import StrEnum
 from acquisition.registers.cells import (
     ADDRESS_SPACE,
     BASES,
+    FLOATS,
+    INTEGERS,
+    N_BYTES,
     REGISTER_FUNCTIONS,
     Cell,
     MapError,
@@ -33,7 +36,8 @@ class FlagCheck:
     Parameters
     ----------
     mask
-        Bits that count. Numbers are compared after they were shifted to its lowest bit.
+        Bits that count. Numbers are compared after they were shifted to its lowest bit. Of a cell
+        that is a single bit, that one.
     set_means
         "bad": the value is bad if any of these bits is set. "ok": it is bad unless all are.
     ok_values
@@ -51,8 +55,29 @@ class FlagCheck:
     def __post_init__(self) -> None:
         if not 0 < self.mask <= MAX_MASK:
             raise MapError(f"must be 0x0001 to 0xFFFF, got {self.mask:#06x}", "mask")
+        if self.cell.type in FLOATS:
+            raise MapError('must be "uint16" or other whole numbers: a float has no flags', "type")
+        if self.cell.type is NumberType.BIT:
+            if self.mask not in (1, MAX_MASK):
+                raise MapError("must be left out: this is one bit already", "mask")
+            object.__setattr__(self, "mask", 1)
         if (self.set_means is None) == (not self.ok_values):
             raise MapError("must be given unless ok_values are, and not with them", "set_means")
+        if self.clipped_values and not self.ok_values:
+            raise MapError("can only be given with ok_values", "clipped_values")
+        self._require_possible("ok_values")
+        self._require_possible("clipped_values")
+
+    @property
+    def lowest_bit(self) -> int:
+        """The lowest bit that counts, alone."""
+        return self.mask & -self.mask
+
+    def _require_possible(self, name: str) -> None:
+        highest = self.mask // self.lowest_bit
+        for number in getattr(self, name):
+            if not 0 <= number <= highest:
+                raise MapError(f"must be numbers of the mask, 0 to {highest}, got {number}", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +145,14 @@ class MapValue:
             raise MapError("cannot be had together with full_scale", "scale_register")
         if not self.invalid_below < self.invalid_above:
             raise MapError(f"must be below invalid_above {self.invalid_above:g}", "invalid_below")
+        if self.cell.type in INTEGERS:
+            n_bits = 8 * N_BYTES[self.cell.type]
+            for number in self.invalid_values:
+                if number % 1 or not -(1 << n_bits - 1) <= number < 1 << n_bits:
+                    raise MapError(
+                        f"must each be a whole number of {n_bits} bits, got {number:.12g}",
+                        "invalid_values",
+                    )
 
     def cells(self) -> Iterator[Cell]:
         """All that has to be read for it, its own number first."""

@@ -38,6 +38,11 @@ class MappedDeviceSettings(ModbusLinkSettings):
     """A device in which nothing changes for longer than this counts as not connected: its
     heartbeat, else its time, else everything that is read. At least two poll periods."""
 
+    connection: Literal["kept", "per_reply"] = "kept"
+    """"kept": one connection for as long as it works. "per_reply": a new one for each request, for
+    a device that closes it after each reply or when it is not asked for a while, or that has a
+    single one which others need, too. Not on a serial line."""
+
     _map: RegisterMapSettings = PrivateAttr()
 
     @model_validator(mode="after")
@@ -45,6 +50,8 @@ class MappedDeviceSettings(ModbusLinkSettings):
         self._map = self._found_map((info.context or {}).get(FOLDER, Path()))
         self._require_least("poll_period_s", self._map.min_poll_period_s)
         self._require_least("timeout_s", self._map.min_timeout_s)
+        if self.device is not None and self.connection != "kept":
+            raise MisfitError('must be "kept" on a serial line', "connection")
         if self.stale_after_s < MIN_STALE_POLLS * self.poll_period_s:
             least = MIN_STALE_POLLS * self.poll_period_s
             raise MisfitError(f"must be two poll periods or more, {least:g}", "stale_after_s")

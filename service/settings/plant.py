@@ -17,6 +17,7 @@ from service.settings.http_limits import HostName, HttpLimitSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.recording import RecordingSettings
 from service.settings.retention import RetentionSettings
+from service.settings.source_fit import require_lines_apart
 from service.settings.space import SpaceSettings
 from service.settings.spectra import SpectraSettings
 from service.settings.store import StoreSettings
@@ -231,6 +232,11 @@ class PlantFile(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         refuse_twice(("unit", n, "id", unit.id) for n, unit in enumerate(self.unit))
+        require_lines_apart(
+            (("unit", n, key), getattr(unit, key))
+            for n, unit in enumerate(self.unit)
+            for key in ("source", "slow_source")
+        )
         self.delivery.require_units(tuple(unit.id for unit in self.unit))
         self.recording.require_units(tuple(unit.id for unit in self.unit))
         for unit in self.unit:

@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
+from acquisition.modbus.transport import ConnectionUse, SerialTransport, TcpTransport, Transport
 from service.settings.modbus_link import ModbusLinkSettings
+from service.settings.modbus_sources import MappedDeviceSettings
 from service.wiring.modbus_identity import identity_of
 
 
@@ -21,9 +22,11 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
 
 def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
     """How a device is reached and known, as every source's settings take it."""
+    use = source.connection if isinstance(source, MappedDeviceSettings) else ConnectionUse.KEPT
     return {
         "transport": transport_of(source),
         "device_id": source.device_id,
         "timeout_s": source.timeout_s,
         "identity": identity_of(source.identity),
+        "connection": ConnectionUse(use),
     }

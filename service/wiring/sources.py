@@ -32,7 +32,8 @@ from service.wiring.registers import (
 from service.wiring.simulations import simulated_feed
 
 DEFAULT_RETRY_S = 0.5
-"""Of sources that are not polled."""
+"""Of sources that are not polled, and of queues: those are asked again within milliseconds, and to
+connect as often to a device that is away would leave no turn to others."""
 
 
 def watched_units(
@@ -73,6 +74,8 @@ def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
 
 def poll_period_s(unit: UnitSettings) -> float:
     """How often a unit's source is looked at; a lost link is tried again as often."""
+    if isinstance(unit.source, modbus_sources.ModbusFifoSettings):
+        return DEFAULT_RETRY_S
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
     return period_s
 

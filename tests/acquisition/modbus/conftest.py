@@ -66,13 +66,13 @@ async def server(device) -> AsyncIterator[ModbusRingServer]:
 
 @pytest.fixture
 async def hostile(device) -> AsyncIterator[HostileServer]:
-    async with HostileServer(device.memory) as server:
+    async with HostileServer(device) as server:
         yield server
 
 
 @pytest.fixture
 async def hostile_line(device, tmp_path) -> AsyncIterator[HostileLine]:
-    async with HostileLine(device.memory, tmp_path / "line") as line:
+    async with HostileLine(device, tmp_path / "line") as line:
         yield line
 
 

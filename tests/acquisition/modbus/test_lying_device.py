@@ -1,11 +1,14 @@
 """A device that lies is disconnected; none of its lies becomes a sample."""
 
 import asyncio
+from itertools import islice
 
 import numpy as np
 import pytest
 
-from acquisition.errors import ConfigError, LinkError
+from acquisition.errors import ConfigError, FrameError, LinkError
+from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.transport import LinkSettings, TcpTransport
 
 
 def changed(position: int, delta: int):
@@ -186,3 +189,37 @@ async def test_after_a_missed_reply_the_link_is_closed_so_that_it_meets_nobody(h
     with pytest.raises(LinkError, match="closed"):
         await link.read(0, 16)
     assert len(hostile.requests) == 1
+
+
+async def test_a_late_reply_that_a_gateway_passes_on_to_the_next_connection_is_nobodys(hostile):
+    settings = LinkSettings(
+        transport=TcpTransport(host="127.0.0.1", port=hostile.port), timeout_s=0.1
+    )
+    late = []
+
+    async def keep(request, reply, writer):  # noqa: ARG001
+        late.append(reply)
+
+    async def pass_on(request, reply, writer):  # noqa: ARG001
+        writer.write(late[0])
+
+    for lie, error in ((keep, LinkError), (pass_on, FrameError)):
+        hostile.lie = lie
+        link = ModbusLink(settings)
+        await link.open()
+        with pytest.raises(error):
+            await link.read(len(late), 1)  # the same length, function and unit: only its id tells
+
+
+async def test_transactions_are_numbered_on_from_connection_to_connection_and_never_zero(hostile):
+    transport = TcpTransport(host="127.0.0.1", port=hostile.port)
+    *_, last = islice(transport.transactions, 64_998)
+    for _ in range(2):
+        link = ModbusLink(LinkSettings(transport=transport))
+        await link.open()
+        for _ in range(2):
+            await link.read(0, 1)
+        link.close()
+
+    found = [int.from_bytes(request[:2], "big") for request in hostile.requests]
+    assert (last, found) == (64_998, [64_999, 65_000, 1, 2])

@@ -101,12 +101,37 @@ async def test_a_clock_too_coarse_for_the_polls_does_not_stamp_them(plant) -> No
     assert blocks[-1].clock.offset_s is None
 
 
+async def test_a_device_whose_clock_has_failed_is_not_said_to_be_in_step(plant) -> None:
+    cells = Cell(address=80, type=NumberType.UINT32), Cell(address=82)
+    at_zero = tuple(Signature(cell=cell, expected=0.0) for cell in cells)
+    time = EpochTime(seconds=cells[0], parts=cells[1], parts_per_s=1000.0)
+    async with plant(map_of(signature=at_zero), read_as=map_of(time=time)) as (source, *_, clock):
+        started_ns = clock.now_ns()
+        blocks = await take(source, 3)
+
+    assert blocks[0].start_ns == started_ns
+    assert blocks[-1].clock.offset_s is None
+
+
 async def test_another_device_at_the_same_address_is_refused(plant) -> None:
     registers = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))
     other = map_of(signature=(Signature(cell=Cell(address=1), expected=43.0),))
     async with plant(registers, read_as=other) as (source, *_):
         with pytest.raises(ConfigError, match="register 1 is 42, expected 43"):
             await take(source, 1)
+
+
+@pytest.mark.parametrize(("expected", "is_right"), [(0.1, True), (0.2, False)])
+async def test_a_float_can_be_a_signature(plant, expected: float, is_right: bool) -> None:
+    cell = Cell(address=30, type=NumberType.FLOAT32)
+    registers = map_of(signature=(Signature(cell=cell, expected=0.1),))
+    read_as = map_of(signature=(Signature(cell=cell, expected=expected),))
+    async with plant(registers, read_as=read_as) as (source, *_):
+        if is_right:
+            assert len(await take(source, 1)) == 1
+        else:
+            with pytest.raises(ConfigError, match=r"register 30 is 0\.1, expected 0\.2"):
+                await take(source, 1)
 
 
 @pytest.mark.parametrize(

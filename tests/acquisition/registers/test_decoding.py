@@ -12,10 +12,8 @@ from acquisition.registers.cells import ByteOrder, Cell, NumberType
 from acquisition.registers.decoding import MapDecoder, ValueState
 from acquisition.registers.device_time import CalendarTime, EpochTime
 from acquisition.registers.register_map import (
-    FlagCheck,
     FullScale,
     MapValue,
-    Meaning,
     RegisterMap,
     ScaleRegister,
     Together,
@@ -109,6 +107,13 @@ def test_an_skf_value_is_its_mantissa_times_its_scale_register() -> None:
     assert state is ValueState.OK
 
 
+def test_a_scale_register_of_zero_gives_no_value_instead_of_zero() -> None:
+    scale = ScaleRegister(cell=Cell(address=610, type=NumberType.INT16))
+    value = MapValue(id="v", cell=Cell(address=609, type=NumberType.INT16), scale_register=scale)
+
+    assert one(value, words(12345, 0))[1] is ValueState.INVALID
+
+
 @pytest.mark.parametrize(
     ("raw", "expected", "state"),
     [
@@ -143,43 +148,6 @@ def test_a_vm600_rack_that_gives_no_range_gives_no_value() -> None:
 
 
 @pytest.mark.parametrize(
-    ("flag", "word", "state"),
-    [
-        ({"mask": 0x0020, "set_means": Meaning.BAD}, 0x0020, ValueState.FLAGGED),
-        ({"mask": 0x0060, "set_means": Meaning.BAD}, 0x0040, ValueState.FLAGGED),
-        ({"mask": 0x0020, "set_means": Meaning.BAD}, 0xFFDF, ValueState.OK),
-        ({"mask": 0x0021, "set_means": Meaning.OK}, 0x0021, ValueState.OK),
-        ({"mask": 0x0021, "set_means": Meaning.OK}, 0x0001, ValueState.FLAGGED),
-        ({"ok_values": (1,), "clipped_values": (2,)}, 1, ValueState.OK),
-        ({"ok_values": (1,), "clipped_values": (2,)}, 2, ValueState.CLIPPED),
-        ({"ok_values": (1,), "clipped_values": (2,)}, 0, ValueState.FLAGGED),
-        ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x02FF, ValueState.OK),
-        ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x0300, ValueState.FLAGGED),
-    ],
-)
-def test_a_status_register_is_read_with_the_polarity_of_its_maker(flag, word, state) -> None:
-    check = FlagCheck(cell=Cell(address=1), **flag)
-    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
-
-    assert one(value, words(5, word)) == (5.0, state)
-
-
-def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
-    """VM600: bit 5 set means the sensor is OK, bits 6 to 11 set mean an error."""
-    status = Cell(address=1)
-    checks = (
-        FlagCheck(cell=status, mask=0x0021, set_means=Meaning.OK),
-        FlagCheck(cell=status, mask=0x0FC0, set_means=Meaning.BAD),
-    )
-    value = MapValue(id="v", cell=Cell(address=0), flags=checks)
-
-    states = [one(value, words(5, word))[1] for word in (0x0021, 0x0001, 0x0121, 0x003F)]
-
-    flagged = ValueState.FLAGGED
-    assert states == [ValueState.OK, flagged, flagged, ValueState.OK]
-
-
-@pytest.mark.parametrize(
     ("type_", "settings", "raw", "is_valid"),
     [
         ("int16", {"invalid_values": (0x8000,)}, -32768, False),
@@ -193,6 +161,9 @@ def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
         ("float32", {}, math.nan, False),
         ("float32", {}, -math.inf, False),
         ("float32", {"invalid_values": (-9999.0,)}, -9999.0, False),
+        ("float32", {"invalid_values": (-9999.9,)}, -9999.9, False),
+        ("float32", {"invalid_values": (1e300,)}, -9999.9, True),
+        ("float64", {"invalid_values": (-9999.9,)}, -9999.9, False),
         ("int16", {"scale": 100.0, "invalid_values": (100,)}, 1, True),
     ],
 )
@@ -250,11 +221,20 @@ def test_the_device_says_when_it_measured() -> None:
     assert times == [1_767_227_415_000_000_000, 0x67891234 * 10**9 + 250_000_000]
 
 
+FLOAT = Cell(address=1, type=NumberType.FLOAT64)
+PARTS = Cell(address=5, type=NumberType.FLOAT32)
+
+
 def test_a_device_whose_clock_makes_no_sense_has_none() -> None:
     value = MapValue(id="v", cell=Cell(address=0))
     for time, content in (
         (CalendarTime(first=Cell(address=1)), words(0, 25, 13, 1, 0, 0, 0)),
+        (CalendarTime(first=Cell(address=1)), words(0, 9999, 12, 31, 23, 59, 59)),
         (EpochTime(seconds=Cell(address=1, type=NumberType.UINT32)), words(0, 0, 0)),
+        (EpochTime(seconds=FLOAT), words(0) + struct.pack(">d", 1e300)),
+        (EpochTime(seconds=FLOAT), words(0) + struct.pack(">d", 2.0**34)),
+        (EpochTime(seconds=FLOAT, parts=PARTS), words(0) + struct.pack(">df", 1.8e9, 1e38)),
+        (EpochTime(seconds=FLOAT, parts=PARTS), words(0) + struct.pack(">df", 1e300, -1e38)),
     ):
         decoder = MapDecoder(RegisterMap(values=(value,), time=time))
         assert decoder.read(content).time_ns is None

@@ -123,6 +123,24 @@ def test_a_flag_says_what_it_is_told_to_say(flag, order, good: bool) -> None:
     assert state is (ValueState.OK if good else ValueState.FLAGGED)
 
 
+@pytest.mark.parametrize(
+    "flag", [{"set_means": Meaning.OK}, {"set_means": Meaning.BAD}, {"ok_values": (0,)}]
+)
+@pytest.mark.parametrize("cell", [{"bit": 3}, {"function": 2}])
+@pytest.mark.parametrize("good", [True, False])
+def test_a_flag_of_one_bit_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:
+    check = FlagCheck(cell=Cell(address=1, type=NumberType.BIT, **cell), **flag)
+    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
+    registers = RegisterMap(values=(value,))
+    decoder, image = MapDecoder(registers), RegisterImage(registers)
+    image.put_flag(check, not good)
+    image.put_flag(check, good)
+
+    state = decoder.read(content_of(decoder, image)).states[0]
+
+    assert state is (ValueState.OK if good else ValueState.FLAGGED)
+
+
 def test_two_flags_of_one_register_do_not_disturb_each_other() -> None:
     status = Cell(address=9)
     checks = [FlagCheck(cell=status, mask=1 << n, set_means=Meaning.BAD) for n in range(3)]

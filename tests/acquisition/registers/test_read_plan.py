@@ -23,6 +23,17 @@ def value(address: int, type_: str = "uint16", **settings) -> MapValue:
     return MapValue(id=f"v{address}", cell=cell, **settings)
 
 
+def flag(mask: int = 0xFFFF, set_means=Meaning.BAD, ok_values=(), clipped_values=(), **cell):
+    cell = Cell(address=0, **cell)
+    return FlagCheck(
+        cell=cell,
+        mask=mask,
+        set_means=set_means,
+        ok_values=ok_values,
+        clipped_values=clipped_values,
+    )
+
+
 def requests(values, **settings) -> list[tuple[int, int, int]]:
     plan = plan_reads(RegisterMap(values=tuple(values), **settings))
     return [(r.function, r.start, r.count) for r in plan.requests]
@@ -150,11 +161,19 @@ def test_the_same_address_of_another_function_is_another_register() -> None:
         (lambda: Cell(address=0, type=NumberType.BIT, bit=16), "0 to 15, got 16"),
         (lambda: FlagCheck(cell=Cell(address=0), mask=0, set_means=Meaning.BAD), "0x0001"),
         (lambda: FlagCheck(cell=Cell(address=0)), "must be given"),
+        (lambda: flag(type=NumberType.FLOAT32), "whole numbers"),
+        (lambda: flag(type=NumberType.BIT, function=2, mask=2), "one bit"),
+        (lambda: flag(clipped_values=(1,)), "with ok_values"),
+        (lambda: flag(set_means=None, ok_values=(0, 16), mask=0x00F0), "0 to 15, got 16"),
+        (lambda: flag(set_means=None, ok_values=(0,), clipped_values=(-1,)), "got -1"),
         (lambda: ScaleRegister(cell=Cell(address=0), divisor=0.0), "must not be 0"),
         (lambda: FullScale(minimum=1.0, maximum=1.0), "must differ"),
         (lambda: FullScale(minimum=0.0, maximum=1.0, raw_minimum=9, raw_maximum=9), "below raw"),
         (lambda: value(0, scale=0.0), "must not be 0"),
         (lambda: value(0, invalid_below=5.0, invalid_above=5.0), "below invalid_above"),
+        (lambda: value(0, invalid_values=(0.5,)), "whole number of 16 bits, got 0.5"),
+        (lambda: value(0, invalid_values=(0x18000,)), "whole number of 16 bits, got 98304"),
+        (lambda: value(0, "int32", invalid_values=(-(2**31) - 1,)), "whole number of 32 bits"),
         (lambda: Together(address=0, count=126), "125"),
         (lambda: Together(address=0, count=2, function=2), "3 or 4"),
         (lambda: RegisterMap(values=(value(0),), base=2), "must be 0, 1"),

@@ -8,34 +8,29 @@ from pathlib import Path
 
 from pymodbus.framer import FramerRTU
 
-from acquisition.daq.register_memory import RegisterMemory
+from acquisition.daq.answers import ReadableDevice, answer
 
-_TCP_READ_BYTES = 12
+_MBAP_HEAD_BYTES = 6
 _RTU_READ_BYTES = 8
+_RTU_FIFO_READ_BYTES = 6
 
 
 class Liar:
-    """Answers reads of registers from a memory; after `n_honest` more replies the lie takes over.
+    """Answers as a device does; after `n_honest` more replies the lie takes over.
 
     A lie gets request, right reply and a writer, and sends what it likes. It is told until it is
     taken away.
     """
 
-    def __init__(self, memory: RegisterMemory) -> None:
+    def __init__(self, device: ReadableDevice) -> None:
         self.lie: Callable | None = None
         self.n_honest = 0
         self.requests: list[bytes] = []
-        self._memory = memory
+        self._device = device
 
-    async def respond(self, request: bytes, pdu_at: int, frame: Callable, writer) -> None:
+    async def respond(self, request: bytes, pdu: bytes, frame: Callable, writer) -> None:
         self.requests.append(request)
-        function, address, count = (
-            request[pdu_at],
-            int.from_bytes(request[pdu_at + 1 : pdu_at + 3], "big"),
-            int.from_bytes(request[pdu_at + 3 : pdu_at + 5], "big"),
-        )
-        data = self._memory.read(address, count)
-        reply = frame(request, bytes([function, len(data)]) + data)
+        reply = frame(request, answer(pdu, self._device))
         self.n_honest -= 1
         if self.lie is None or self.n_honest >= 0:
             writer.write(reply)
@@ -49,9 +44,17 @@ class HostileServer(Liar):
 
     port = 0
 
-    def __init__(self, memory: RegisterMemory) -> None:
-        super().__init__(memory)
+    def __init__(self, device: ReadableDevice) -> None:
+        super().__init__(device)
         self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def n_connected(self) -> int:
+        return len(self._tasks)
+
+    @property
+    def endpoint(self) -> dict[str, str | int]:
+        return {"host": "127.0.0.1", "port": self.port}
 
     async def __aenter__(self) -> "HostileServer":
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
@@ -70,8 +73,9 @@ class HostileServer(Liar):
         self._tasks.add(task)
         try:
             while True:
-                request = await reader.readexactly(_TCP_READ_BYTES)
-                await self.respond(request, 7, tcp_frame, writer)
+                head = await reader.readexactly(_MBAP_HEAD_BYTES)
+                request = head + await reader.readexactly(int.from_bytes(head[4:], "big"))
+                await self.respond(request, request[7:], tcp_frame, writer)
         except (asyncio.IncompleteReadError, ConnectionError, asyncio.CancelledError):
             pass
         finally:
@@ -82,12 +86,16 @@ class HostileServer(Liar):
 class HostileLine(Liar):
     """A Modbus RTU device on a pseudo-terminal, always found at the same path."""
 
-    def __init__(self, memory: RegisterMemory, path: Path) -> None:
-        super().__init__(memory)
+    def __init__(self, device: ReadableDevice, path: Path) -> None:
+        super().__init__(device)
         self.path = path
         self._requests: asyncio.Queue[bytes] = asyncio.Queue()
         self._received = b""
         self._received_at_s = 0.0
+
+    @property
+    def endpoint(self) -> dict[str, str | int]:
+        return {"device": str(self.path), "parity": "none"}
 
     async def __aenter__(self) -> "HostileLine":
         self._open()
@@ -113,7 +121,8 @@ class HostileLine(Liar):
 
     async def _answer(self) -> None:
         while True:
-            await self.respond(await self._requests.get(), 1, rtu_frame, self)
+            request = await self._requests.get()
+            await self.respond(request, request[1:-2], rtu_frame, self)
 
     def _open(self) -> None:
         self._ours, self._theirs = os.openpty()
@@ -133,7 +142,8 @@ class HostileLine(Liar):
             self._received = b""  # what was left of a request that never became whole
         self._received_at_s = now_s
         self._received += os.read(self._ours, 4096)
-        if len(self._received) == _RTU_READ_BYTES:
+        is_fifo = self._received[1:2] == b"\x18"
+        if len(self._received) == (_RTU_FIFO_READ_BYTES if is_fifo else _RTU_READ_BYTES):
             self._requests.put_nowait(self._received)
             self._received = b""
 

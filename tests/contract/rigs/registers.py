@@ -54,7 +54,7 @@ def registers(rows) -> RegisterMap:
     )
 
 
-class _Rig:
+class Rig:
     """A device on a real link; pulling the plug takes the link away."""
 
     absence: str
@@ -85,12 +85,12 @@ class _Rig:
         return TcpTransport(**self._server.endpoint)
 
 
-class _OnTcp(_Rig):
+class OnTcp(Rig):
     absence = r"127\.0\.0\.1:\d+: Connection refused"
     timeout_s = 5.0
 
 
-class _OnRtu(_Rig):
+class OnRtu(Rig):
     absence = r"/line: No such file or directory"
     timeout_s = 0.6
 
@@ -113,7 +113,7 @@ class _ClockedDevice(MapDevice):
         return super().read_registers(function, address, count)
 
 
-class _PolledRig(_Rig):
+class _PolledRig(Rig):
     """Time passes by the source's own waiting; while nobody is connected, by the rig."""
 
     keeps = False
@@ -170,15 +170,15 @@ class _CountedConnection:
         return await self._connection.__aexit__(*error)
 
 
-class PolledTcpRig(_OnTcp, _PolledRig):
+class PolledTcpRig(OnTcp, _PolledRig):
     """Polled registers over Modbus TCP."""
 
 
-class PolledRtuRig(_OnRtu, _PolledRig):
+class PolledRtuRig(OnRtu, _PolledRig):
     """Polled registers over Modbus RTU."""
 
 
-class VectorTcpRig(_OnTcp, _PolledRig):
+class VectorTcpRig(OnTcp, _PolledRig):
     """A vector rack over Modbus TCP."""
 
     rows = tuple(row.id for row in VECTORS)
@@ -187,11 +187,11 @@ class VectorTcpRig(_OnTcp, _PolledRig):
         return vector_calibration(self._calibration, ("c0", "c1"), VECTORS)
 
 
-class VectorRtuRig(_OnRtu, VectorTcpRig):
+class VectorRtuRig(OnRtu, VectorTcpRig):
     """A vector rack over Modbus RTU."""
 
 
-class _FifoRig(_Rig):
+class _FifoRig(Rig):
     """Queues, with slow values in the registers of another device."""
 
     layout = FifoLayout(addresses=(1000,), n_channels=2)
@@ -238,15 +238,15 @@ class _Slow:
         return RawBlock(0, first, 0, 600.0, counts, (), self._slow)
 
 
-class FifoTcpRig(_OnTcp, _FifoRig):
+class FifoTcpRig(OnTcp, _FifoRig):
     """A queue of all channels over Modbus TCP."""
 
 
-class FifoRtuRig(_OnRtu, _FifoRig):
+class FifoRtuRig(OnRtu, _FifoRig):
     """A queue of all channels over Modbus RTU."""
 
 
-class ChannelFifoTcpRig(_OnTcp, _FifoRig):
+class ChannelFifoTcpRig(OnTcp, _FifoRig):
     """A queue for each channel, over Modbus TCP."""
 
     layout = FifoLayout(addresses=(1000, 1100), n_channels=2, kind=FifoKind.PER_CHANNEL)

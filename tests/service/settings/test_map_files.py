@@ -87,6 +87,14 @@ def changed(old: str, new: str) -> str:
             "map.toml:12: value[2].flag[1].mask = 0: Input should be greater",
         ),
         (MINIMAL + "[[value.flag]]\naddress = 30\n", "value[2].flag[1].set_means: must be given"),
+        (
+            MINIMAL + "[[value.flag]]\naddress = 30\ntype = 'float32'\nset_means = 'bad'\n",
+            "map.toml:12: value[2].flag[1].type: must be",
+        ),
+        (
+            changed("address = 20", "address = 20\ninvalid_values = [0.5]"),
+            "value[2].invalid_values: must each be a whole number of 16 bits, got 0.5",
+        ),
         (MINIMAL + "[[together]]\naddress = 11\ncount = 5\n", "together: the block from 11 cuts"),
         (MINIMAL + "[[together]]\naddress = 40\ncount = 126\n", "together[1].count = 126"),
         (

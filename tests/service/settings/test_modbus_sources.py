@@ -103,6 +103,14 @@ def test_a_rack_that_can_never_work_is_refused(settings: dict[str, Any], said: s
     assert said in misfit(ModbusVectorSettings, **given)
 
 
+def test_a_serial_line_cannot_be_connected_for_each_reply() -> None:
+    with pytest.raises(ValidationError, match='must be "kept" on a serial line'):
+        ModbusPolledSettings.model_validate(
+            {"kind": "modbus_polled", "device": "/dev/ttyUSB0", "map": WAVES}
+            | {"poll_period_s": 0.05, "connection": "per_reply"}
+        )
+
+
 def test_a_map_with_many_mistakes_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "map.toml").write_text("bass = 1\nbast = 2\n")
     with pytest.raises(ValidationError) as refusal:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.delivery import Delivery
+from acquisition.modbus.transport import ConnectionUse
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Unit
@@ -22,15 +23,18 @@ from service.settings.modbus_sources import (
     ModbusVectorSettings,
 )
 from service.settings.units import UnitSettings
+from service.wiring.probes import link_settings_of
 from service.wiring.register_daqs import fifo_device, modbus_server, polled_device, vector_device
 from service.wiring.registers import (
     at_poll_rate,
     fifo_source,
+    polled_settings,
     polled_source,
     vector_monitor,
     vector_source,
 )
 from service.wiring.simulations import simulated_feed
+from service.wiring.sources import DEFAULT_RETRY_S, poll_period_s
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 N_SEGMENTS = 6
@@ -142,3 +146,22 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
     assert block.n_samples == settings.block_samples
     probe = block.samples[[c.id for c in unit.channels].index("ujb_shaft_x")]
     assert 1000.0 < probe.mean() < 3000.0
+
+
+def test_a_queue_that_is_away_is_not_called_each_time_that_it_would_be_read(settings) -> None:
+    queue = ModbusFifoSettings(kind="modbus_fifo", host="192.0.2.1", addresses=(7,))
+    assert queue.poll_period_s < 0.01
+
+    assert poll_period_s(settings.model_copy(update={"source": queue})) == DEFAULT_RETRY_S
+    assert poll_period_s(settings) == settings.source.poll_period_s
+
+
+@pytest.mark.parametrize("use", ConnectionUse)
+def test_how_long_a_connection_is_kept_reaches_the_adapter(use: ConnectionUse) -> None:
+    given = {"kind": "modbus_polled", "host": "192.0.2.1", "poll_period_s": 60.0}
+    given |= {"stale_after_s": 600.0, "map": {"value": [{"channel": "a", "address": 1}]}}
+
+    device = ModbusPolledSettings.model_validate(given | {"connection": use.value})
+
+    assert polled_settings(device).connection is use
+    assert link_settings_of(device).connection is use
