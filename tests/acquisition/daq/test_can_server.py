@@ -90,8 +90,15 @@ async def test_a_bus_without_text_has_no_faults_of_text_and_cannot_be_cut(device
     async with CanBusServer(device) as server:
         with pytest.raises(LookupError, match="long_line"):
             server.inject("long_line")
-        with pytest.raises(LinkError, match="no connection that could be cut"):
+        with pytest.raises(LookupError, match=r"no fault 'cut'; there are bus_off, drop"):
             server.inject("cut")
+
+
+async def test_a_port_in_use_is_an_error_that_names_it(device):
+    async with SlcanTcpServer(device) as first:
+        where = first.endpoint["channel"].removeprefix("socket://")
+        with pytest.raises(LinkError, match=f"cannot listen on {where}"):
+            await SlcanTcpServer(device, port=int(where.rpartition(":")[2])).__aenter__()
 
 
 async def test_a_served_recording_ends_when_all_of_it_is_taken(counting_feed):
