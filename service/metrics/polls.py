@@ -55,7 +55,7 @@ class PollClock:
         self._pulse, self._reader = pulse, asyncio.current_task()
 
     def _beat(self, after_s: float = 0.0) -> None:
-        # what asks another device beside, or listens to a bus in a thread, says nothing of the reader
+        # what asks another device beside, or hears a bus in a thread, says nothing of the reader
         if self._reader is not None and _current_task() is self._reader:
             self._pulse.beat(after_s)
 
