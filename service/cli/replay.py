@@ -57,6 +57,7 @@ def replay(
         units = recordings_by_unit(recordings, file)
         folder = out or replay_folder(file, units.values(), SystemClock().now_ns())
         played = replayed_plant(file, units, folder)
+        _require_new(database_path(played))
         with _performance(played, plant, units, through, speed, serve) as performance:
             _run(performance, port)
     except (PortInUseError, StoreError, AcquisitionError, LookupError) as error:
@@ -97,6 +98,18 @@ def _performance(
             raise LinkError(
                 "the simulated DAQ has ended before its recordings did: results are incomplete"
             )
+
+
+def _require_new(database: Path) -> None:
+    """Refuse a folder with results: alarms would go on where those had ended.
+
+    Raises
+    ------
+    LookupError
+        Naming it.
+    """
+    if database.exists():
+        raise LookupError(f"{database} holds results already; a replay needs a folder of its own")
 
 
 def _run(performance: Performance, port: int) -> None:
