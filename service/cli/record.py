@@ -51,6 +51,10 @@ def record(
     if isinstance(settings.source, ModbusVectorSettings):
         fail(f"padwatch record: the rack of unit {settings.id} gives vectors, not samples", code=2)
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fail(f"padwatch record: {out.parent}: {error.strerror}")
+    try:
         writer = recording_writer(settings, out, made_by())
         clock = SystemClock()
         patience = Patience(seconds, clock) if reconnect else None

@@ -85,9 +85,9 @@ async def test_one_service_reads_every_kind_of_daq(
     await program.end()
 
     polls = await start(
-        *("record", str(watched), "--unit", "POLLED", "--seconds", "1", "--out", "polls")
+        *("record", str(watched), "--unit", "POLLED", "--seconds", "1", "--out", "runs/polls")
     )
     async with asyncio.timeout(60):
         assert await polls.process.wait() == 0
-    manifest = json.loads((tmp_path / "polls" / "manifest.json").read_text())
+    manifest = json.loads((tmp_path / "runs" / "polls" / "manifest.json").read_text())
     assert manifest["rate_hz"] == 25.0

@@ -154,8 +154,14 @@ async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
 
 
 def test_a_feed_with_other_channels_is_refused(counting_feed):
-    with pytest.raises(ConfigError, match=r"\(3, 2, False\) in the feed, \(2, 2, False\)"):
+    with pytest.raises(ConfigError, match=r"\(3, 2\) in the feed, \(2, 2\)"):
         CanDevice(counting_feed(n_channels=3), SHAPE)
+
+
+def test_counts_in_a_profile_of_engineering_units_are_refused_with_the_right_one(counting_feed):
+    shape = CanShape(channels=SHAPE.channels, slow=SHAPE.slow, floats=True)
+    with pytest.raises(ConfigError, match=r'need the profile "padwatch_int16", not "padwatch_f'):
+        CanDevice(counting_feed(), shape)
 
 
 async def test_a_link_to_a_terminal_stays_when_its_number_changes(tmp_path, device):
