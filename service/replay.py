@@ -43,10 +43,14 @@ class PlayedOut:
     ----------
     over
         Set when the DAQ has said that the recording is over.
+    gone
+        Set when there is no DAQ any more, which ends the stream, too; without it, it is waited for.
     """
 
-    def __init__(self, source: SampleSource, over: threading.Event) -> None:
-        self._source, self._over = source, over
+    def __init__(
+        self, source: SampleSource, over: threading.Event, gone: threading.Event | None = None
+    ) -> None:
+        self._source, self._over, self._gone = source, over, gone
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
@@ -61,7 +65,7 @@ class PlayedOut:
             try:
                 blocks = await stack.enter_async_context(self._source.connect())
             except LinkError:
-                if not self._over.is_set():
+                if not self._is_over:
                     raise
                 blocks = _nothing()
             yield await stack.enter_async_context(aclosing(self._until_over(blocks)))
@@ -73,8 +77,12 @@ class PlayedOut:
             async for block in blocks:
                 yield block
         except LinkError:
-            if not self._over.is_set():
+            if not self._is_over:
                 raise
+
+    @property
+    def _is_over(self) -> bool:
+        return self._over.is_set() or (self._gone is not None and self._gone.is_set())
 
 
 async def _nothing() -> AsyncIterator[SampleBlock]:

@@ -24,7 +24,11 @@ class Wire(StrEnum):
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
     """The plant with all units behind DAQs on this wire, where no DAQ has said yet where it is."""
-    units = tuple(unit.model_copy(update={"source": _source(wire)}) for unit in plant.unit)
+    units = tuple(
+        # where a sample is a poll, the rate of the recording is that of the polls
+        unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
+        for unit in plant.unit
+    )
     return plant.model_copy(update={"unit": units})
 
 

@@ -16,7 +16,6 @@ from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_faults import Item
 from acquisition.daq.can_frames import FrameKind, WireFrame
 from acquisition.daq.can_server import CanDaqServer
-from acquisition.errors import LinkError
 
 _BUS_OFF_ID = 0x40
 _ERROR_ID = 0x88
@@ -30,6 +29,8 @@ class CanBusServer(CanDaqServer):
     interface, channel, options
         As python-can names them.
     """
+
+    has_cable = False
 
     def __init__(
         self,
@@ -66,10 +67,6 @@ class CanBusServer(CanDaqServer):
         if self._bus is not None:
             self._bus.shutdown()
             self._bus = None
-
-    def cut(self) -> None:
-        """Nothing here can be cut."""
-        raise LinkError(f"{self._interface} has no connection that could be cut")
 
     async def _send(self, items: Sequence[Item]) -> None:
         for item in items:

@@ -127,11 +127,18 @@ class CanDevice:
 
 
 def _require_fit(first: RawBlock, shape: CanShape) -> None:
-    floats = first.counts.dtype.kind == "f"
-    found = (len(first.counts), len(first.slow), floats)
-    expected = (len(shape.channels), len(shape.slow), shape.floats)
+    found = (len(first.counts), len(first.slow))
+    expected = (len(shape.channels), len(shape.slow))
     if found != expected:
         raise ConfigError(
-            "simulated CAN DAQ: channels, slow channels and whether samples are floats are"
-            f" {found} in the feed, {expected} in its messages"
+            f"simulated CAN DAQ: channels and slow channels are {found} in the feed, {expected} in"
+            " its messages"
+        )
+    floats = first.counts.dtype.kind == "f"
+    if floats != shape.floats:
+        kinds = {False: "a converter's counts", True: "engineering units"}
+        names = {False: "padwatch_int16", True: "padwatch_float32"}
+        raise ConfigError(
+            f"simulated CAN DAQ: the samples are {kinds[floats]}, which need the profile"
+            f' "{names[floats]}", not "{names[shape.floats]}"'
         )

@@ -27,7 +27,14 @@ class CanDaqServer:
         lost; else the oldest blocks are.
     as_line
         How frames are written as text, if they are.
+
+    Attributes
+    ----------
+    has_cable
+        Whether there is a connection that can be cut.
     """
+
+    has_cable = True
 
     def __init__(
         self,
@@ -103,7 +110,7 @@ class CanDaqServer:
         ``drop``, ``repeat``, ``reorder``, ``wrong_dlc``, ``error_frame``, ``flood``, ``rtr``,
         ``extended_twin``, ``bus_off`` and, on slcan, ``non_hex_line``, ``long_line`` and
         ``truncated_line`` meet the next waveform frames; ``freeze`` the next blocks;
-        ``reset_epoch`` restarts the device, ``cut`` cuts the connection.
+        ``reset_epoch`` restarts the device, ``cut`` cuts the connection, where there is one.
 
         Raises
         ------
@@ -116,10 +123,10 @@ class CanDaqServer:
             self.device.frozen += count
         elif fault == "reset_epoch":
             self.device.restart()
-        elif fault == "cut":
+        elif fault == "cut" and self.has_cable:
             self.cut()
         else:
-            known = [*self._faults.known, "freeze", "reset_epoch", "cut"]
+            known = [*self._faults.known, "freeze", "reset_epoch", *["cut"] * self.has_cable]
             raise LookupError(f"no fault {fault!r}; there are {', '.join(sorted(known))}")
 
     async def _serve(self) -> None:

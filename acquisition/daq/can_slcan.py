@@ -13,10 +13,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from acquisition.clock import Clock
+from acquisition.daq import line_link
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_faults import Item
 from acquisition.daq.can_frames import FD_LENGTHS, FrameKind, WireFrame
 from acquisition.daq.can_server import CanDaqServer
+from acquisition.errors import LinkError
 
 _MAX_COMMAND = 64
 _OK, _ERROR = b"\r", b"\a"
@@ -126,7 +128,11 @@ class SlcanTcpServer(_SlcanServer):
         return {"interface": "slcan", "channel": f"socket://{self._host}:{self._port}"}
 
     async def _plug_in(self) -> None:
-        self._server = await asyncio.start_server(self._accept, self._host, self._port)
+        where = f"{self._host}:{self._port}"
+        try:
+            self._server = await asyncio.start_server(self._accept, self._host, self._port)
+        except OSError as exc:
+            raise LinkError(f"cannot listen on {where}: {exc.strerror}") from exc
         self._port = self._server.sockets[0].getsockname()[1]
 
     async def _pull_out(self) -> None:
@@ -198,13 +204,15 @@ class SlcanPtyServer(_SlcanServer):
         self._attach()
 
     def _attach(self) -> None:
-        self._master, self._slave = os.openpty()
+        try:
+            self._master, self._slave = os.openpty()
+        except OSError as exc:
+            raise LinkError(f"cannot make a pseudo-terminal: {exc.strerror}") from exc
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self._path = os.ttyname(self._slave)
         if self._link is not None:
-            self._link.unlink(missing_ok=True)
-            self._link.symlink_to(self._path)
+            line_link.point(self._link, self._path)
         asyncio.get_running_loop().add_reader(self._master, self._read)
 
     async def _pull_out(self) -> None:
@@ -220,7 +228,7 @@ class SlcanPtyServer(_SlcanServer):
         self._master = -1
         self._writable.set()
         if self._link is not None:
-            self._link.unlink(missing_ok=True)
+            line_link.remove(self._link)
 
     def cut(self) -> None:
         """Unplug the adapter and plug it in again."""

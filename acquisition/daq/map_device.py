@@ -77,7 +77,7 @@ class MapDevice:
     @property
     def step_s(self) -> float:
         """Time from one change of the registers to the next."""
-        return self._step_samples / self._calibration.rate_hz
+        return self._step_samples / self.newest.rate_hz
 
     @property
     def drained(self) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 from pymodbus.framer import FramerRTU
 
 from acquisition.clock import Clock
+from acquisition.daq import line_link
 from acquisition.daq.modbus_server import ModbusDevice, ModbusServer
 from acquisition.daq.reply_faults import HangUpError
 from acquisition.errors import LinkError
@@ -33,7 +34,7 @@ class ModbusRtuServer(ModbusServer):
 
     Raises
     ------
-    LinkError
+    LinkError, ConfigError
         On entering, if there is no pseudo-terminal to be had or the link cannot be made.
     """
 
@@ -76,11 +77,10 @@ class ModbusRtuServer(ModbusServer):
             ours, theirs = os.openpty()
             self._line = ours, theirs
             self._name = os.ttyname(theirs)
-            if self._link is not None:
-                self._link.unlink(missing_ok=True)
-                self._link.symlink_to(self._name)
         except OSError as exc:
             raise LinkError(f"cannot make a serial line {self._link or ''}: {exc}") from exc
+        if self._link is not None:
+            line_link.point(self._link, self._name)
         tty.setraw(theirs)
         os.set_blocking(ours, False)
         asyncio.get_running_loop().add_reader(ours, self._take)
@@ -94,7 +94,7 @@ class ModbusRtuServer(ModbusServer):
         self._line = None
         self._received = b""
         if self._link is not None:
-            self._link.unlink(missing_ok=True)
+            line_link.remove(self._link)
 
     def _take(self) -> None:
         if self._line is None:

@@ -6,7 +6,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import IO
 
 from service.cli.plant_file import fail
@@ -27,10 +27,18 @@ class RunningDaq:
         Where each unit is found: keys and values of its source's settings.
     over
         For each unit, set when its recording has been played to the end.
+    gone
+        Set when the process has ended.
     """
 
     endpoints: Endpoints
     over: dict[str, threading.Event]
+    gone: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether it has ended before its recordings have."""
+        return self.gone.is_set() and not all(over.is_set() for over in self.over.values())
 
     def attached(self, plant: PlantFile) -> PlantFile:
         """The plant with its sources pointed to this DAQ."""
@@ -44,28 +52,35 @@ class RunningDaq:
 @contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
     """Run ``padwatch daq`` with arguments; it ends with this process, however that ends."""
-    process = subprocess.Popen(  # noqa: S603  our own program
+    with subprocess.Popen(  # noqa: S603  our own program
         [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,  # Ctrl-C is for this process, which stops the DAQ last
-    )
-    try:
-        line = process.stdout.readline() if process.stdout else b""
-        if not line or process.stdout is None:
-            fail("padwatch: the simulated DAQ did not start; its own message stands above")
-        endpoints: Endpoints = json.loads(line)
-        daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
-        news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)
-        news.start()
-        yield daq
-    finally:
-        process.terminate()
+    ) as process:
+        news = None
         try:
-            process.wait(STOP_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            line = process.stdout.readline() if process.stdout else b""
+            if not line or process.stdout is None:
+                fail("padwatch: the simulated DAQ did not start; its own message stands above")
+            endpoints: Endpoints = json.loads(line)
+            daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
+            news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)
+            news.start()
+            yield daq
+        finally:
+            _stop(process)
+            if news is not None:
+                news.join()  # before what it reads is closed
+
+
+def _stop(process: "subprocess.Popen[bytes]") -> None:
+    process.terminate()
+    try:
+        process.wait(STOP_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _listen(stdout: IO[bytes], daq: RunningDaq) -> None:
@@ -74,3 +89,4 @@ def _listen(stdout: IO[bytes], daq: RunningDaq) -> None:
         ended = json.loads(line).get("ended")
         if ended in daq.over:
             daq.over[ended].set()
+    daq.gone.set()

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -77,7 +78,8 @@ def reanalyse(
         configured = calibration_of(settings)
         for words in calibration_differences(ids, selection.calibration, configured):
             typer.echo(f"{recording}: {words}; used is the {calibration} one", err=True)
-        monitor = UnitMonitor(machine_of(settings), analysis_of(plant_file.analysis))
+        machine = replace(machine_of(settings), rate_hz=opened.manifest.rate_hz)
+        monitor = UnitMonitor(machine, analysis_of(plant_file.analysis))
         printer = JsonPrinter() if json_output else TextPrinter()
         found = uvloop.run(_print(source, monitor, choice, printer, opened.manifest.n_samples))
     except AcquisitionError as error:

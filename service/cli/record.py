@@ -18,6 +18,7 @@ from acquisition.source import SampleSource
 from service.cli.made_by import made_by
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
+from service.settings.modbus_sources import ModbusVectorSettings
 from service.wiring.recordings import recording_of, recording_writer
 from service.wiring.sources import source_of
 
@@ -47,6 +48,12 @@ def record(
     unless --reconnect is given: then the recording ends when its length has passed.
     """
     settings = one_unit(read_plant_file(plant_file), unit, plant_file)
+    if isinstance(settings.source, ModbusVectorSettings):
+        fail(f"padwatch record: the rack of unit {settings.id} gives vectors, not samples", code=2)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fail(f"padwatch record: {out.parent}: {error.strerror}")
     try:
         writer = recording_writer(settings, out, made_by())
         clock = SystemClock()

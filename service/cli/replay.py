@@ -3,14 +3,13 @@
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from acquisition.clock import SystemClock
-from acquisition.errors import AcquisitionError
+from acquisition.errors import AcquisitionError, LinkError
 from service.cli.daq import SpeedOption
 from service.cli.daq_process import daq_process
 from service.cli.ending import run_to_its_end
@@ -58,8 +57,9 @@ def replay(
         units = recordings_by_unit(recordings, file)
         folder = out or replay_folder(file, units.values(), SystemClock().now_ns())
         played = replayed_plant(file, units, folder)
-        with _performance(played, plant, units, through, speed) as performance:
-            _run(replace(performance, ends=not serve), port)
+        _require_new(database_path(played))
+        with _performance(played, plant, units, through, speed, serve) as performance:
+            _run(performance, port)
     except (PortInUseError, StoreError, AcquisitionError, LookupError) as error:
         fail(f"padwatch replay: {error.args[0]}")
     database = database_path(played)
@@ -73,6 +73,7 @@ def _performance(
     units: Mapping[str, Path],
     through: Wire | None,
     speed: float,
+    serve: bool,
 ) -> Iterator[Performance]:
     clock = SystemClock()
     if through is None:
@@ -80,6 +81,7 @@ def _performance(
             plant,
             watched_units(plant, lambda u: replay_source(units[u.id], u, clock, speed or None)),
             Origin.REPLAY,
+            ends=not serve,
         )
         return
     arguments = [str(plant_path), "--through", through.value, "--speed", str(speed)]
@@ -87,10 +89,27 @@ def _performance(
         arguments += ["--recording", str(folder)]
     with daq_process(arguments) as daq:
         attached = daq.attached(over_wire(plant, through))
+        gone = None if serve else daq.gone
         watched = watched_units(
-            attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id])
+            attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id], gone)
         )
-        yield Performance(attached, watched, Origin.REPLAY)
+        yield Performance(attached, watched, Origin.REPLAY, ends=not serve)
+        if daq.has_failed:
+            raise LinkError(
+                "the simulated DAQ has ended before its recordings did: results are incomplete"
+            )
+
+
+def _require_new(database: Path) -> None:
+    """Refuse a folder with results: alarms would go on where those had ended.
+
+    Raises
+    ------
+    LookupError
+        Naming it.
+    """
+    if database.exists():
+        raise LookupError(f"{database} holds results already; a replay needs a folder of its own")
 
 
 def _run(performance: Performance, port: int) -> None:

@@ -38,7 +38,7 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
         Path(plant.service.data_folder) / CAPTURES,
         settings,
         {unit.id: _writer_of(unit) for unit in units},
-        {unit.id: unit.rate_hz for unit in units},
+        {unit.id: unit.sampling_hz for unit in units},
         clock,
     )
 

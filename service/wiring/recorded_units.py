@@ -8,7 +8,7 @@ def recorded_unit(unit: UnitSettings) -> RecordedUnit:
     """Channels and calibration of a unit as they stand in the manifest of its recordings."""
     return RecordedUnit(
         unit=unit.id,
-        rate_hz=unit.rate_hz,
+        rate_hz=unit.sampling_hz,
         channels=tuple(
             RecordedChannel(
                 id=channel.id,

@@ -71,7 +71,8 @@ def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
         If it is not there, or at another rate or in another unit.
     """
     slow_units = {channel.id: channel.unit for channel in unit.slow_channel}
-    return select(recording.manifest, machine_of(unit), slow_units)
+    machine = replace(machine_of(unit), rate_hz=unit.sampling_hz)
+    return select(recording.manifest, machine, slow_units)
 
 
 def recording_source(

@@ -1,8 +1,12 @@
 """What a running simulated DAQ answers to a line of its user."""
 
+import asyncio
+import json
+
 import pytest
 
-from service.daq_program import obeyed
+from acquisition.errors import LinkError
+from service.daq_program import obeyed, run_daq
 
 
 class Device:
@@ -16,6 +20,21 @@ class Device:
         if fault not in ("drop", "tear"):
             raise LookupError(f"unknown fault {fault}; there are drop, tear")
         self.faults.append((fault, count))
+
+    async def run(self) -> None:
+        await asyncio.Event().wait()
+
+    async def __aenter__(self) -> "Device":
+        return self
+
+    async def __aexit__(self, *_: object) -> None: ...
+
+
+class Failing(Device):
+    """A server whose network goes away."""
+
+    async def run(self) -> None:
+        raise LinkError("the network is unreachable")
 
 
 @pytest.fixture
@@ -37,6 +56,7 @@ def test_a_fault_is_injected_where_and_as_often_as_told(devices) -> None:
         ("U1", "'U1' is not UNIT FAULT [COUNT]"),
         ("U1 drop three", "'U1 drop three' is not UNIT FAULT [COUNT]"),
         ("U1 drop -1", "'U1 drop -1' is not UNIT FAULT [COUNT]"),
+        ("U1 drop 1000001", "COUNT is 1000001, at most 1000000"),
         ("U1 drop 1 2", "'U1 drop 1 2' is not UNIT FAULT [COUNT]"),
         ("U3 drop", "no unit U3 here; there are U1, U2"),
         ("U1 melt", "unknown fault melt; there are drop, tear"),
@@ -45,3 +65,10 @@ def test_a_fault_is_injected_where_and_as_often_as_told(devices) -> None:
 def test_a_line_that_is_no_command_changes_nothing_and_says_why(devices, line, words) -> None:
     assert obeyed(devices, line) == {"refused": words}
     assert devices["U1"].faults == []
+
+
+async def test_a_server_that_cannot_go_on_says_why_in_one_error(devices) -> None:
+    told: list[str] = []
+    with pytest.raises(LinkError, match="unreachable"):
+        await run_daq(devices | {"U3": Failing()}, told.append, controlled=False)
+    assert json.loads(told[0]) == {name: {"port": 1} for name in ("U1", "U2", "U3")}

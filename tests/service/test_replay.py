@@ -50,6 +50,14 @@ async def test_before_its_end_a_lost_link_stays_a_lost_link(refuses: bool) -> No
         await taken(source)
 
 
+@pytest.mark.parametrize("refuses", [False, True], ids=["while reading", "when connecting"])
+async def test_a_daq_that_is_gone_is_not_waited_for(refuses: bool) -> None:
+    gone = threading.Event()
+    gone.set()
+    source = PlayedOut(Standing(["a"], refuses), threading.Event(), gone)
+    assert await taken(source) == ([] if refuses else ["a"])
+
+
 def test_results_of_a_replay_lie_apart_under_what_was_played_and_when(deploy: Path) -> None:
     plant = load_plant_file(deploy / "demo.toml")
     folder = replay_folder(plant, [Path("runs/march"), Path("runs/april")], NEW_YEAR_NS)

@@ -18,6 +18,7 @@ MIN_SAMPLES = 20
 POLLED_EACH_S = 0.05
 QUEUE_ON_A_LINE_HZ = 100.0
 POLLED_UP_TO_HZ = 8.0
+PATIENCE_S = 60.0
 
 
 def register_map(**of_channels: str) -> str:
@@ -103,6 +104,13 @@ async def test_the_service_reads_every_kind_of_source_over_every_wire(
     await asyncio.gather(*(speed_is_right(program, id_) for id_ in read))
     assert await program.end() == 0
     assert "Traceback" not in program.errors
+
+    recorded = ("--unit", "POLLED_TCP", "--seconds", "1", "--out", "runs/polls")
+    polls = await start("record", str(tmp_path / "plant.toml"), *recorded)
+    async with asyncio.timeout(PATIENCE_S):
+        assert await polls.process.wait() == 0
+    manifest = json.loads((tmp_path / "runs" / "polls" / "manifest.json").read_text())
+    assert manifest["rate_hz"] == 1.0 / POLLED_EACH_S
     assert await daq.end() == 0
 
 

@@ -1,8 +1,11 @@
 """Recorded runs through the whole service: straight, and through a DAQ over each real wire."""
 
+import asyncio
 import hashlib
 import json
 import math
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -143,7 +146,7 @@ async def test_a_replay_says_so_and_stays_apart_from_the_live_plant(
     assert "holds replay results and is not opened for live ones" in refused.errors
 
 
-async def test_a_replay_that_only_shall_be_stored_ends_by_itself(
+async def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_not_mixed_with_another(
     start: Callable, tmp_path: Path
 ) -> None:
     program = await start(
@@ -154,3 +157,27 @@ async def test_a_replay_that_only_shall_be_stored_ends_by_itself(
     assert await program.process.wait() == 0
     assert json.loads(output[-1]) == {"database": "results/padwatch.sqlite3"}
     assert (tmp_path / "results" / "padwatch.sqlite3").exists()
+
+    again = await start(
+        *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),
+        *("--speed", "0", "--out", "results"),
+    )
+    assert await again.process.wait() == 1
+    await again.end()
+    assert "holds results already; a replay needs a folder of its own" in again.errors
+
+
+async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incomplete(
+    start: Callable, children: Callable
+) -> None:
+    program = await start(
+        *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),
+        *("--speed", "1", "--through", "modbus_tcp", "--out", "results"),
+    )
+    await program.wait_for_url()
+    [daq] = children(program.pid)
+    os.kill(daq, signal.SIGKILL)
+    async with asyncio.timeout(LONGEST_RUN_S):
+        assert await program.process.wait() == 1
+    await program.end()
+    assert "ended before its recordings did: results are incomplete" in program.errors

@@ -90,8 +90,15 @@ async def test_a_bus_without_text_has_no_faults_of_text_and_cannot_be_cut(device
     async with CanBusServer(device) as server:
         with pytest.raises(LookupError, match="long_line"):
             server.inject("long_line")
-        with pytest.raises(LinkError, match="no connection that could be cut"):
+        with pytest.raises(LookupError, match=r"no fault 'cut'; there are bus_off, drop"):
             server.inject("cut")
+
+
+async def test_a_port_in_use_is_an_error_that_names_it(device):
+    async with SlcanTcpServer(device) as first:
+        where = first.endpoint["channel"].removeprefix("socket://")
+        with pytest.raises(LinkError, match=f"cannot listen on {where}"):
+            await SlcanTcpServer(device, port=int(where.rpartition(":")[2])).__aenter__()
 
 
 async def test_a_served_recording_ends_when_all_of_it_is_taken(counting_feed):
@@ -147,8 +154,14 @@ async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
 
 
 def test_a_feed_with_other_channels_is_refused(counting_feed):
-    with pytest.raises(ConfigError, match=r"\(3, 2, False\) in the feed, \(2, 2, False\)"):
+    with pytest.raises(ConfigError, match=r"\(3, 2\) in the feed, \(2, 2\)"):
         CanDevice(counting_feed(n_channels=3), SHAPE)
+
+
+def test_counts_in_a_profile_of_engineering_units_are_refused_with_the_right_one(counting_feed):
+    shape = CanShape(channels=SHAPE.channels, slow=SHAPE.slow, floats=True)
+    with pytest.raises(ConfigError, match=r'need the profile "padwatch_int16", not "padwatch_f'):
+        CanDevice(counting_feed(), shape)
 
 
 async def test_a_link_to_a_terminal_stays_when_its_number_changes(tmp_path, device):
