@@ -8,7 +8,9 @@ from core.units import NS_PER_S
 _MAX_UNSURE_NS = NS_PER_S
 """Samples that arrive late for longer than this were not late: others before them are lost."""
 
-_MIN_TOLERANCE_NS = 1_000_000
+MAX_INSTANTS_PER_S = 1250.0
+"""Up to here a second of drift is less than half an instant, so that each missing one is told."""
+
 _MAX_DRIFT = 300e-6
 """Twice what the crystals of device and host can differ, and some."""
 
@@ -17,12 +19,13 @@ class ArrivalCheck:
     """Whether as many samples have arrived as the time that passed calls for.
 
     Samples can be late, never early: the least delay seen is none, and a sample that comes with as
-    little shows that none before it was lost.
+    little shows that none before it was lost. Less than half of what a single instant takes is as
+    little.
     """
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, instant_samples: int) -> None:
         self._period_ns = NS_PER_S / rate_hz
-        self._tolerance_ns = max(self._period_ns / 2, _MIN_TOLERANCE_NS)
+        self._instant_samples = instant_samples
         self._origin_ns: int | None = None
         self._least_ns = 0.0
         self._previous_ns = 0
@@ -41,11 +44,15 @@ class ArrivalCheck:
 
     def is_prompt(self, delay_ns: float) -> bool:
         """Whether a delay is so small that nothing can have been lost."""
-        return delay_ns <= self._tolerance_ns
+        return delay_ns < self._instant_ns / 2
 
     def n_lost(self, delay_ns: float) -> int:
         """Samples whose loss explains a delay that does not go away."""
-        return max(1, round(delay_ns / self._period_ns))
+        return self._instant_samples * max(1, round(delay_ns / self._instant_ns))
+
+    @property
+    def _instant_ns(self) -> float:
+        return self._instant_samples * self._period_ns
 
 
 class UncountedInstants:
@@ -74,7 +81,7 @@ class UncountedInstants:
         self._begin()
 
     def _begin(self) -> None:
-        self._check = ArrivalCheck(self._rate_hz)
+        self._check = ArrivalCheck(self._rate_hz, self._plan.samples_per_frame)
         self._frames: list[bytes] = []
         self._last_wave = self._plan.n_waves
         self._spoilt = False
