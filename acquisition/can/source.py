@@ -108,6 +108,8 @@ class CanSource:
             raw_blocks: list[RawBlock] = []
             if batch:
                 raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns)
+                if self._assembler.trouble:
+                    raw_blocks = []
                 for block in self._delivery.take_together(raw_blocks, batch.arrived):
                     yield block
             if raw_blocks:
@@ -120,7 +122,9 @@ class CanSource:
         silent_s = self._clock.monotonic_s() - fresh_at_s
         if silent_s > self._settings.stale_after_s:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
+            trouble = self._assembler.trouble
             raise LinkError(
-                f"{self._settings.link}: no complete sample for {silent_s:.1f} s;"
+                f"{self._settings.link}: no {'credible' if trouble else 'complete'} sample for"
+                f" {silent_s:.1f} s;{f' {trouble}' if trouble else ''}"
                 f" frames refused so far: {refused or 'none'}"
             )

@@ -55,8 +55,8 @@ class PollClock:
         self._pulse, self._reader = pulse, asyncio.current_task()
 
     def _beat(self, after_s: float = 0.0) -> None:
-        # what asks another device beside says nothing of the one that reads
-        if self._reader is not None and asyncio.current_task() is self._reader:
+        # what asks another device beside, or listens to a bus, says nothing of the one that reads
+        if self._reader is not None and _task_here() is self._reader:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
@@ -64,6 +64,14 @@ class PollClock:
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)
+
+
+def _task_here() -> asyncio.Task[Any] | None:
+    """Return the task that runs; none in a thread of a source's own."""
+    try:
+        return asyncio.current_task()
+    except RuntimeError:
+        return None
 
 
 class TimedSource:

@@ -160,6 +160,29 @@ def test_a_rate_at_which_the_clock_cannot_tell_losses_is_refused(settings, count
         at_rate(settings, counts_calibration, 1251.0)
 
 
+@pytest.mark.parametrize("share", [1.3, 2.0])
+def test_more_samples_than_the_rate_are_not_believed_as_from_two_modules_with_the_same_ids(
+    share, assembler
+):
+    blocks = []
+    for start in range(0, 3000, 6):
+        frames = itertools.chain.from_iterable(instant(n) for n in range(start, start + 6))
+        if not assembler.trouble:
+            blocks += assembler.take(frames, at((start + 6) / RATE_HZ / share))
+    assert "more frames come than rate_hz says" in assembler.trouble
+    assert sum(b.n_samples for b in blocks) <= 0.8 * share * RATE_HZ
+
+
+@pytest.mark.parametrize("step_s", [-3600.0, -2.0, 2.0, 3600.0])
+def test_a_host_clock_that_is_set_and_frames_that_had_waited_are_not_too_many(step_s, assembler):
+    frames = itertools.chain.from_iterable(instant(n) for n in range(1200))
+    assembler.take(frames, at(2.0))  # they waited before the bus was opened
+    for start in range(1200, 6000, 6):
+        frames = itertools.chain.from_iterable(instant(n) for n in range(start, start + 6))
+        assembler.take(frames, at((start + 6) / RATE_HZ + (step_s if start > 3000 else 0.0)))
+        assert assembler.trouble == ""
+
+
 def test_late_frames_are_no_loss(assembler):
     random = np.random.default_rng(4)
     blocks = []
