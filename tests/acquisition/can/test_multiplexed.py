@@ -101,7 +101,8 @@ def test_a_common_signal_cannot_be_a_channel(dbc, counts_calibration):
 def test_a_probe_shows_a_multiplexed_message_though_the_dbc_lacks_some_of_its_values(inner):
     text = (
         'VERSION ""\nBU_: N\nBO_ 200 X: 2 N\n SG_ outer M : 0|4@1+ (1,0) [0|0] "" N\n'
-        f' SG_ inner {inner or "m0"} : 4|4@1+ (1,0) [0|0] "" N\n SG_ y m1 : 8|8@1+ (1,0) [0|0] "" N\n'
+        f' SG_ inner {inner or "m0"} : 4|4@1+ (1,0) [0|0] "" N\n'
+        ' SG_ y m1 : 8|8@1+ (1,0) [0|0] "" N\n'
     )
     if inner:
         text += "SG_MUL_VAL_ 200 y inner 1-1;\nSG_MUL_VAL_ 200 inner outer 0-0;\n"
