@@ -32,6 +32,12 @@ class Delivery:
         self._grid = BlockGrid(calibration.block_samples)
         self._stamps = StampCheck()
         self._clock = ClockEstimate()
+        self._fault: StampFault | None = None
+
+    def note_fault(self, fault: StampFault) -> None:
+        """Let the next block tell that a stamp beside those of its samples was not used."""
+        self._stamps.n_faults += 1
+        self._fault = fault
 
     def take(
         self,
@@ -53,11 +59,14 @@ class Delivery:
         has_stamp
             Whether this block has one of the device's stamps, if the device stamps at all.
         """
-        raw, fault = self._stamps.check(raw)
+        raw, own_fault = self._stamps.check(raw)
         blocks = self._grid.put(raw)
+        fault = own_fault or self._fault
+        if blocks:
+            self._fault = None
         if arrived is None:
             return [self._sample_block(block, fault) for block in blocks]
-        self._note_arrival(raw, has_stamp and fault is None, arrived)
+        self._note_arrival(raw, has_stamp and own_fault is None, arrived)
         clock = self._clock.reading(self._stamps.n_faults)
         sampled_s = arrived.steady_s - held_s
         return [

@@ -51,6 +51,15 @@ class Assembler:
         self._ready: list[Instant] = []
         self._epoch = self._counted.epoch
 
+    @property
+    def trouble(self) -> str:
+        """Why none of the samples can be believed; empty if they can."""
+        if self._counted.rivals.found:
+            return "frames contradict each other; do two devices send the same ids?"
+        if not self._plan.counted and self._uncounted.are_too_many:
+            return "more frames come than rate_hz says; do two devices send the same ids?"
+        return ""
+
     def take(self, frames: Iterable[Frame], arrived_ns: int) -> list[RawBlock]:
         """Take the frames of a batch; return the blocks that this completes, in order.
 

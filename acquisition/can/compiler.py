@@ -18,6 +18,7 @@ from acquisition.can.plan import (
 )
 from acquisition.can.settings import CanChannel, CanSettings, CanSlowChannel
 from acquisition.can.signals import Place, SignalTable
+from acquisition.can.uncounted import MAX_INSTANTS_PER_S
 from acquisition.can.units import known_unit, spellings
 from acquisition.can.waveforms import (
     WaveChannel,
@@ -70,6 +71,7 @@ class _Compiler:
         if n_samples and settings.counter_counts == "frames":
             raise ConfigError('frame_samples needs counter_counts = "samples"')
         self._require_counter_of_epoch(counters)
+        self._require_losses_are_seen(counters)
         parts = {*self._waves, *values, *counters}
         messages: dict[int, MessagePlan] = {}
         for place in sorted(parts):
@@ -202,6 +204,15 @@ class _Compiler:
             raise ConfigError(
                 f'epoch = "{path}": its message has no counter, so that nobody knows from which'
                 " sample on it holds; name its counter under counters, or leave epoch out"
+            )
+
+    def _require_losses_are_seen(self, counters: Mapping[Place, object]) -> None:
+        instants_per_s = self._calibration.rate_hz / self._samples_per_frame
+        if not counters and instants_per_s > MAX_INSTANTS_PER_S:
+            raise ConfigError(
+                f"counters: none is named, and {instants_per_s:.6g} frames a second of each message"
+                " are too many to find losses by the clock alone, which can"
+                f" {MAX_INSTANTS_PER_S:g}; name the counters, or let the device send fewer"
             )
 
     def _part(

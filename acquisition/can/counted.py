@@ -1,15 +1,20 @@
 """`CountedInstants`: complete sample instants from messages that carry counters."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from acquisition.can.counter_axis import CounterAxis, Jump, Mark
 from acquisition.can.instants import Instant, PendingInstant, Refusal, RefusalCounts
 from acquisition.can.plan import Counter as PartCounter
 from acquisition.can.plan import Part, Plan
+from acquisition.can.rivals import Rivals
 from acquisition.epochs import Epochs
 
 MAX_PENDING = 64
 """Instants that may be incomplete at the same time."""
+
+_MAX_TOLD = 256
+"""Frames of each message that are remembered, to be compared with those that come again."""
 
 _WIDE = 1 << 32
 """A counter of fewer samples than this wraps while nobody looks."""
@@ -41,6 +46,11 @@ class CountedInstants:
         Where refused frames are counted.
     begun_ns
         When this life of the adapter began, UTC.
+
+    Attributes
+    ----------
+    rivals
+        Whether a second device counts under the same ids.
     """
 
     def __init__(
@@ -56,6 +66,8 @@ class CountedInstants:
         self._epochs = Epochs(begun_ns, trusts_device=self._tells_epoch and is_wide)
         self._told_epoch: int | None = None
         self._doubted: list[_Doubted] = []
+        self._left: tuple[Mark, int | None] | None = None
+        self.rivals = Rivals()
         self._incomplete = 0
         self._unusable: list[int] = []
         self._begin()
@@ -93,10 +105,11 @@ class CountedInstants:
             return None
         last = self._last[wave]
         if index <= last or index < self._stop:
-            again = Refusal.DUPLICATE if index == last else Refusal.OUT_OF_ORDER
-            self._refused[again] += 1
+            self._refuse_old(wave, index, placed.data)
             return None
+        self.rivals.fits()
         self._last[wave] = index
+        self._remember(wave, index, placed.data)
         n_samples = self._n_samples(part, placed.data)
         pending = self._pending.get(index)
         if pending is None:
@@ -106,6 +119,27 @@ class CountedInstants:
             self._give_up_oldest()
             return None
         return self._finished(index, pending.n_samples, frames)
+
+    def _refuse_old(self, wave: int, index: int, data: bytes) -> None:
+        """Count a frame of a sample that is past; a device alone never tells one in two ways."""
+        if self._contradicts(self._told[wave], index, data):
+            self._refused[Refusal.CONTRADICTORY] += 1
+            self.rivals.contradicts()
+            return
+        again = Refusal.DUPLICATE if index == self._last[wave] else Refusal.OUT_OF_ORDER
+        self._refused[again] += 1
+
+    def _contradicts(self, told: Mapping[int, bytes], index: int, data: bytes) -> bool:
+        if index in told:
+            return told[index] != data
+        n_samples = self._plan.samples_per_frame
+        return any(n in told for n in range(index - n_samples + 1, index + n_samples))
+
+    def _remember(self, wave: int, index: int, data: bytes) -> None:
+        told = self._told[wave]
+        told[index] = data
+        if len(told) > _MAX_TOLD:
+            del told[next(iter(told))]
 
     def _doubt(self, frame: _Doubted) -> list[Placed]:
         """Wait for a second frame where the first does not fit the axis."""
@@ -123,7 +157,9 @@ class CountedInstants:
             return self._move([*self._doubted, frame])
         same_epoch = frame.epoch is None or frame.epoch == self._told_epoch
         index = self._axis.place(mark.counter, mark.modulus, mark.arrived_ns)
-        self._refused[Refusal.IMPOSSIBLE_COUNTER] += len(self._doubted)
+        for _ in self._doubted:
+            self._refused[Refusal.IMPOSSIBLE_COUNTER] += 1
+            self.rivals.contradicts()
         self._doubted.clear()
         if index is not None and same_epoch:
             return [Placed(frame.part, frame.data, index)]
@@ -145,6 +181,7 @@ class CountedInstants:
         self._doubted = []
         widest = max(frames, key=lambda frame: frame.mark.modulus)
         epoch = self._epoch_of(frames)
+        left = (self._axis.left(widest.mark.modulus), self._told_epoch)
         if epoch != self._told_epoch:
             kind, index = Jump.RESTART, widest.mark.counter
             self._epochs.begin(epoch)
@@ -156,9 +193,19 @@ class CountedInstants:
                 self._epochs.begin()
         if kind is Jump.RESTART:
             self._begin()
+            if self._goes_on(widest.mark, epoch):
+                self.rivals.returns()
+        self._left = left
         self._told_epoch = epoch
         self._axis.anchor(index, widest.mark.arrived_ns)
         return [Placed(f.part, f.data, self._near(f.mark, index)) for f in frames]
+
+    def _goes_on(self, mark: Mark, epoch: int | None) -> bool:
+        """Whether a count goes on that was left for another one a moment ago."""
+        if self._left is None or self._left[1] != epoch:
+            return False
+        left = self._left[0]
+        return left.modulus == mark.modulus and self._axis.resumes(left, mark)
 
     def _near(self, mark: Mark, index: int) -> int:
         half = mark.modulus // 2
@@ -200,6 +247,7 @@ class CountedInstants:
         """Forget what belongs to the epoch that has ended."""
         self._pending: dict[int, PendingInstant] = {}
         self._last = [-1] * self._plan.n_waves
+        self._told: list[dict[int, bytes]] = [{} for _ in range(self._plan.n_waves)]
         self._stop = -1
         self._incomplete = 0
         self._unusable = [0] * self._plan.n_waves

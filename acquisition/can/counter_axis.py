@@ -86,6 +86,16 @@ class CounterAxis:
         ahead = (mark.counter - doubted.counter) % modulus
         return ahead <= min(self._near, modulus // 2)
 
+    def left(self, modulus: int) -> Mark:
+        """Where the axis stands, as a place to come back to."""
+        return Mark((self.newest or 0) % modulus, modulus, self._newest_ns)
+
+    def resumes(self, left: Mark, mark: Mark) -> bool:
+        """Whether a frame goes on at a place that was left within the last second."""
+        silent_s = (mark.arrived_ns - left.arrived_ns) / NS_PER_S
+        ahead = (mark.counter - left.counter) % mark.modulus
+        return silent_s <= _SILENCE_S and 0 < ahead <= self._near + silent_s * self._rate_hz
+
     def gap(self, mark: Mark) -> int:
         """Index of a place that is not before the newest frame; the clock tells whole wraps."""
         forward = self._forward(mark)

@@ -1,5 +1,6 @@
 """A DBC file, read by cantools and turned into plain values; the one place that knows cantools."""
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,9 @@ from acquisition.errors import ConfigError, FrameError
 MAX_FILE_BYTES = 8_000_000
 _FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 _EXTENDED_FLAG = 1 << 31
+_MAX_MULTIPLEXER_VALUES = 100_000
+_MULTIPLEXER_LINE = re.compile(r"SG_MUL_VAL_[^;]*")
+_RANGE = re.compile(r"(\d{1,20})\s*-\s*(\d{1,20})")
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ class DbcMessage:
         Bytes that a frame of it has on the wire.
     multiplexer
         Name of its multiplexer signal, if it has one.
+    nested
+        Whether a multiplexer of it is itself multiplexed, or it has several.
     """
 
     name: str
@@ -63,6 +69,7 @@ class DbcMessage:
     fd: bool
     length: int
     multiplexer: str | None
+    nested: bool
     source: Message = field(repr=False, compare=False)
     signals: dict[str, DbcSignal] = field(default_factory=dict, repr=False, compare=False)
 
@@ -114,6 +121,7 @@ def parse_dbc(text: str, path: Path) -> dict[str, DbcMessage]:
     ConfigError
         If the file cannot be read, is no DBC, has overlapping signals, or two messages with one id.
     """
+    _refuse_wide_ranges(text, path)
     try:
         database = load_string(text, database_format="dbc")
     except (DatabaseError, ValueError, KeyError) as exc:
@@ -139,6 +147,20 @@ def _text(path: Path) -> str:
         return content.decode("cp1252", errors="replace")  # what most DBC editors write
 
 
+def _refuse_wide_ranges(text: str, path: Path) -> None:
+    """Refuse ranges that cantools would write out number by number until the memory is full."""
+    n_values = sum(
+        max(0, int(last) - int(first))
+        for line in _MULTIPLEXER_LINE.findall(text)
+        for first, last in _RANGE.findall(line)
+    )
+    if n_values > _MAX_MULTIPLEXER_VALUES:
+        raise ConfigError(
+            f"{path}: ranges of SG_MUL_VAL_ have {n_values} values, at most"
+            f" {_MAX_MULTIPLEXER_VALUES} are allowed; leave out those that no frame has"
+        )
+
+
 def _refuse_shared(path: Path, messages: Iterable[DbcMessage]) -> None:
     names: dict[int, str] = {}
     seen: set[str] = set()
@@ -157,13 +179,15 @@ def _refuse_shared(path: Path, messages: Iterable[DbcMessage]) -> None:
 
 def _message(source: Message) -> DbcMessage:
     multiplexers = [s.name for s in source.signals if s.is_multiplexer]
+    roots = [s.name for s in source.signals if s.is_multiplexer and not s.multiplexer_ids]
     message = DbcMessage(
         name=source.name,
         frame_id=source.frame_id,
         extended=source.is_extended_frame,
         fd=bool(source.is_fd) or source.length > _FD_LENGTHS[8],
         length=next((n for n in _FD_LENGTHS if n >= source.length), source.length),
-        multiplexer=multiplexers[0] if multiplexers else None,
+        multiplexer=roots[0] if roots else None,
+        nested=len(multiplexers) > 1,
         source=source,
     )
     for signal in source.signals:
@@ -172,12 +196,6 @@ def _message(source: Message) -> DbcMessage:
 
 
 def _signal(message: DbcMessage, source: Signal) -> DbcSignal:
-    nested = source.multiplexer_signal not in (None, message.multiplexer)
-    if nested or (source.is_multiplexer and source.multiplexer_ids):
-        raise ConfigError(
-            f"message {message.name}: signal {source.name} is multiplexed twice over, which is not"
-            " supported; leave it out of the DBC"
-        )
     return DbcSignal(
         message=message,
         name=source.name,

@@ -15,6 +15,7 @@ class Refusal(StrEnum):
     NO_TIME = "no_time_stamp"
     UNCOUNTED_LOSS = "uncounted_loss"
     DUPLICATE = "duplicate_frame"
+    CONTRADICTORY = "contradictory_frame"
     OUT_OF_ORDER = "out_of_order_frame"
     IMPOSSIBLE_COUNTER = "impossible_counter"
     BEFORE_START = "before_start"

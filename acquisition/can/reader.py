@@ -15,9 +15,11 @@ from acquisition.can.bus import foreign_errors_renamed
 from acquisition.can.error_frames import lost_in_controller, require_bus
 from acquisition.can.gate import Frame, FrameGate
 from acquisition.can.instants import Refusal, RefusalCounts
+from acquisition.can.interface_clock import InterfaceClock
 from acquisition.can.slcan import SlcanBus
 from acquisition.clock import Clock
 from acquisition.errors import FrameError, LinkError
+from core.device_clock import StampFault
 
 _RECEIVE_S = 0.1
 _REST_S = 0.005
@@ -38,11 +40,14 @@ class Batch:
     Parameters
     ----------
     arrived
-        When the last of them had been read.
+        When the last of them had been read; or when it came, by the interface's stamps.
+    stamp_fault
+        Why a stamp of the interface was not used.
     """
 
     frames: list[Frame]
     arrived: Arrival
+    stamp_fault: StampFault | None = None
 
 
 class FrameReader:
@@ -58,6 +63,8 @@ class FrameReader:
         Whether this interface's error frames are in the format of Linux.
     refused
         Where frames are counted that are not handed on.
+    stamps
+        Makes arrivals of the interface's stamps; without, frames arrive when they are read.
     """
 
     def __init__(
@@ -71,6 +78,7 @@ class FrameReader:
         max_frames: int,
         when_full: Literal["drop", "wait"],
         judges_errors: bool,
+        stamps: InterfaceClock | None = None,
     ) -> None:
         self._open_bus = open_bus
         self._where = where
@@ -80,6 +88,8 @@ class FrameReader:
         self._max_frames = max_frames
         self._waits = when_full == "wait"
         self._judges_errors = judges_errors
+        self._stamps = stamps
+        self._stamp_fault: StampFault | None = None
         self._batches: deque[Batch] = deque()
         self._n_waiting = 0
         self._room = threading.Condition()
@@ -172,7 +182,8 @@ class FrameReader:
                 if isinstance(bus, SlcanBus):
                     self._refused[Refusal.MALFORMED] += bus.take_n_malformed()
                 if frames:
-                    self._hand_over(Batch(frames, self._arrived))
+                    self._hand_over(Batch(frames, self._arrived, self._stamp_fault))
+                    self._stamp_fault = None
             if not frames and bus.state is can.BusState.ERROR:
                 raise LinkError(f"{self._where}: the interface says that it is in error")
 
@@ -186,7 +197,7 @@ class FrameReader:
 
     def _receive(self, bus: can.BusABC, frames: list[Frame], timeout_s: float) -> None:
         """Take all frames that have come, after waiting for the first."""
-        n_before = len(frames)
+        n_before, stamp_s = len(frames), 0.0
         try:
             while len(frames) < _MAX_BATCH:
                 message = self._next_message(bus, timeout_s)
@@ -196,9 +207,16 @@ class FrameReader:
                 frame = self._gate.admit(message)
                 if frame is not None:
                     frames.append(frame)
+                    stamp_s = message.timestamp
         finally:
             if len(frames) > n_before:
-                self._arrived = Arrival.now(self._clock)
+                self._note_arrival(stamp_s)
+
+    def _note_arrival(self, stamp_s: float) -> None:
+        self._arrived = Arrival.now(self._clock)
+        if self._stamps is not None:
+            self._arrived, fault = self._stamps.arrival(stamp_s, self._arrived)
+            self._stamp_fault = self._stamp_fault or fault
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
         """Next message, over what nobody can read; a bus that says nothing else is lost."""

@@ -93,6 +93,8 @@ class CanSettings:
         For how long a message without waveforms and without counter is valid.
     stale_after_s
         A bus without a complete new sample for longer than this is not connected; above 0.
+    stamps
+        When frames come is told by the "host", as they are read, or by the "interface".
     queue_frames
         Frames that wait for the event loop at most.
     when_full
@@ -115,6 +117,7 @@ class CanSettings:
     hold_samples: int | str = 50
     hold_s: float = 5.0
     stale_after_s: float = 3.0
+    stamps: Literal["host", "interface"] = "host"
     queue_frames: int = 65536
     when_full: Literal["drop", "wait"] = "drop"
 

@@ -39,6 +39,11 @@ class SignalTable:
                 f'{key} = "{path}": no message {message} in the DBC; there are'
                 f" {_shown(self.messages)}; write Message.Signal"
             )
+        if self.messages[message].nested:
+            raise ConfigError(
+                f'{key} = "{path}": message {message} is multiplexed twice over, which is not'
+                " supported; let the device send the signal in a message of its own"
+            )
         signals = self.messages[message].signals
         if name not in signals:
             raise ConfigError(

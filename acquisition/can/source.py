@@ -11,6 +11,7 @@ from acquisition.can.assembly import Assembler
 from acquisition.can.bus import LINUX_ERROR_FRAMES, open_bus
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
+from acquisition.can.interface_clock import InterfaceClock
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
@@ -99,6 +100,7 @@ class CanSource:
             max_frames=settings.queue_frames,
             when_full=settings.when_full,
             judges_errors=settings.link.interface in LINUX_ERROR_FRAMES,
+            stamps=InterfaceClock() if settings.stamps == "interface" else None,
         )
 
     async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
@@ -107,7 +109,11 @@ class CanSource:
             batch = await reader.next_batch(min(_LOOK_S, self._settings.stale_after_s))
             raw_blocks: list[RawBlock] = []
             if batch:
+                if batch.stamp_fault:
+                    self._delivery.note_fault(batch.stamp_fault)
                 raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns)
+                if self._assembler.trouble:
+                    raw_blocks = []
                 for block in self._delivery.take_together(raw_blocks, batch.arrived):
                     yield block
             if raw_blocks:
@@ -120,7 +126,9 @@ class CanSource:
         silent_s = self._clock.monotonic_s() - fresh_at_s
         if silent_s > self._settings.stale_after_s:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
+            trouble = self._assembler.trouble
             raise LinkError(
-                f"{self._settings.link}: no complete sample for {silent_s:.1f} s;"
+                f"{self._settings.link}: no {'credible' if trouble else 'complete'} sample for"
+                f" {silent_s:.1f} s;{f' {trouble}' if trouble else ''}"
                 f" frames refused so far: {refused or 'none'}"
             )

@@ -199,13 +199,13 @@ def _spans(message: DbcMessage, frames: Sequence[bytes]) -> tuple[Span, ...]:
 def _values(
     message: DbcMessage, signal: DbcSignal, frames: Sequence[bytes]
 ) -> npt.NDArray[np.float64]:
-    if not signal.multiplexer_ids or message.multiplexer is None:
+    if message.multiplexer is None:
         return np.asarray(FrameLayout(message, [signal]).columns(frames)[signal.name], np.float64)
     values = []
     for data in frames:
         try:
             values.append(float(message.raw_value(signal.name, data)))
-        except FrameError:  # the signal is not there at this value of the multiplexer
+        except FrameError:  # the DBC does not know this value of the multiplexer
             continue
     return np.array(values)
 

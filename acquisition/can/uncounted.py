@@ -8,44 +8,75 @@ from core.units import NS_PER_S
 _MAX_UNSURE_NS = NS_PER_S
 """Samples that arrive late for longer than this were not late: others before them are lost."""
 
-_MIN_TOLERANCE_NS = 1_000_000
+MAX_INSTANTS_PER_S = 1250.0
+"""Up to here a second of drift is less than half an instant, so that each missing one is told."""
+
 _MAX_DRIFT = 300e-6
 """Twice what the crystals of device and host can differ, and some."""
+
+
+_WINDOW_NS = NS_PER_S // 4
+_FAST_SHARE = 0.2
+_FAST_WINDOWS = 2
+"""What waited before the bus was opened, and a host's clock that is put back, fill one window."""
 
 
 class ArrivalCheck:
     """Whether as many samples have arrived as the time that passed calls for.
 
     Samples can be late, never early: the least delay seen is none, and a sample that comes with as
-    little shows that none before it was lost.
+    little shows that none before it was lost. Less than half of what a single instant takes is as
+    little.
     """
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, instant_samples: int) -> None:
         self._period_ns = NS_PER_S / rate_hz
-        self._tolerance_ns = max(self._period_ns / 2, _MIN_TOLERANCE_NS)
+        self._instant_samples = instant_samples
         self._origin_ns: int | None = None
+        self._window_ns = 0
+        self._early_ns = 0.0
+        self._n_fast = 0
         self._least_ns = 0.0
         self._previous_ns = 0
 
     def delay_ns(self, stop_index: int, arrived_ns: int) -> float:
         """How late samples up to an index are, against the least delay seen."""
         if self._origin_ns is None:
-            self._origin_ns = self._previous_ns = arrived_ns
+            self._origin_ns = self._previous_ns = self._window_ns = arrived_ns
             self._least_ns = -stop_index * self._period_ns
         delay_ns = arrived_ns - self._origin_ns - stop_index * self._period_ns
         passed_ns = min(max(0, arrived_ns - self._previous_ns), _MAX_UNSURE_NS)
         self._least_ns += _MAX_DRIFT * passed_ns
         self._previous_ns = arrived_ns
+        self._early_ns += max(0.0, self._least_ns - delay_ns)
         self._least_ns = min(self._least_ns, delay_ns)
+        self._judge_pace(arrived_ns)
         return delay_ns - self._least_ns
+
+    @property
+    def are_too_many(self) -> bool:
+        """Whether more samples come, and not for once only, than a device of this rate has."""
+        return self._n_fast >= _FAST_WINDOWS
 
     def is_prompt(self, delay_ns: float) -> bool:
         """Whether a delay is so small that nothing can have been lost."""
-        return delay_ns <= self._tolerance_ns
+        return delay_ns < self._instant_ns / 2
 
     def n_lost(self, delay_ns: float) -> int:
         """Samples whose loss explains a delay that does not go away."""
-        return max(1, round(delay_ns / self._period_ns))
+        return self._instant_samples * max(1, round(delay_ns / self._instant_ns))
+
+    def _judge_pace(self, arrived_ns: int) -> None:
+        passed_ns = arrived_ns - self._window_ns
+        if abs(passed_ns) < _WINDOW_NS:
+            return
+        is_fast = self._early_ns > _FAST_SHARE * passed_ns > 0.0
+        self._n_fast = self._n_fast + 1 if is_fast else 0
+        self._window_ns, self._early_ns = arrived_ns, 0.0
+
+    @property
+    def _instant_ns(self) -> float:
+        return self._instant_samples * self._period_ns
 
 
 class UncountedInstants:
@@ -74,7 +105,7 @@ class UncountedInstants:
         self._begin()
 
     def _begin(self) -> None:
-        self._check = ArrivalCheck(self._rate_hz)
+        self._check = ArrivalCheck(self._rate_hz, self._plan.samples_per_frame)
         self._frames: list[bytes] = []
         self._last_wave = self._plan.n_waves
         self._spoilt = False
@@ -94,6 +125,11 @@ class UncountedInstants:
     def next_index(self) -> int:
         """First sample that has not been completed."""
         return self._next
+
+    @property
+    def are_too_many(self) -> bool:
+        """Whether more samples come than a single device of this rate has."""
+        return self._check.are_too_many
 
     def set_epoch(self, epoch: int) -> bool:
         """Take over an epoch that the device told; return whether it began to count anew."""

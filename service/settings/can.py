@@ -32,6 +32,9 @@ OF_A_DBC = (
 LISTENING_IS_SET = ("socketcan",)
 """Interfaces whose bit rates are set in the system, not by who listens."""
 
+WITHOUT_STAMPS = ("slcan",)
+"""Interfaces that do not say when frames came."""
+
 
 class CanSettings(Settings):
     """A measuring device on a CAN or CAN FD bus; padwatch only listens."""
@@ -107,6 +110,10 @@ class CanSettings(Settings):
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
     """A bus without a complete new sample for this long counts as not connected."""
 
+    stamps: Literal["host", "interface"] = "host"
+    """What tells when frames came: the "host", which reads them, or the clock of the "interface",
+    which is led to the host's; that one knows better where the host is busy at times."""
+
     receive_buffer: Annotated[int, Field(ge=100, le=10_000_000)] = 65_536
     """Frames that may wait to be worked on; example: 65536, half a minute of twelve channels."""
 
@@ -124,6 +131,8 @@ class CanSettings(Settings):
             raise MisfitError(f"dbc or profile must be given, found {found}", "dbc")
         self._check_signals()
         self._check_speed()
+        if self.stamps == "interface" and self.interface in WITHOUT_STAMPS:
+            raise MisfitError(f'must be "host": {self.interface} has no time stamps', "stamps")
         return self
 
     @property

@@ -36,6 +36,7 @@ def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSett
         "stale_after_s": source.stale_after_s,
         "queue_frames": source.receive_buffer,
         "when_full": source.when_full,
+        "stamps": source.stamps,
     }
     units = tuple(UNITS[channel.measurand] for channel in unit.channel)
     if source.profile is not None:

@@ -183,6 +183,27 @@ def test_a_dbc_that_is_wrong_is_refused_with_its_name(text, words, dbc):
     assert str(dbc) in str(refusal.value)
 
 
+NESTED = """
+BO_ 512 NESTED: 8 N
+ SG_ inner m0M : 0|4@1+ (1,0) [0|0] "" N
+ SG_ outer M : 4|4@1+ (1,0) [0|0] "" N
+ SG_ y m1 : 8|8@1+ (1,0) [0|0] "um" N
+"""
+NESTED_RANGES = "SG_MUL_VAL_ 512 y inner 1-1;\nSG_MUL_VAL_ 512 inner outer 0-0;\n"
+
+
+def test_a_message_that_nobody_asks_for_may_be_multiplexed_twice_over(dbc):
+    dbc.write_text(DBC + NESTED + NESTED_RANGES, encoding="utf-8")
+    compiled(dbc, X)
+
+
+def test_a_multiplexer_of_billions_of_values_is_refused_before_it_fills_the_memory(dbc):
+    ranges = NESTED_RANGES.replace("1-1", "1-1, 3-4000000000")
+    dbc.write_text(DBC + NESTED + ranges, encoding="utf-8")
+    with pytest.raises(ConfigError, match="have 3999999997 values, at most 100000"):
+        compiled(dbc, X)
+
+
 def test_a_file_that_is_missing_or_a_folder_is_refused(tmp_path):
     for path in (tmp_path / "none.dbc", tmp_path):
         with pytest.raises(ConfigError, match="dbc must name a DBC file"):

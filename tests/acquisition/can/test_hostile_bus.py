@@ -12,6 +12,7 @@ from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.errors import LinkError
 
 N_EACH = 200
+N_LOSSES = 10_000
 N_CHANNELS = 4
 LINE_FAULTS = ["non_hex_line", "long_line", "truncated_line"]
 LOSING = {
@@ -98,7 +99,7 @@ async def test_two_hundred_of_each_fault_and_no_false_sample(fault, shape, devic
         assert lost == Counter()
 
 
-async def test_thousands_of_seeded_losses_over_the_wire_are_exact(shape, device, source_of):
+async def test_ten_thousand_seeded_losses_over_the_wire_are_exact(shape, device, source_of):
     random = np.random.default_rng(20261121)
     n_losses, n_expected = 0, 0
     n_waves = len(shape.waves)
@@ -107,7 +108,7 @@ async def test_thousands_of_seeded_losses_over_the_wire_are_exact(shape, device,
         async with source.connect() as stream:
             watch = Watch(stream)
             await watch.up_to(50)
-            while n_losses < 2000:
+            while n_losses < N_LOSSES:
                 for _ in range(20):
                     n_instants = int(random.integers(0, 50 // shape.samples_per_frame))
                     server.inject("drop", n_instants * n_waves)

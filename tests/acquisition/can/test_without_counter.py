@@ -1,6 +1,7 @@
 """A device that counts nothing: the clock finds what is missing, and nothing false is joined."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -118,6 +119,68 @@ def test_a_loss_is_found_by_the_clock_flagged_and_counted(n_lost, assembler):
     n_stored = sum(b.n_samples for b in blocks)
     assert n_stored + sum(r.n_samples for r in rejected) == 6000 + n_lost
     assert len(blocks) > 600
+
+
+def at_rate(settings, counts_calibration, rate_hz: float) -> Assembler:
+    calibration = replace(counts_calibration(n_channels=12, n_slow=1), rate_hz=rate_hz)
+    return Assembler(compile_plan(settings, calibration), 12, 1, rate_hz, settings.hold_s)
+
+
+def two_sets_that_lose_one(number: int):
+    """Of two sets in a row the end of one and the beginning of the other are lost."""
+    first, second = list(instant(number)), list(instant(number + 1))
+    return [*first[:2], *second[2:]]
+
+
+@pytest.mark.parametrize("what_is_left", [lambda _: [], two_sets_that_lose_one])
+@pytest.mark.parametrize("rate_hz", [100.0, 500.0, 600.0, 625.0, 1000.0, 1250.0])
+def test_the_loss_of_a_single_instant_is_found_at_every_rate(
+    rate_hz, what_is_left, settings, counts_calibration
+):
+    """Also where what is left of two instants looks like one: they are never mixed."""
+    assembler = at_rate(settings, counts_calibration, rate_hz)
+    n_seen = 2 if what_is_left is two_sets_that_lose_one else 1
+    blocks, number = [], 0
+    while number < 12_000:
+        frames = [f for n in range(number, number + 6) for f in instant(n)]
+        number += 6
+        if number % 3000 == 0:
+            frames += what_is_left(number)
+            number += n_seen
+        blocks += assembler.take(frames, at(number / rate_hz))
+    assert_true_samples(blocks)
+    assert_never_joined_over_a_loss(blocks)
+    n_stored = sum(b.n_samples for b in blocks)
+    assert n_stored + sum(r.n_samples for b in blocks for r in b.rejected) == blocks[-1].stop_index
+    assert {r.reason for b in blocks for r in b.rejected} == {"uncounted_loss"}
+
+
+def test_a_rate_at_which_the_clock_cannot_tell_losses_is_refused(settings, counts_calibration):
+    with pytest.raises(ConfigError, match=r"counters: none is named, and 1251 .* which can 1250"):
+        at_rate(settings, counts_calibration, 1251.0)
+
+
+@pytest.mark.parametrize("share", [1.3, 2.0])
+def test_more_samples_than_the_rate_are_not_believed_as_from_two_modules_with_the_same_ids(
+    share, assembler
+):
+    blocks = []
+    for start in range(0, 3000, 6):
+        frames = itertools.chain.from_iterable(instant(n) for n in range(start, start + 6))
+        if not assembler.trouble:
+            blocks += assembler.take(frames, at((start + 6) / RATE_HZ / share))
+    assert "more frames come than rate_hz says" in assembler.trouble
+    assert sum(b.n_samples for b in blocks) <= 0.8 * share * RATE_HZ
+
+
+@pytest.mark.parametrize("step_s", [-3600.0, -2.0, 2.0, 3600.0])
+def test_a_host_clock_that_is_set_and_frames_that_had_waited_are_not_too_many(step_s, assembler):
+    frames = itertools.chain.from_iterable(instant(n) for n in range(1200))
+    assembler.take(frames, at(2.0))  # they waited before the bus was opened
+    for start in range(1200, 6000, 6):
+        frames = itertools.chain.from_iterable(instant(n) for n in range(start, start + 6))
+        assembler.take(frames, at((start + 6) / RATE_HZ + (step_s if start > 3000 else 0.0)))
+        assert assembler.trouble == ""
 
 
 def test_late_frames_are_no_loss(assembler):

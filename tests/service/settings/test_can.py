@@ -45,6 +45,7 @@ def test_a_profile_needs_nothing_else():
         ({"seconds": "T.s"}, "microseconds", "must be given together"),
         ({"microseconds": "T.us"}, "seconds", "must be given together"),
         ({"data_bitrate": 2_000_000}, "data_bitrate", "set fd = true"),
+        ({"stamps": "interface"}, "stamps", 'must be "host": slcan has no time stamps'),
         ({"interface": "socketcan"}, "bitrate", "is set by the system here: ip link set"),
         (
             {"counter_counts": "frames", "frame_samples": ["WAVE.n"]},
