@@ -19,6 +19,7 @@ from acquisition.delivery import Delivery
 from acquisition.errors import LinkError
 from acquisition.raw import RawBlock
 from core.blocks import SampleBlock
+from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 """Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
@@ -107,8 +108,10 @@ class CanSource:
             batch = await reader.next_batch(min(_LOOK_S, self._settings.stale_after_s))
             raw_blocks: list[RawBlock] = []
             if batch:
-                raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns)
-                for block in self._delivery.take_together(raw_blocks, batch.arrived):
+                arrived = batch.arrived
+                steady_ns = ns_from_s(arrived.steady_s)
+                raw_blocks = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
+                for block in self._delivery.take_together(raw_blocks, arrived):
                     yield block
             if raw_blocks:
                 fresh_at_s = self._clock.monotonic_s()
