@@ -13,8 +13,8 @@ from acquisition.modbus.follower import RingFollower
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.profile import HEADER_REGISTERS
 from acquisition.modbus.replies import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
+from acquisition.modbus.ring_pace import out_of_step_s
 from acquisition.modbus.ring_reader import RingReader
-from acquisition.modbus.spread_polls import SpreadPolls
 from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
 from core.blocks import SampleBlock
 
@@ -33,7 +33,7 @@ class ModbusRingSettings(LinkSettings):
     base_address
         Register address of the header, counted from 0.
     poll_period_s
-        Time between polls on average, above 0; the ring must hold much more than that.
+        Longest time between polls, above 0; the ring must hold much more than that.
     stale_after_s
         A device without a usable new sample for longer than this is not connected; above 0.
     """
@@ -114,7 +114,8 @@ class ModbusRingSource:
             self._fresh_at_s = self._clock.monotonic_s()
 
     async def _blocks(self, reader: RingReader) -> AsyncGenerator[SampleBlock, None]:
-        polls = SpreadPolls(self._settings.poll_period_s, self._slot_s, self._clock.monotonic_s())
+        period_s = out_of_step_s(self._settings.poll_period_s, self._slot_s)
+        due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
             with _nonsense_drops_the_link():
@@ -127,7 +128,14 @@ class ModbusRingSource:
                 self._fresh_at_s = self._clock.monotonic_s()
             else:
                 self._require_fresh()
-            await self._clock.sleep(polls.wait_s(self._clock.monotonic_s()))
+            due_s = await self._wait(due_s + period_s)
+
+    async def _wait(self, due_s: float) -> float:
+        """Wait for the next poll; polls that are overdue are left out, never piled up."""
+        now_s = self._clock.monotonic_s()
+        due_s = max(due_s, now_s)
+        await self._clock.sleep(due_s - now_s)
+        return due_s
 
     def _require_fresh(self) -> None:
         standing_s = self._clock.monotonic_s() - self._fresh_at_s
