@@ -56,7 +56,7 @@ class PollClock:
 
     def _beat(self, after_s: float = 0.0) -> None:
         # what asks another device beside says nothing of the one that reads
-        if self._reader is not None and asyncio.current_task() is self._reader:
+        if self._reader is not None and _current_task() is self._reader:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
@@ -64,6 +64,14 @@ class PollClock:
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)
+
+
+def _current_task() -> asyncio.Task[Any] | None:
+    """The task that asks; None in the thread of a driver, which looks at the clock too."""
+    try:
+        return asyncio.current_task()
+    except RuntimeError:
+        return None
 
 
 class TimedSource:
