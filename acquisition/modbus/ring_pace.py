@@ -2,7 +2,7 @@
 
 import math
 
-_SHARES = ((3.0 - 5.0**0.5) / 2.0, (5.0**0.5 - 1.0) / 2.0)
+_SHARES: tuple[float, float] = ((3.0 - 5.0**0.5) / 2.0, (5.0**0.5 - 1.0) / 2.0)
 """Of a turn: multiples of the golden section fill an interval most evenly (Weyl 1916)."""
 
 
