@@ -10,7 +10,7 @@ from acquisition.clock_estimate import ClockEstimate
 from acquisition.raw import RawBlock
 from acquisition.stamps import StampCheck
 from core.blocks import SampleBlock
-from core.device_clock import StampFault
+from core.device_clock import DeviceClock, StampFault
 from core.units import ns_from_s
 
 
@@ -24,11 +24,20 @@ class Delivery:
     ----------
     stamped
         Whether ``start_ns`` of the raw blocks comes from the device rather than from the host.
+    samples_when_asked
+        Whether the host says when to sample: then the device has no rate that could drift.
     """
 
-    def __init__(self, calibration: UnitCalibration, *, stamped: bool = True) -> None:
+    def __init__(
+        self,
+        calibration: UnitCalibration,
+        *,
+        stamped: bool = True,
+        samples_when_asked: bool = False,
+    ) -> None:
         self._calibration = calibration
         self._stamped = stamped
+        self._samples_when_asked = samples_when_asked
         self._grid = BlockGrid(calibration.block_samples)
         self._stamps = StampCheck()
         self._clock = ClockEstimate()
@@ -67,7 +76,7 @@ class Delivery:
         if arrived is None:
             return [self._sample_block(block, fault) for block in blocks]
         self._note_arrival(raw, has_stamp and own_fault is None, arrived)
-        clock = self._clock.reading(self._stamps.n_faults)
+        clock = self._reading()
         sampled_s = arrived.steady_s - held_s
         return [
             replace(self._sample_block(block, fault), clock=clock, sampled_s=sampled_s)
@@ -94,6 +103,12 @@ class Delivery:
     def flush(self) -> list[SampleBlock]:
         """What is left when nothing will follow, as at the end of a recording."""
         return [calibrate(raw, self._calibration) for raw in self._grid.flush()]
+
+    def _reading(self) -> DeviceClock:
+        clock = self._clock.reading(self._stamps.n_faults)
+        if self._samples_when_asked:
+            return replace(clock, drift_ppm=None, u_drift_ppm=None)
+        return clock
 
     def _note_arrival(self, raw: RawBlock, is_good: bool, arrived: Arrival) -> None:
         stop_ns = raw.start_ns + ns_from_s(raw.n_samples / raw.rate_hz)

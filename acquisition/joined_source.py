@@ -17,7 +17,8 @@ class SlowValues(Protocol):
     def watch(self) -> AbstractAsyncContextManager[None]:
         """Ask it again and again until the context is left; losing it ends nothing.
 
-        Entering waits for its first answer, or until it is known that there is none.
+        The first time, entering waits for its first answer, or until it is known that there is
+        none; later it does not, for a device that is away must not hold up waveforms.
         """
         ...
 
@@ -30,7 +31,8 @@ class JoinedSource:
     """Puts the current slow values onto each block of another source.
 
     A slow device that is lost, or faulty, is no reason to lose waveforms: its values are then
-    missing, with the reason.
+    missing, with the reason. It is asked only while waveforms come, lest it be connected to at
+    each attempt to reach the other device.
     """
 
     def __init__(self, source: SampleSource, slow: SlowValues) -> None:
@@ -50,7 +52,7 @@ class JoinedSource:
         LinkError, ConfigError
             As the source of the waveforms does.
         """
-        async with self._slow.watch(), self._source.connect() as blocks:
+        async with self._source.connect() as blocks, self._slow.watch():
             joined = self._joined(blocks)
             try:
                 yield joined

@@ -2,16 +2,20 @@
 
 The simulated DAQ is a process of its own. One is stopped and continued, so that the connection
 stays but nobody answers; a hundred in one process are started while the service looks for them.
-Times are counted in poll periods, since seconds depend on the plant file.
+Times are counted in poll periods, since seconds depend on the plant file; of a CAN bus, that nobody
+polls, and of a queue, that is emptied all the time, in those of a lost link's retries.
 """
 
 import argparse
+import random
+import re
 import signal
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from ingest import daq, fetch, padwatch, plant_file
@@ -24,52 +28,93 @@ NOTICE_LIMIT, RETURN_LIMIT = 3.0, 2.0
 START_UP_S = 3.0
 
 
+@dataclass(frozen=True)
+class Wire:
+    """A source's table in the plant file, ``{folder}`` and ``{port}`` to be filled in.
+
+    Parameters
+    ----------
+    silence
+        Poll periods after which it is told at the latest that nothing comes.
+    """
+
+    source: str
+    poll_s: float = POLL_S
+    silence: float = NOTICE_LIMIT
+
+
+SERIAL = 'baudrate = 460800\nparity = "none"\ntimeout_s = 0.1\n'
+RTU = 'kind = "modbus_ring"\ndevice = "{folder}/line"\n' + SERIAL
+FIFO = 'kind = "modbus_fifo"\nhost = "127.0.0.1"\nport = {port}\naddresses = [1000]\n'
+CAN = 'kind = "can"\ninterface = "slcan"\nchannel = "{folder}/can"\nprofile = "padwatch_int16"\n'
+WIRES = {
+    "ring, TCP": Wire('kind = "modbus_ring"\nhost = "127.0.0.1"\nport = {port}\n'),
+    "ring, RTU": Wire(RTU),
+    "queue, TCP": Wire(FIFO),
+    "CAN": Wire(CAN + "stale_after_s = 1.0\n", poll_s=0.5),
+    "CAN FD": Wire(CAN + "fd = true\nstale_after_s = 1.0\n", poll_s=0.5),
+}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cycles", type=int, default=20)
     parser.add_argument("--devices", type=int, default=100)
+    parser.add_argument("--wires", nargs="*", choices=list(WIRES), default=list(WIRES))
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        single = silences(Path(folder), options.cycles)
-        many = vanish_together(Path(folder), options.devices)
-    print(f"{'in poll periods of ' + str(POLL_S) + ' s':<44}{'median':>8}{'worst':>8}{'limit':>8}")
-    rows = (
-        ("silent DAQ noticed", single["noticed"], NOTICE_LIMIT),
-        ("first good sample after it answers again", single["back"], RETURN_LIMIT),
-    )
-    for words, values, limit in rows:
-        print(f"{words:<44}{statistics.median(values):>8.2f}{max(values):>8.2f}{limit:>8.1f}")
-    print(f"{options.devices} devices that return together, last one back after {many:.2f} periods")
+    rows = []
+    print(f"{'in poll periods':<50}{'median':>8}{'worst':>8}{'limit':>8}")
+    for name in options.wires:
+        with tempfile.TemporaryDirectory() as folder:
+            found = silences(Path(folder), options.cycles, WIRES[name])
+        rows.append((f"{name}: silence noticed", found["noticed"], WIRES[name].silence))
+        rows.append((f"{name}: first good sample after", found["back"], RETURN_LIMIT))
+        for words, values, limit in rows[-2:]:
+            print(f"{words:<50}{statistics.median(values):>8.2f}{max(values):>8.2f}{limit:>8.1f}")
+    if options.devices:
+        with tempfile.TemporaryDirectory() as folder:
+            many = vanish_together(Path(folder), options.devices)
+        print(f"{options.devices} devices return together, the last after {many:.2f} periods")
     sys.exit(any(max(values) > limit for _, values, limit in rows))
 
 
-def silences(folder: Path, n_cycles: int) -> dict[str, list[float]]:
+def on(wire: Wire, folder: Path, port: int = 0) -> str:
+    """A plant of one unit behind a wire."""
+    source = wire.source.format(folder=folder, port=port)
+    return re.sub(
+        r'kind = "modbus_ring"\n.*?\n\n', source + "\n", plant_file(1, folder / "data"), flags=re.S
+    )
+
+
+def silences(folder: Path, n_cycles: int, wire: Wire) -> dict[str, list[float]]:
     """Let one DAQ fall silent and answer again, many times."""
     plant = folder / "one.toml"
-    plant.write_text(plant_file(1, folder / "one"), encoding="utf-8")
+    plant.write_text(on(wire, folder), encoding="utf-8")
     found: dict[str, list[float]] = {"noticed": [], "back": []}
     with padwatch("daq", str(plant)) as (process, line):
-        port = int(line.partition('"port": ')[2].rstrip("}\n "))
-        plant.write_text(plant_file(1, folder / "one", {"U1": port}), encoding="utf-8")
+        port = re.search(r'"port": (\d+)', line)
+        plant.write_text(on(wire, folder, int(port[1]) if port else 0), encoding="utf-8")
         with padwatch("run", str(plant), "--port", "0") as (_, said):
             units = said.split()[-1] + "api/v1/units"
             until(units, "connected")
             for _ in range(n_cycles):
                 time.sleep(1.0)
-                found["noticed"].append(
-                    after_signal(process, signal.SIGSTOP, units, "not_connected")
-                )
-                time.sleep(1.0)
-                found["back"].append(after_signal(process, signal.SIGCONT, units, "connected"))
+                for key, number, state in (
+                    ("noticed", signal.SIGSTOP, "not_connected"),
+                    ("back", signal.SIGCONT, "connected"),
+                ):
+                    took_s = after_signal(process, number, units, state)
+                    found[key].append(took_s / wire.poll_s)
+                    time.sleep(random.uniform(1.0, 2.0))  # noqa: S311
     return found
 
 
 def after_signal(process: subprocess.Popen[str], number: int, units: str, state: str) -> float:
-    """Poll periods from a signal to the DAQ until all units are in this state."""
+    """Seconds from a signal to the DAQ until all units are in this state."""
     process.send_signal(number)
     started = time.monotonic()
     until(units, state)
-    return (time.monotonic() - started) / POLL_S
+    return time.monotonic() - started
 
 
 def until(units: str, state: str) -> None:

@@ -23,7 +23,7 @@ class DeviceClock:
         way; None if the device does not stamp.
     drift_ppm
         How much faster than nominal the device samples by the host's clock, in parts per million;
-        None until there is enough to tell.
+        None until there is enough to tell, and where the host says when to sample.
     u_drift_ppm
         Its standard uncertainty.
     n_faults

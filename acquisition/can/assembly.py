@@ -60,25 +60,33 @@ class Assembler:
             return "more frames come than rate_hz says; do two devices send the same ids?"
         return ""
 
-    def take(self, frames: Iterable[Frame], arrived_ns: int) -> list[RawBlock]:
+    def take(
+        self, frames: Iterable[Frame], arrived_ns: int, steady_ns: int | None = None
+    ) -> list[RawBlock]:
         """Take the frames of a batch; return the blocks that this completes, in order.
 
         Parameters
         ----------
         arrived_ns
-            By the host's clock, when the last of them had arrived.
+            By the host's clock, when the last of them had arrived; stamps are made of it.
+        steady_ns
+            The same by a clock that is never set: it tells what is lost and what is a restart.
+            None where there is no other, as in a log.
         """
+        passed_ns = arrived_ns if steady_ns is None else steady_ns
         blocks: list[RawBlock] = []
         for key, data in frames:
             try:
-                blocks += self._take(key, data, arrived_ns)
+                blocks += self._take(key, data, arrived_ns, passed_ns)
             except FrameError:
                 self.refused[Refusal.UNDECODABLE] += 1
         if not self._plan.counted:
-            self._ready = self._uncounted.confirmed(arrived_ns)
+            self._ready = self._uncounted.confirmed(passed_ns)
         return blocks + self._built(arrived_ns)
 
-    def _take(self, key: int, data: bytes | None, arrived_ns: int) -> list[RawBlock]:
+    def _take(
+        self, key: int, data: bytes | None, arrived_ns: int, passed_ns: int
+    ) -> list[RawBlock]:
         message = self._plan.messages[key]
         if data is None:
             if message.multiplexer is None:
@@ -89,16 +97,18 @@ class Assembler:
             return []
         part = message.parts[number]
         if part.counter is not None:
-            return self._take_counted(part, data, arrived_ns)
+            return self._take_counted(part, data, arrived_ns, passed_ns)
         self._note_now(part, data)
         if part.wave is not None:
             self._uncounted.put(part.wave, data)
         return []
 
-    def _take_counted(self, part: Part, data: bytes, arrived_ns: int) -> list[RawBlock]:
+    def _take_counted(
+        self, part: Part, data: bytes, arrived_ns: int, passed_ns: int
+    ) -> list[RawBlock]:
         if part.counter is None:
             return []
-        placed = self._counted.take(part, part.counter, data, arrived_ns)
+        placed = self._counted.take(part, part.counter, data, passed_ns)
         blocks = self._after_restart(self._counted.epoch, arrived_ns) if placed else []
         for frame in placed:
             self._note(frame)

@@ -32,7 +32,7 @@ class Mark:
     counter
         In samples, from 0 to ``modulus``.
     arrived_ns
-        By the host's clock.
+        By a clock of the host that is never set.
     """
 
     counter: int

@@ -20,6 +20,7 @@ from acquisition.delivery import Delivery
 from acquisition.errors import LinkError
 from acquisition.raw import RawBlock
 from core.blocks import SampleBlock
+from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 """Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
@@ -111,10 +112,12 @@ class CanSource:
             if batch:
                 if batch.stamp_fault:
                     self._delivery.note_fault(batch.stamp_fault)
-                raw_blocks = self._assembler.take(batch.frames, batch.arrived.host_ns)
+                arrived = batch.arrived
+                steady_ns = ns_from_s(arrived.steady_s)
+                raw_blocks = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
                 if self._assembler.trouble:
                     raw_blocks = []
-                for block in self._delivery.take_together(raw_blocks, batch.arrived):
+                for block in self._delivery.take_together(raw_blocks, arrived):
                     yield block
             if raw_blocks:
                 fresh_at_s = self._clock.monotonic_s()

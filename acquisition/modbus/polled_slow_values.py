@@ -1,6 +1,7 @@
 """`PolledSlowValues`: slow values of one device, polled beside another device's waveforms."""
 
 import asyncio
+import random
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 
@@ -23,8 +24,8 @@ _CONFIG_RETRY_S = 15.0
 class PolledSlowValues:
     """The newest slow values of a device.
 
-    Other than a source it tries a lost link again by itself, once a poll period: the unit goes on
-    without it, so that nobody else would.
+    Other than a source it tries a lost link again by itself, about once a poll period: the unit
+    goes on without it, so that nobody else would.
 
     Parameters
     ----------
@@ -64,8 +65,7 @@ class PolledSlowValues:
 
     @asynccontextmanager
     async def watch(self) -> AsyncIterator[None]:
-        """Poll in the background until the context is left; the first poll is waited for."""
-        self._asked.clear()
+        """Poll in the background until the context is left; the very first poll is waited for."""
         self._task = task = asyncio.create_task(self._run(), name="poll slow values")
         try:
             await self._asked.wait()
@@ -100,9 +100,12 @@ class PolledSlowValues:
                 await self._poll()
             except AcquisitionError as error:
                 self.trouble = str(error)
-                wait_s = max(self._settings.poll_period_s, _MIN_RETRY_S)
-                is_config = isinstance(error, ConfigError)
-                await self._clock.sleep(max(wait_s, _CONFIG_RETRY_S) if is_config else wait_s)
+                await self._clock.sleep(self._retry_s(error))
+
+    def _retry_s(self, error: AcquisitionError) -> float:
+        least_s = _CONFIG_RETRY_S if isinstance(error, ConfigError) else _MIN_RETRY_S
+        # devices that vanish together must not be called back together
+        return max(self._settings.poll_period_s, least_s) * random.uniform(1.0, 1.5)  # noqa: S311
 
     async def _poll(self) -> None:
         """Open the link and poll until something goes wrong."""

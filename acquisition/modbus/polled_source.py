@@ -114,7 +114,7 @@ class PolledSource:
         self._stamped = (
             time is not None and settings.poll_period_s >= _LEAST_STAMP_STEPS * time.resolution_s
         )
-        self._delivery = Delivery(calibration, stamped=self._stamped)
+        self._delivery = Delivery(calibration, stamped=self._stamped, samples_when_asked=True)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:

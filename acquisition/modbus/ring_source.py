@@ -13,6 +13,7 @@ from acquisition.modbus.follower import RingFollower
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.profile import HEADER_REGISTERS
 from acquisition.modbus.replies import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
+from acquisition.modbus.ring_pace import out_of_step_s
 from acquisition.modbus.ring_reader import RingReader
 from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
 from core.blocks import SampleBlock
@@ -32,7 +33,7 @@ class ModbusRingSettings(LinkSettings):
     base_address
         Register address of the header, counted from 0.
     poll_period_s
-        Time between polls, above 0; the ring must hold much more than that.
+        Longest time between polls, above 0; the ring must hold much more than that.
     stale_after_s
         A device without a usable new sample for longer than this is not connected; above 0.
     """
@@ -76,6 +77,7 @@ class ModbusRingSource:
         )
         self._fresh_at_s = 0.0
         self._stale_after_s = settings.stale_after_s
+        self._slot_s = 0.0
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
@@ -104,15 +106,15 @@ class ModbusRingSource:
 
     async def _identify(self, reader: RingReader) -> None:
         header = await self._follower.header(reader)
-        self._stale_after_s = max(
-            self._settings.stale_after_s, _MIN_STALE_SLOTS * header.layout.slot_duration_s
-        )
+        self._slot_s = header.layout.slot_duration_s
+        self._stale_after_s = max(self._settings.stale_after_s, _MIN_STALE_SLOTS * self._slot_s)
         if self._follower.newest == (header.epoch, header.newest):
             self._require_fresh()
         else:
             self._fresh_at_s = self._clock.monotonic_s()
 
     async def _blocks(self, reader: RingReader) -> AsyncGenerator[SampleBlock, None]:
+        period_s = out_of_step_s(self._settings.poll_period_s, self._slot_s)
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
@@ -126,7 +128,7 @@ class ModbusRingSource:
                 self._fresh_at_s = self._clock.monotonic_s()
             else:
                 self._require_fresh()
-            due_s = await self._wait(due_s + self._settings.poll_period_s)
+            due_s = await self._wait(due_s + period_s)
 
     async def _wait(self, due_s: float) -> float:
         """Wait for the next poll; polls that are overdue are left out, never piled up."""

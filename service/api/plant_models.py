@@ -15,7 +15,7 @@ class DeviceClockModel(ApiModel):
 
     drift_ppm: float | None
     """How much faster than nominal the device samples, by the host's clock, in parts per million;
-    null during the first minute."""
+    null during the first minute, and of a device that samples when it is asked."""
 
     drift_uncertainty_ppm: float | None
     """Standard uncertainty of the drift."""

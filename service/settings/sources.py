@@ -27,7 +27,8 @@ class ModbusRingSettings(ModbusLinkSettings):
     """Function code that reads the registers: 3 (holding) or 4 (input)."""
 
     poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.25
-    """Time between looks at the ring in seconds; the ring must hold several of them."""
+    """Longest time between looks at the ring in seconds; the ring must hold several of them. It is
+    looked at a little sooner, out of step with its slots, which shows how fast the DAQ samples."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
     """A DAQ whose newest slot stands still for this long counts as not connected."""

@@ -32,8 +32,10 @@ from service.wiring.registers import (
 from service.wiring.simulations import simulated_feed
 
 DEFAULT_RETRY_S = 0.5
-"""Of sources that are not polled, and of queues: those are asked again within milliseconds, and to
-connect as often to a device that is away would leave no turn to others."""
+"""Of sources that are not polled."""
+
+LEAST_RETRY_S = 0.25
+"""A queue is looked at 200 times a second; its device, when it is away, is not to be called so."""
 
 
 def watched_units(
@@ -41,7 +43,7 @@ def watched_units(
 ) -> dict[str, WatchedUnit]:
     """Source and monitor of every unit of a plant."""
     return {
-        unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), poll_period_s(unit))
+        unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
         for unit in plant.unit
     }
 
@@ -72,12 +74,10 @@ def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
     }
 
 
-def poll_period_s(unit: UnitSettings) -> float:
-    """How often a unit's source is looked at; a lost link is tried again as often."""
-    if isinstance(unit.source, modbus_sources.ModbusFifoSettings):
-        return DEFAULT_RETRY_S
+def retry_s(unit: UnitSettings) -> float:
+    """How soon a unit's lost link is tried again: as often as it is looked at, but no storm."""
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
-    return period_s
+    return max(period_s, LEAST_RETRY_S)
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:

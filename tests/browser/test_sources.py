@@ -66,7 +66,11 @@ async def test_where_no_device_answers_the_page_says_so_and_what_to_do(
 async def test_the_worst_about_a_source_is_told_with_what_to_do(running_plant, page) -> None:
     silent = {"state": "not_connected", "reason": "daq:502: no answer within 0.5 s"}
     other = {"state": "not_connected", "reason": "daq:502: its vendor is 'A', expected is 'B'"}
+    nameless = {"state": "not_connected", "reason": "daq:502: no name server answers within 1.0 s"}
+    unknown = "daq:502: [Errno -3] Temporary failure in name resolution"
     cases = [
+        (nameless, [], 0, 0, "bad", "name of the device"),
+        (nameless | {"reason": unknown}, [], 0, 0, "bad", "name of the device"),
         (silent, [], 0, 0, "bad", "switched on"),
         (other, [], 0, 0, "bad", "Another device"),
         ({"data_age_s": 12.0}, [DRIFT], 0, 1, "bad", "still samples"),

@@ -76,6 +76,45 @@ async def test_what_passed_while_nobody_was_connected_is_an_exact_jump_of_the_in
     assert_samples_are_their_own_numbers(after)
 
 
+def gaps_between(blocks: list[SampleBlock]) -> dict[int, int]:
+    """First sample and length of each gap."""
+    for block in blocks:
+        assert_samples_are_their_own_numbers(block)
+        assert block.epoch == blocks[0].epoch
+        assert block.rejected == ()
+    return {
+        before.stop_index: after.first_index - before.stop_index
+        for before, after in itertools.pairwise(blocks)
+        if after.first_index != before.stop_index
+    }
+
+
+async def test_a_loss_in_the_middle_of_a_stream_is_an_exact_gap(lossy_rig):
+    rig = lossy_rig
+    async with rig.source.connect() as stream:
+        rig.run(rig.step_samples)
+        blocks = [await anext(stream)]
+        for first, n_lost in rig.losses.items():
+            while blocks[-1].stop_index < first:
+                rig.run(rig.step_samples)
+                blocks += await blocks_up_to(stream, blocks[-1].stop_index + rig.step_samples)
+            rig.run(n_lost + 4 * rig.step_samples)
+            blocks += await blocks_up_to(stream, first + n_lost + 2 * rig.step_samples)
+    assert gaps_between(blocks) == rig.losses
+
+
+async def test_polls_that_could_not_be_made_in_time_are_an_exact_gap(polled_rig):
+    rig, missed = polled_rig, {}
+    async with rig.source.connect() as stream:
+        blocks = [await anext(stream)]
+        for n_lost in rig.losses.values():
+            blocks += await blocks_up_to(stream, blocks[-1].stop_index + 20)
+            missed[blocks[-1].stop_index] = n_lost
+            rig.stall(n_lost + 1)
+            blocks += await blocks_up_to(stream, blocks[-1].stop_index + n_lost + 20)
+    assert gaps_between(blocks) == missed
+
+
 async def test_a_stream_that_was_left_has_ended_and_may_be_closed_again(rig):
     async with rig.source.connect() as stream:
         rig.run(rig.step_samples)

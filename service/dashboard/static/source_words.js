@@ -28,7 +28,7 @@ const LINK_ADVICE = [
   [/unreachable|no route/i, "The network has no way there: look at switch, cable and IP address."],
   [/no connection within|no answer|timed? ?out|did not answer/i, "Nothing answers: is the DAQ switched on, its cable in, its address right?"],
   [/closed the connection|reset by/i, "The device ended the connection: it may be restarting, or serve another client."],
-  [/name or service|resolve|getaddrinfo/i, "The name of the device is not known: mend host in the plant file, or the name server."],
+  [/name or service|name server|name resolution|hostname|resolve|getaddrinfo/i, "The name of the device is not known: mend host in the plant file, or the name server."],
   [/no such file|permission|could not open/i, "The serial port is not there or not allowed: look at the adapter and at its rights."],
 ];
 

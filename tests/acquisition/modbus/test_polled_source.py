@@ -113,6 +113,13 @@ async def test_a_device_whose_clock_has_failed_is_not_said_to_be_in_step(plant) 
     assert blocks[-1].clock.offset_s is None
 
 
+async def test_a_device_that_samples_when_it_is_asked_has_no_drift(plant) -> None:
+    async with plant() as (source, *_):
+        blocks = await take(source, 120)
+
+    assert {block.clock.drift_ppm for block in blocks} == {None}
+
+
 async def test_another_device_at_the_same_address_is_refused(plant) -> None:
     registers = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))
     other = map_of(signature=(Signature(cell=Cell(address=1), expected=43.0),))

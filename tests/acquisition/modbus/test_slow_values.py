@@ -11,7 +11,7 @@ from acquisition.calibration import SlowCalibration, UnitCalibration
 from acquisition.clock import SystemClock
 from acquisition.daq.map_device import MapDevice
 from acquisition.daq.tcp_server import ModbusTcpServer
-from acquisition.errors import ConfigError
+from acquisition.errors import ConfigError, LinkError
 from acquisition.joined_source import JoinedSource, only_slow, without_slow
 from acquisition.modbus.polled_slow_values import PolledSlowValues
 from acquisition.modbus.polled_source import PolledSettings
@@ -122,6 +122,35 @@ async def test_a_device_that_was_never_there_costs_no_waveform(plant) -> None:
 
     assert block.channel_quality == (GOOD,)
     assert block.slow["oil"].quality.reason is Reason.NOT_CONNECTED
+
+
+async def test_a_device_that_does_not_answer_does_not_hold_up_waveforms_that_are_back(
+    plant,
+) -> None:
+    async with plant(timeout_s=3600.0) as (source, _, _, _, server):
+        async with source.connect() as stream:
+            await anext(stream)
+        server.inject("silent", 100)
+        async with asyncio.timeout(10.0), source.connect() as stream:
+            block = await anext(stream)
+
+    assert block.slow["oil"] == Reading(45.0)  # not yet too old
+
+
+async def test_while_there_are_no_waveforms_the_other_device_is_left_alone(plant) -> None:
+    class Away:
+        @asynccontextmanager
+        async def connect(self):
+            raise LinkError("10.0.0.7:502: Connection refused")
+            yield
+
+    async with plant() as (_, slow, _, _, server):
+        source = JoinedSource(Away(), slow)
+        for _ in range(5):
+            with pytest.raises(LinkError):
+                async with source.connect():
+                    pass
+        assert not server.function_codes
 
 
 async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, stepped_clock) -> None:

@@ -142,6 +142,10 @@ class _PolledRig(Rig):
         if not self.source.n_connected:
             self._clock.step(n_samples / self._calibration.rate_hz)
 
+    def stall(self, n_polls: int) -> None:
+        """Let so many polls come due while the reader is busy with something else."""
+        self._clock.step(n_polls / self._calibration.rate_hz)
+
 
 class _Counted:
     """Knows whether anybody is connected."""

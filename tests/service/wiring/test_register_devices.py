@@ -34,7 +34,6 @@ from service.wiring.registers import (
     vector_source,
 )
 from service.wiring.simulations import simulated_feed
-from service.wiring.sources import DEFAULT_RETRY_S, poll_period_s
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 N_SEGMENTS = 6
@@ -146,14 +145,6 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
     assert block.n_samples == settings.block_samples
     probe = block.samples[[c.id for c in unit.channels].index("ujb_shaft_x")]
     assert 1000.0 < probe.mean() < 3000.0
-
-
-def test_a_queue_that_is_away_is_not_called_each_time_that_it_would_be_read(settings) -> None:
-    queue = ModbusFifoSettings(kind="modbus_fifo", host="192.0.2.1", addresses=(7,))
-    assert queue.poll_period_s < 0.01
-
-    assert poll_period_s(settings.model_copy(update={"source": queue})) == DEFAULT_RETRY_S
-    assert poll_period_s(settings) == settings.source.poll_period_s
 
 
 @pytest.mark.parametrize("use", ConnectionUse)

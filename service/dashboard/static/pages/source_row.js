@@ -11,6 +11,9 @@ export const HEADS = ["Unit", "State", "For", "Data age", "Received", "Missing",
 
 const DASH = "—";
 
+/** Kinds whose samples are taken when padwatch asks: they have no rate that could drift. */
+const SAMPLED_WHEN_ASKED = ["modbus_polled", "modbus_vector"];
+
 /** Returns `{ nodes, draw(found) }`. */
 export function sourceRow({ source: { unit }, name }) {
   const state = mark();
@@ -76,7 +79,7 @@ function factsOf(source, settings) {
     ["Rejected", reasonsWords(source.rejected) || "None"],
     ["Sent twice, dropped", formatCount(source.n_repeated)],
     ["Restarts of the device", formatCount(source.n_restarts)],
-    ["Clock drift", driftWords(source.clock)],
+    ["Clock drift", driftWords(source)],
     ["Wrong time stamps", source.clock ? formatCount(source.clock.n_stamp_faults) : DASH],
     ["Kind", sourceKindWords(source.kind)],
     ["Sampling", `${formatFixed(source.rate_hz, source.rate_hz % 1 ? 2 : 0)} per second and channel`],
@@ -95,7 +98,8 @@ function pollWords({ polls, poll_period_s: period }) {
 
 const durationWords = (seconds) => (seconds < 1 ? `${formatFixed(1000 * seconds, 0)} ms` : `${formatFixed(seconds, 1)} s`);
 
-function driftWords(clock) {
+function driftWords({ clock, kind }) {
+  if (SAMPLED_WHEN_ASKED.includes(kind)) return "None: it is sampled when it is asked";
   if (!clock || clock.drift_ppm === null) return "Not known yet";
   const sign = clock.drift_ppm < 0 ? "−" : "+";
   return `${sign}${Math.abs(clock.drift_ppm).toFixed(1)} ± ${(1.96 * clock.drift_uncertainty_ppm).toFixed(1)} ppm`;
