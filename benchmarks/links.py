@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,25 +35,34 @@ class Wire:
 
     Parameters
     ----------
-    silence
-        Poll periods after which it is told at the latest that nothing comes.
+    value
+        What the register map says of each channel; None if there is no map.
     """
 
     source: str
     poll_s: float = POLL_S
-    silence: float = NOTICE_LIMIT
+    value: str | None = None
 
 
 SERIAL = 'baudrate = 460800\nparity = "none"\ntimeout_s = 0.1\n'
 RTU = 'kind = "modbus_ring"\ndevice = "{folder}/line"\n' + SERIAL
-FIFO = 'kind = "modbus_fifo"\nhost = "127.0.0.1"\nport = {port}\naddresses = [1000]\n'
-CAN = 'kind = "can"\ninterface = "slcan"\nchannel = "{folder}/can"\nprofile = "padwatch_int16"\n'
+TCP = 'host = "127.0.0.1"\nport = {port}\n'
+FIFO = 'kind = "modbus_fifo"\naddresses = [1000]\n' + TCP
+POLLED = 'kind = "modbus_polled"\npoll_period_s = 0.1\ntimeout_s = 0.15\n' + TCP
+RACK = 'kind = "modbus_vector"\npoll_period_s = 1.0\n' + TCP
+VECTOR = 'quantity = "order1_amplitude"\ndetector = "pp"\n'
+CAN = 'kind = "can"\ninterface = "slcan"\nprofile = "padwatch_int16"\n'
+CAN_TCP = CAN + 'channel = "socket://127.0.0.1:{port}"\n'
+CAN_LINE = CAN + 'channel = "{folder}/can"\noptions = {{ sleep_after_open = 0.0 }}\n'
 WIRES = {
-    "ring, TCP": Wire('kind = "modbus_ring"\nhost = "127.0.0.1"\nport = {port}\n'),
+    "ring, TCP": Wire('kind = "modbus_ring"\n' + TCP),
     "ring, RTU": Wire(RTU),
     "queue, TCP": Wire(FIFO),
-    "CAN": Wire(CAN + "stale_after_s = 1.0\n", poll_s=0.5),
-    "CAN FD": Wire(CAN + "fd = true\nstale_after_s = 1.0\n", poll_s=0.5),
+    "registers, TCP": Wire(POLLED, poll_s=0.1, value=""),
+    "rack, TCP": Wire(RACK, poll_s=1.0, value=VECTOR),
+    "CAN, TCP": Wire(CAN_TCP, poll_s=0.5),
+    "CAN FD, TCP": Wire(CAN_TCP + "fd = true\n", poll_s=0.5),
+    "CAN, line": Wire(CAN_LINE, poll_s=0.5),
 }
 
 
@@ -67,7 +77,7 @@ def main() -> None:
     for name in options.wires:
         with tempfile.TemporaryDirectory() as folder:
             found = silences(Path(folder), options.cycles, WIRES[name])
-        rows.append((f"{name}: silence noticed", found["noticed"], WIRES[name].silence))
+        rows.append((f"{name}: silence noticed", found["noticed"], NOTICE_LIMIT))
         rows.append((f"{name}: first good sample after", found["back"], RETURN_LIMIT))
         for words, values, limit in rows[-2:]:
             print(f"{words:<50}{statistics.median(values):>8.2f}{max(values):>8.2f}{limit:>8.1f}")
@@ -81,8 +91,21 @@ def main() -> None:
 def on(wire: Wire, folder: Path, port: int = 0) -> str:
     """A plant of one unit behind a wire."""
     source = wire.source.format(folder=folder, port=port)
-    return re.sub(
-        r'kind = "modbus_ring"\n.*?\n\n', source + "\n", plant_file(1, folder / "data"), flags=re.S
+    plant = plant_file(1, folder / "data")
+    if wire.value is not None:
+        source += register_map(plant, wire.value)
+        plant = f"[analysis]\nmax_frequency_hz = 4.0\n{plant}"
+    return re.sub(r'kind = "modbus_ring"\n.*?\n\n', source + "\n", plant, flags=re.S)
+
+
+def register_map(plant: str, value: str) -> str:
+    """A map of floats for everything that the unit of a plant file has."""
+    found = tomllib.loads(plant)["unit"][0]
+    lines = [f'channel = "{channel["id"]}"\n{value}' for channel in found["channel"]]
+    lines += [f'channel = "{slow["id"]}"\n' for slow in found["slow_channel"]]
+    return "".join(
+        f'[[unit.source.map.value]]\n{line}address = {100 + 2 * n}\ntype = "float32"\n'
+        for n, line in enumerate(lines)
     )
 
 
@@ -92,8 +115,8 @@ def silences(folder: Path, n_cycles: int, wire: Wire) -> dict[str, list[float]]:
     plant.write_text(on(wire, folder), encoding="utf-8")
     found: dict[str, list[float]] = {"noticed": [], "back": []}
     with padwatch("daq", str(plant)) as (process, line):
-        port = re.search(r'"port": (\d+)', line)
-        plant.write_text(on(wire, folder, int(port[1]) if port else 0), encoding="utf-8")
+        port = re.search(r'"port": (\d+)|socket://[^:]+:(\d+)', line)
+        plant.write_text(on(wire, folder, int(port[1] or port[2]) if port else 0), encoding="utf-8")
         with padwatch("run", str(plant), "--port", "0") as (_, said):
             units = said.split()[-1] + "api/v1/units"
             until(units, "connected")

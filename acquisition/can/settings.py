@@ -116,7 +116,7 @@ class CanSettings:
     microseconds: str | None = None
     hold_samples: int | str = 50
     hold_s: float = 5.0
-    stale_after_s: float = 3.0
+    stale_after_s: float = 1.0
     stamps: Literal["host", "interface"] = "host"
     queue_frames: int = 65536
     when_full: Literal["drop", "wait"] = "drop"

@@ -27,6 +27,9 @@ BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 
 _LOOK_S = 0.2
 
+_MIN_STALE_INSTANTS = 3
+"""So many sample instants make the least silence that means something."""
+
 
 class CanSource:
     """Samples of one unit from CAN frames; remembers where it stood when connected again.
@@ -55,6 +58,8 @@ class CanSource:
         self._clock = clock
         self._opener = opener
         self._plan = compile_plan(settings, calibration)
+        instant_s = self._plan.samples_per_frame / calibration.rate_hz
+        self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
         self._delivery = Delivery(calibration, stamped=SECONDS in self._plan.quantities)
         self._assembler = Assembler(
             self._plan,
@@ -105,9 +110,11 @@ class CanSource:
         )
 
     async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
-        fresh_at_s = self._clock.monotonic_s()
+        look_s = min(_LOOK_S, self._stale_after_s)
+        silent_s = 0.0
         while True:
-            batch = await reader.next_batch(min(_LOOK_S, self._settings.stale_after_s))
+            looked_s = self._clock.monotonic_s()
+            batch = await reader.next_batch(look_s)
             raw_blocks: list[RawBlock] = []
             if batch:
                 if batch.stamp_fault:
@@ -120,14 +127,15 @@ class CanSource:
                 for block in self._delivery.take_together(raw_blocks, arrived):
                     yield block
             if raw_blocks:
-                fresh_at_s = self._clock.monotonic_s()
+                silent_s = 0.0
             else:
-                self._require_fresh(fresh_at_s)
+                # a process that stood still has not listened for all that time
+                silent_s += min(self._clock.monotonic_s() - looked_s, 2 * look_s)
+                self._require_fresh(silent_s)
             await asyncio.sleep(0)
 
-    def _require_fresh(self, fresh_at_s: float) -> None:
-        silent_s = self._clock.monotonic_s() - fresh_at_s
-        if silent_s > self._settings.stale_after_s:
+    def _require_fresh(self, silent_s: float) -> None:
+        if silent_s > self._stale_after_s:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
             trouble = self._assembler.trouble
             raise LinkError(

@@ -107,8 +107,9 @@ class CanSettings(Settings):
     hold_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 5.0
     """For how many seconds a message without waveforms and without counter is valid."""
 
-    stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
-    """A bus without a complete new sample for this long counts as not connected."""
+    stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 1.0
+    """A bus without a complete new sample for this long counts as not connected; at least the time
+    of three samples, or of three frames that have several."""
 
     stamps: Literal["host", "interface"] = "host"
     """What tells when frames came: the "host", which reads them, or the clock of the "interface",

@@ -34,7 +34,7 @@ from service.wiring.simulations import simulated_feed
 DEFAULT_RETRY_S = 0.5
 """Of sources that are not polled."""
 
-LEAST_RETRY_S = 0.25
+QUEUE_RETRY_S = 0.25
 """A queue is looked at 200 times a second; its device, when it is away, is not to be called so."""
 
 
@@ -76,8 +76,10 @@ def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
 
 def retry_s(unit: UnitSettings) -> float:
     """How soon a unit's lost link is tried again: as often as it is looked at, but no storm."""
+    if isinstance(unit.source, modbus_sources.ModbusFifoSettings):
+        return QUEUE_RETRY_S
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
-    return max(period_s, LEAST_RETRY_S)
+    return period_s
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:

@@ -8,8 +8,18 @@ import numpy as np
 import pytest
 from rigs.fake_bus import VIRTUAL, can_threads, send_block
 
+from acquisition.clock import SystemClock
 from acquisition.daq.can_device import CanDevice
 from acquisition.errors import LinkError
+
+
+class HeldClock(SystemClock):
+    """Of a host on which nothing ran for a while."""
+
+    held_s = 0.0
+
+    def monotonic_s(self) -> float:
+        return super().monotonic_s() + self.held_s
 
 
 async def test_now_and_then_a_message_that_cannot_be_read_is_counted(
@@ -89,6 +99,23 @@ async def test_silence_is_a_lost_link_after_the_stale_time(shape, fake_bus, sour
     async with source.connect() as stream:
         with pytest.raises(LinkError, match="no complete sample for 0"):
             await anext(stream)
+
+
+async def test_a_host_that_stood_still_takes_its_own_silence_for_no_silence_of_the_bus(
+    shape, fake_bus, source_of, device
+):
+    clock = HeldClock()
+    source = source_of(shape, VIRTUAL, opener=lambda *_: fake_bus, clock=clock, stale_after_s=1.0)
+    async with source.connect() as stream:
+        send_block(device, fake_bus)
+        await anext(stream)
+        following = asyncio.ensure_future(anext(stream))
+        await asyncio.sleep(0)
+        clock.held_s = 60.0
+        await asyncio.wait([following], timeout=0.5)
+        assert not following.done()
+        send_block(device, fake_bus)
+        await following
 
 
 async def test_a_source_that_is_cancelled_while_opening_leaves_no_thread(
