@@ -116,32 +116,49 @@ class FifoSource:
         if not self._layout.removes:
             return
         if uncounted or self._counted.is_ambiguous(self._clock.monotonic_s()):
-            deadline_s = self._clock.monotonic_s() + self._settings.stale_after_s
+            begun_s = self._clock.monotonic_s()
             while not self._is_drained(await self._read(link)):
-                self._require_in_time(deadline_s)
+                self._require_in_time(self._clock.monotonic_s() - begun_s)
 
     async def _blocks(self, link: ModbusLink) -> AsyncGenerator[SampleBlock, None]:
         waiting: list[PlacedSamples] = []
-        deadline_s = self._clock.monotonic_s() + self._settings.stale_after_s
+        arrived = Arrival.now(self._clock)
+        reading_s = 0.0
         while True:
-            with wrong_replies_drop_the_link():
-                pieces = await self._read(link)
-                arrived = Arrival.now(self._clock)
-                now_s = arrived.steady_s
-                waiting += self._place(pieces, now_s)
+            begun_s = self._clock.monotonic_s()
+            try:
+                with wrong_replies_drop_the_link():
+                    pieces = await self._read(link)
+                    arrived = Arrival.now(self._clock)
+                    waiting += self._place(pieces, arrived.steady_s)
+            except LinkError:
+                for block in self._saved(waiting, arrived):
+                    yield block
+                raise
             if not self._is_drained(pieces):
-                self._require_in_time(deadline_s)
+                reading_s += arrived.steady_s - begun_s
+                self._require_in_time(reading_s)
                 continue
-            deadline_s = now_s + self._settings.stale_after_s
-            if not self._layout.has_counter and self._uncounted.has_lost(now_s):
+            reading_s = 0.0
+            if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
                 waiting.clear()  # nobody knows where among these the loss is
                 self._uncounted.begin()
-            raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
-            waiting.clear()
-            for block in self._delivery.take_together(raw_blocks, arrived):
+            for block in self._delivered(waiting, arrived):
                 yield block
-            self._freshness.note(repr(self._newest).encode(), now_s)
+            waiting.clear()
+            self._freshness.note(repr(self._newest).encode(), arrived.steady_s)
             await self._clock.sleep(self._settings.poll_period_s)
+
+    def _saved(self, waiting: list[PlacedSamples], arrived: Arrival) -> list[SampleBlock]:
+        """What a lost link leaves: the queue has given it away, and will not give it again.
+
+        Of samples that are not counted nobody knows whether any are missing among them.
+        """
+        return self._delivered(waiting, arrived) if self._layout.has_counter else []
+
+    def _delivered(self, waiting: list[PlacedSamples], arrived: Arrival) -> list[SampleBlock]:
+        raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
+        return self._delivery.take_together(raw_blocks, arrived)
 
     async def _read(self, link: ModbusLink) -> list[FifoPiece]:
         return [
@@ -159,8 +176,8 @@ class FifoSource:
         full = any(piece.n_samples >= self._layout.most_samples for piece in pieces)
         return not self._layout.removes or not full
 
-    def _require_in_time(self, deadline_s: float) -> None:
-        if self._clock.monotonic_s() > deadline_s:
+    def _require_in_time(self, reading_s: float) -> None:
+        if reading_s > self._settings.stale_after_s:
             raise LinkError(
                 f"{self._settings.transport}: the queue has not run empty for"
                 f" {self._settings.stale_after_s:g} s: the link is too slow for"
