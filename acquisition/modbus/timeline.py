@@ -12,6 +12,11 @@ _DRIFT = 1e-3
 """A device's clock may be corrected by a second and run a permille wrong; the index is exact."""
 
 
+_MAX_MISCOUNTED = 8
+"""Slots in a row of which only the sequence number may be wrong; a device that counts otherwise for
+longer has been reset."""
+
+
 class Refusal(StrEnum):
     """Why the samples of a slot are not used; the names become counters."""
 
@@ -32,8 +37,9 @@ class Timeline:
 
     A slot fits if sequence number and sample index have advanced by the same amount since the last
     slot that did. A single slot that does not is refused. Two in a row that agree with each other
-    show that the counters were reset: a new epoch, since the old axis has ended. Stamps decide
-    nothing here; they are judged where all adapters' stamps are.
+    show that the counters were reset: a new epoch, since the old axis has ended. A few whose index
+    and time go on as before, or back together, were written twice or counted wrongly: these are no
+    reset. Else stamps decide nothing here; they are judged where all adapters' stamps are.
 
     Attributes
     ----------
@@ -43,14 +49,16 @@ class Timeline:
 
     def __init__(self, layout: RingLayout, n_resets: int = 0) -> None:
         self._layout = layout
+        self._slot_ns = layout.samples_per_slot * 1000 * NS_PER_S // layout.rate_mhz
         self._accepted: Slot | None = None
         self._accepted_index = 0
         self._refused: Slot | None = None
+        self._n_miscounted = 0
         self.n_resets = n_resets
 
     def anchor(self, slot: Slot) -> None:
         """Start the axis at a slot, at the index it names itself."""
-        self._accepted, self._accepted_index, self._refused = slot, slot.first_index, None
+        self._accept(slot, slot.first_index)
 
     def restart(self, slot: Slot) -> None:
         """End the axis, since the device's counters went back, and start a new one."""
@@ -64,8 +72,11 @@ class Timeline:
         if self._accepted is None:
             self.anchor(slot)
         elif self._on_one_axis(self._accepted, slot):
-            self._accepted_index += self._n_samples(self._accepted, slot)
-            self._accepted, self._refused = slot, None
+            self._accept(slot, self._accepted_index + self._n_samples(self._accepted, slot))
+        elif self._is_miscounted(self._accepted, slot) and self._n_miscounted < _MAX_MISCOUNTED:
+            self._n_miscounted += 1
+            self._refused = None
+            return Refusal.INCONSISTENT_INDEX
         elif self._refused is not None and self._on_one_axis(self._refused, slot):
             self.restart(slot)
         else:
@@ -81,9 +92,27 @@ class Timeline:
         before = self._accepted
         if before is None or not self._on_one_axis(before, slot):
             return False
-        expected_ns = self._n_samples(before, slot) * 1000 * NS_PER_S // self._layout.rate_mhz
-        deviation_ns = slot.start_ns - before.start_ns - expected_ns
-        return abs(deviation_ns) <= _TOLERANCE_NS + _DRIFT * abs(expected_ns)
+        return self._is_then(before, slot, self._n_samples(before, slot))
+
+    def _accept(self, slot: Slot, index: int) -> None:
+        self._accepted, self._accepted_index = slot, index
+        self._refused, self._n_miscounted = None, 0
+
+    def _is_miscounted(self, reference: Slot, slot: Slot) -> bool:
+        """Whether index and time agree about where a slot belongs, whatever its number says.
+
+        A device that was reset lately counts low numbers at a later time, by two slots at least.
+        """
+        n_samples = ahead(slot.first_index, reference.first_index)
+        return self._is_then(reference, slot, n_samples, self._slot_ns // 2)
+
+    def _is_then(
+        self, reference: Slot, slot: Slot, n_samples: int, tolerance_ns: int = _TOLERANCE_NS
+    ) -> bool:
+        """Whether a slot was taken so many samples after another one, by the device's clock."""
+        expected_ns = n_samples * 1000 * NS_PER_S // self._layout.rate_mhz
+        deviation_ns = slot.start_ns - reference.start_ns - expected_ns
+        return abs(deviation_ns) <= tolerance_ns + _DRIFT * abs(expected_ns)
 
     def _on_one_axis(self, reference: Slot, slot: Slot) -> bool:
         n_samples = self._n_samples(reference, slot)

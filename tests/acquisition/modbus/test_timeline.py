@@ -1,5 +1,7 @@
 """The sample axis: unwrapped, and free of what does not fit it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -88,3 +90,28 @@ def test_an_older_slot_of_the_same_axis_is_a_repetition_and_one_of_another_time_
     assert timeline.repeats(slot(3))
     assert not timeline.repeats(slot(3, shift_s=60))
     assert not timeline.repeats(slot(3, shift_index=50))
+
+
+def counted_one_less(n: int) -> Slot:
+    """The samples and the time of the slot before, under the number of this one."""
+    return replace(slot(n - 1), sequence=n, trailer=n)
+
+
+@pytest.mark.parametrize("n_wrong", [1, 2, 3, 8])
+@pytest.mark.parametrize("wrong", [counted_one_less, lambda n: slot(n, shift_index=1)])
+def test_slots_that_only_their_number_or_index_misplaces_are_no_reset(n_wrong, wrong):
+    timeline = Timeline(LAYOUT)
+    timeline.place(slot(0))
+    for n in range(1, n_wrong + 1):
+        assert timeline.place(wrong(n)) is Refusal.INCONSISTENT_INDEX
+    assert timeline.place(slot(n_wrong + 1)) == 50 * (n_wrong + 1)
+    assert timeline.n_resets == 0
+
+
+def test_a_device_that_goes_on_to_count_otherwise_has_been_reset():
+    timeline = Timeline(LAYOUT)
+    timeline.place(slot(0))
+    placed = [timeline.place(slot(n, shift_index=1)) for n in range(1, 12)]
+    assert placed[:9] == [Refusal.INCONSISTENT_INDEX] * 9
+    assert placed[9:] == [501, 551]
+    assert timeline.n_resets == 1

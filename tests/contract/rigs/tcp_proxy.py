@@ -28,6 +28,7 @@ class MaliciousProxy:
         self._device_port = port
         self._random = np.random.default_rng(seed)
         self._tasks: set[asyncio.Task[None]] = set()
+        self._ends: list[asyncio.StreamWriter] = []
 
     async def __aenter__(self) -> "MaliciousProxy":
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
@@ -40,26 +41,33 @@ class MaliciousProxy:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await self._server.wait_closed()
+        for end in self._ends:
+            end.close()
+        await asyncio.gather(*(end.wait_closed() for end in self._ends), return_exceptions=True)
 
-    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
+    def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.create_task(self._stand_between(reader, writer))
         self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        self._ends.append(writer)
+
+    async def _stand_between(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
         device_reader, device_writer = await asyncio.open_connection("127.0.0.1", self._device_port)
+        self._ends.append(device_writer)
         ways = [
             asyncio.create_task(self._pump(reader, device_writer, self._request)),
             asyncio.create_task(self._pump(device_reader, writer, self._reply)),
         ]
         try:
             await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-        except asyncio.CancelledError:
-            pass
         finally:
             for way in ways:
                 way.cancel()
             await asyncio.gather(*ways, return_exceptions=True)
             for end in (writer, device_writer):
                 end.close()
-            self._tasks.discard(task)
 
     async def _pump(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, treat: Callable
