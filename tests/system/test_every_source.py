@@ -16,7 +16,9 @@ FAST_LINE = "baudrate = 4_000_000\nparity = 'none'"
 
 MIN_SAMPLES = 20
 POLLED_EACH_S = 0.05
-QUEUE_ON_A_LINE_HZ = 100.0
+QUEUE_HZ = 100.0
+"""A queue that a busy machine does not empty in time is a lost link."""
+
 POLLED_UP_TO_HZ = 8.0
 PATIENCE_S = 60.0
 
@@ -73,8 +75,8 @@ def plant_file(folder: Path, found: dict[str, dict[str, Any]] | None = None) -> 
         if found and str(found[id_].get("channel", "")).startswith("socket"):
             source = source.replace("socket://127.0.0.1:0", str(found[id_]["channel"]))
         mine = before.replace('id = "U1"', f'id = "{id_}"')
-        if id_ == "FIFO_RTU":
-            mine = mine.replace("rate_hz = 600.0", f"rate_hz = {QUEUE_ON_A_LINE_HZ}")
+        if id_.startswith("FIFO"):
+            mine = mine.replace("rate_hz = 600.0", f"rate_hz = {QUEUE_HZ}")
         text += "[[unit]]\n" + mine
         text += f"[unit.source]\n{source}\n{after}"
     path = folder / "plant.toml"
