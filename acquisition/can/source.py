@@ -110,11 +110,10 @@ class CanSource:
         )
 
     async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
-        look_s = min(_LOOK_S, self._stale_after_s)
         silent_s = 0.0
         while True:
             looked_s = self._clock.monotonic_s()
-            batch = await reader.next_batch(look_s)
+            batch = await reader.next_batch(min(_LOOK_S, self._stale_after_s - silent_s))
             raw_blocks: list[RawBlock] = []
             if batch:
                 if batch.stamp_fault:
@@ -130,12 +129,12 @@ class CanSource:
                 silent_s = 0.0
             else:
                 # a process that stood still has not listened for all that time
-                silent_s += min(self._clock.monotonic_s() - looked_s, 2 * look_s)
+                silent_s += min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
                 self._require_fresh(silent_s)
             await asyncio.sleep(0)
 
     def _require_fresh(self, silent_s: float) -> None:
-        if silent_s > self._stale_after_s:
+        if silent_s >= self._stale_after_s:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
             trouble = self._assembler.trouble
             raise LinkError(

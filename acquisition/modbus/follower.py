@@ -16,6 +16,10 @@ from core.blocks import Rejection
 _N_REREADS = 3
 """A device needs milliseconds to write a slot; still torn after this many round trips, it lies."""
 
+_AT_ONCE_S = 0.5
+"""Samples that are read before they are handed on: what a ring holds after an outage takes a slow
+line seconds, and would be asked for all over again if that fails before its end."""
+
 
 class RingFollower:
     """Where a reader stands in one device's ring, kept across connections.
@@ -71,8 +75,13 @@ class RingFollower:
                 )
         return header
 
+    @property
+    def n_waiting(self) -> int:
+        """Slots that the device has shown and that were not read yet."""
+        return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
+
     async def advance(self, reader: RingReader) -> list[RawBlock]:
-        """Read everything that is new, in order.
+        """Read what is new, in order; of much only the first.
 
         Raises
         ------
@@ -93,7 +102,7 @@ class RingFollower:
                 return []
             oldest = newest - (layout.n_slots - 2)
             found = [(sequence, slot) for sequence, slot in found if ahead(sequence, oldest) >= 0]
-        self._handled = header.newest
+        self._handled = wanted[-1]
         return self._placed(found, header, slow)
 
     async def _enter(self, reader: RingReader, header: RingHeader) -> None:
@@ -143,8 +152,9 @@ class RingFollower:
 
     def _unread(self, header: RingHeader) -> list[int]:
         n_behind = ahead(header.newest, self._handled)
-        n_wanted = min(n_behind, header.layout.n_slots - 1)
-        return [(header.newest - back) % U32 for back in range(n_wanted - 1, -1, -1)]
+        n_there = min(n_behind, header.layout.n_slots - 1)
+        n_wanted = min(n_there, max(1, round(_AT_ONCE_S / header.layout.slot_duration_s)))
+        return [(header.newest - n_there + 1 + n) % U32 for n in range(n_wanted)]
 
     async def _newest_slot(self, reader: RingReader, header: RingHeader) -> Slot | None:
         [slot] = await self._read(reader, header.layout, [header.newest])

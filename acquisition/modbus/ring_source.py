@@ -121,11 +121,14 @@ class ModbusRingSource:
             with _nonsense_drops_the_link():
                 raw_blocks = await self._follower.advance(reader)
             arrived = Arrival.now(self._clock)
-            read_for_s = arrived.steady_s - begun_s
+            n_waiting = self._follower.n_waiting
+            read_for_s = arrived.steady_s - begun_s + n_waiting * self._slot_s
             for block in self._delivery.take_together(raw_blocks, arrived, read_for_s):
                 yield block
             if raw_blocks:
                 self._fresh_at_s = self._clock.monotonic_s()
+                if n_waiting:
+                    continue
             else:
                 self._require_fresh()
             due_s = await self._wait(due_s + period_s)

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from acquisition.daq import faults
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_pace import out_of_step_s
 from acquisition.modbus.ring_source import ModbusRingSettings
@@ -128,3 +131,27 @@ async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(
             await anext(stream)
     pace_s = out_of_step_s(1.0, device.layout.slot_duration_s)
     assert np.diff(polled_at_s) == pytest.approx([pace_s, pace_s, pace_s, 7.3, pace_s])
+
+
+async def test_samples_that_a_ring_has_kept_come_bit_by_bit(counting_feed, source_at, read_until):
+    device = RingDevice(counting_feed(n_channels=3), settings=RingDeviceSettings(n_slots=32))
+    asked: list[int] = []
+    read = device.memory.read
+
+    def read_and_note(address: int, count: int) -> bytes:
+        asked.append(address)
+        return read(address, count)
+
+    async with ModbusRingServer(device) as server:
+        source = source_at(server.port)
+        async with source.connect() as stream:
+            await anext(stream)
+        device.produce(30)
+        device.memory.read = read_and_note
+        async with source.connect() as stream:
+            first = await anext(stream)
+            n_read = sum(address >= device.layout.ring_address for address in asked)
+            rest = await read_until(stream, 50 * 31)
+    reads_per_slot = -(-device.layout.slot_registers // 125)
+    assert n_read <= 6 * reads_per_slot  # of thirty
+    assert [block.first_index for block in [first, *rest]] == list(range(50, 50 * 31, 50))
