@@ -4,9 +4,13 @@ import threading
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acquisition.errors import LinkError
+from core.blocks import SampleBlock
+from core.device_clock import DeviceClock
+from core.quality import GOOD
 from service.replay import PlayedOut, replay_folder, replayed_plant
 from service.settings.loading import load_plant_file
 
@@ -31,7 +35,16 @@ class Standing:
         raise LinkError("the device answers but its data stand still")
 
 
-async def taken(source) -> list[str]:
+def block(number: int, clock: DeviceClock | None = None) -> SampleBlock:
+    """One sample of one channel, of long ago."""
+    samples = np.full((1, 1), number, np.float32)
+    return SampleBlock("U1", 1, number, NEW_YEAR_NS, 600.0, samples, (GOOD,), clock=clock)
+
+
+FIRST, SECOND = block(1), block(2)
+
+
+async def taken(source) -> list[SampleBlock]:
     async with source.connect() as blocks:
         return [block async for block in blocks]
 
@@ -39,13 +52,21 @@ async def taken(source) -> list[str]:
 async def test_a_device_that_stands_still_after_its_recording_ends_the_stream() -> None:
     over = threading.Event()
     over.set()
-    assert await taken(PlayedOut(Standing(["a", "b"]), over)) == ["a", "b"]
+    assert await taken(PlayedOut(Standing([FIRST, SECOND]), over)) == [FIRST, SECOND]
     assert await taken(PlayedOut(Standing([], refuses=True), over)) == []
+
+
+async def test_a_device_that_plays_the_past_has_no_clock_that_could_be_off() -> None:
+    over = threading.Event()
+    over.set()
+    off = DeviceClock(offset_s=-28e6, drift_ppm=5e5, u_drift_ppm=1.0)
+    [played] = await taken(PlayedOut(Standing([block(1, off)]), over))
+    assert played.clock is None
 
 
 @pytest.mark.parametrize("refuses", [False, True], ids=["while reading", "when connecting"])
 async def test_before_its_end_a_lost_link_stays_a_lost_link(refuses: bool) -> None:
-    source = PlayedOut(Standing(["a"], refuses), threading.Event())
+    source = PlayedOut(Standing([FIRST], refuses), threading.Event())
     with pytest.raises(LinkError, match="stand still"):
         await taken(source)
 
@@ -54,8 +75,8 @@ async def test_before_its_end_a_lost_link_stays_a_lost_link(refuses: bool) -> No
 async def test_a_daq_that_is_gone_is_not_waited_for(refuses: bool) -> None:
     gone = threading.Event()
     gone.set()
-    source = PlayedOut(Standing(["a"], refuses), threading.Event(), gone)
-    assert await taken(source) == ([] if refuses else ["a"])
+    source = PlayedOut(Standing([FIRST], refuses), threading.Event(), gone)
+    assert await taken(source) == ([] if refuses else [FIRST])
 
 
 def test_results_of_a_replay_lie_apart_under_what_was_played_and_when(deploy: Path) -> None:

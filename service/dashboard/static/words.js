@@ -3,7 +3,7 @@
 const REASONS = {
   ok: ["good", "Everything needed is there."],
   waiting_for_data: ["waiting for data", "The first full segment has not been recorded yet."],
-  not_connected: ["not connected", "The data acquisition unit does not answer."],
+  not_connected: ["not connected", "No samples come from the data acquisition unit."],
   stale: ["data too old", "No new samples have arrived lately."],
   sensor_failure: ["sensor failure", "A transducer reports a fault or its voltage is outside its OK limits."],
   clipped: ["signal clipped", "The signal exceeds the range of the converter."],
