@@ -5,6 +5,7 @@ from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
+from acquisition.errors import ConfigError
 from acquisition.importing.frames import FrameBatch
 from acquisition.raw import RawBlock
 from service.conversion import calibration_of
@@ -36,12 +37,20 @@ class CanLogDecoder:
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: FrameBatch) -> list[RawBlock]:
-        """Decode frames; see :class:`acquisition.importing.frames.FrameDecoder`."""
+        """Decode frames; see :class:`acquisition.importing.frames.FrameDecoder`.
+
+        Raises
+        ------
+        ConfigError
+            If they cannot all be those of one device.
+        """
         blocks: list[RawBlock] = []
         for time_ns, message in zip(frames.times_ns.tolist(), frames.messages(), strict=True):
             frame = self._gate.admit(message)
             if frame is not None:
                 blocks += self._assembler.take([frame], time_ns)
+        if self._assembler.trouble:
+            raise ConfigError(self._assembler.trouble)
         return blocks
 
     def flush(self) -> list[RawBlock]:

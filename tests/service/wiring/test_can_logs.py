@@ -13,7 +13,9 @@ from acquisition.calibration import UnitCalibration
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.daq.can_dbc import daq_dbc, daq_settings
 from acquisition.daq.can_device import CanDevice
+from acquisition.daq.can_frames import WireFrame
 from acquisition.daq.can_shape import CanShape, DaqSignal
+from acquisition.errors import ConfigError
 from acquisition.importing.job import ImportJob, TimeAxis
 from acquisition.importing.reading import reading
 from acquisition.raw import FeedEndedError, RawBlock
@@ -68,23 +70,49 @@ def test_every_sample_flag_and_stamp_comes_back(
     assert on_grid(raws) == on_grid(feed.sent)
 
 
-def write_log(path: Path, kind: str, device: CanDevice) -> None:
+def test_a_log_of_two_devices_under_the_same_ids_is_refused(
+    counting_feed: Callable[..., object],
+    counts_calibration: Callable[..., UnitCalibration],
+    tmp_path: Path,
+) -> None:
+    shape = CanShape(
+        channels=(DaqSignal("c0", "V", 1.0), DaqSignal("c1", "V", 1.0)),
+        slow=(DaqSignal("slow0", "degC"), DaqSignal("slow1", "degC")),
+    )
+    one, other = (CanDevice(GappyFeed(counting_feed()), shape) for _ in range(2))
+    for _ in range(20):  # of the same make, and on for a little longer
+        other.next_frames()
+        other.produce()
+    write_log(tmp_path / "log", "candump", one, other)
+    link = CanLinkSettings(interface="virtual", channel="none")
+    decoder = CanLogDecoder(daq_settings(shape, link, ("um", "um")), counts_calibration())
+    job = ImportJob(format="candump", rate_hz=600.0, time=TimeAxis("file", 0))
+    with reading(tmp_path / "log", job) as found:
+        every_batch = map(decoder.take, found.frames())
+        with pytest.raises(ConfigError, match="do two devices send the same ids"):
+            list(every_batch)
+
+
+def write_log(path: Path, kind: str, *devices: CanDevice) -> None:
     writer = can.CanutilsLogWriter if kind == "candump" else can.BLFWriter
     with writer(path) as log:
         n_frames = 0
-        while device.has_frames:
-            for frame in device.next_frames():
-                log(
-                    can.Message(
-                        timestamp=START_S + n_frames * 1e-4,
-                        arbitration_id=frame.frame_id,
-                        is_extended_id=frame.extended,
-                        is_fd=frame.fd,
-                        data=frame.data,
-                    )
-                )
+        while all(device.has_frames for device in devices):
+            for frame in (frame for device in devices for frame in device.next_frames()):
+                log(as_message(frame, n_frames))
                 n_frames += 1
-            device.produce()
+            for device in devices:
+                device.produce()
+
+
+def as_message(frame: WireFrame, number: int) -> can.Message:
+    return can.Message(
+        timestamp=START_S + number * 1e-4,
+        arbitration_id=frame.frame_id,
+        is_extended_id=frame.extended,
+        is_fd=frame.fd,
+        data=frame.data,
+    )
 
 
 def on_grid(raws: list[RawBlock]) -> list[str]:
