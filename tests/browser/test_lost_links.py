@@ -91,7 +91,7 @@ async def test_a_plant_without_daq_has_a_sentence_in_place_of_every_chart(
     await expect(page.locator(".state .mark")).to_have_text("Bad: not connected", timeout=DATA_MS)
     for chart in await page.locator("figure").all():
         await expect(chart.locator(".sentence")).to_contain_text(
-            re.compile("not connected|does not answer"), timeout=DATA_MS
+            re.compile("not connected|No samples come"), timeout=DATA_MS
         )
         await expect(chart.locator(".chart")).to_be_hidden()
     assert await page.evaluate(NO_NUMBER)
