@@ -131,15 +131,15 @@ class FifoSource:
                     pieces = await self._read(link)
                     arrived = Arrival.now(self._clock)
                     waiting += self._place(pieces, arrived.steady_s)
+                drained = self._is_drained(pieces)
+                reading_s = 0.0 if drained else reading_s + arrived.steady_s - begun_s
+                self._require_in_time(reading_s)
             except LinkError:
                 for block in self._saved(waiting, arrived):
                     yield block
                 raise
-            if not self._is_drained(pieces):
-                reading_s += arrived.steady_s - begun_s
-                self._require_in_time(reading_s)
+            if not drained:
                 continue
-            reading_s = 0.0
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
                 waiting.clear()  # nobody knows where among these the loss is
                 self._uncounted.begin()

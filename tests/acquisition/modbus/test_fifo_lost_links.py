@@ -74,3 +74,19 @@ async def test_samples_that_are_not_counted_are_not_kept_where_some_may_be_missi
         p.run(10)
         lose_the_link_after(p, N_READ)
         assert await until_lost(stream) == []
+
+
+async def test_what_was_read_over_too_slow_a_link_is_kept_too(plant) -> None:
+    async with plant(depth_samples=100_000) as p, p.source.connect() as stream:
+        first = await up_to(stream, STEP)
+        answer = p.device.read_fifo
+
+        def slowly(address: int) -> bytes | None:
+            p.run(1)
+            return answer(address)
+
+        p.device.read_fifo = slowly
+        before = await until_lost(stream)
+    assert len(before) > 1
+    assert gaps([*first, *before]) == []
+    assert_right([*first, *before])

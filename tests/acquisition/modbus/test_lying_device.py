@@ -117,7 +117,7 @@ async def _collect(stream, blocks) -> None:
 @pytest.mark.parametrize("n_honest", [0, 1, 3], ids=["header", "slot", "later"])
 @pytest.mark.parametrize("lie", LIES.values(), ids=LIES.keys())
 async def test_no_lie_becomes_a_sample(lie, n_honest, hostile, device, source_at):
-    source = source_at(hostile.port, timeout_s=0.25)
+    source = source_at(hostile.port, timeout_s=0.6)
     async with source.connect() as stream:
         blocks = [await anext(stream)]
         device.produce(3)
