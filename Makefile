@@ -4,20 +4,32 @@ PORT ?= 8080
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DEV_STAMP := $(VENV)/.developing
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes
 NPM_FOLDER := tests/browser/javascript
 AXE := $(NPM_FOLDER)/node_modules/axe-core/axe.min.js
 SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-.PHONY: install run axe test check docs screenshots bench fuzz accuracy torture soak format lock clean
+WORKERS ?= 4
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-$(STAMP): requirements/run.txt requirements/dev.txt pyproject.toml
+.PHONY: install develop run axe test test-long mutants check docs screenshots bench fuzz accuracy torture soak \
+  format lock clean
+
+$(STAMP): requirements/run.txt requirements/build.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "padwatch needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements/run.txt -r requirements/dev.txt
+	$(PIP) -r requirements/run.txt -r requirements/build.txt
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
+$(DEV_STAMP): $(STAMP) requirements/dev.txt
+	$(PIP) -r requirements/run.txt -r requirements/dev.txt
+	touch $@
+
 install: $(STAMP)
+
+develop: $(DEV_STAMP)
 
 run: install
 	@exec $(BIN)/padwatch demo --port $(PORT)
@@ -30,50 +42,56 @@ axe:
 	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory $(AXE); \
 	else echo 'npm is not installed: pages are not tested with axe-core'; fi
 
-test: install axe
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+test: develop axe
+	$(PYTEST)
 
-check: install
+test-long: develop axe
+	$(PYTEST) -m long
+
+mutants: develop
+	$(BIN)/python tests/mutants/run.py
+
+check: develop
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/sphinx-build $(SPHINX) --quiet docs build/docs
 
-docs: install
+docs: develop
 	$(BIN)/sphinx-build $(SPHINX) docs build/docs
 
-bench: install
+bench: develop
 	$(BIN)/python benchmarks/ingest.py
 	$(BIN)/python benchmarks/polling.py
 	$(BIN)/python benchmarks/alarms.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/trend_years.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/analysis.py
 
-fuzz: install
+fuzz: develop
 	$(BIN)/python benchmarks/fuzz.py
 
-screenshots: install
+screenshots: develop
 	PYTHONPATH=benchmarks $(BIN)/python docs/_tools/take_pictures.py
 
-accuracy: install
+accuracy: develop
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2
 
 SEED ?= $(shell date +%s)
 SOAK_MINUTES ?= 20
 PLANTED = $$(grep -rl --include='test_*.py' mark.planted tests --exclude-dir torture)
-torture: install
+torture: develop
 	@echo "make torture SEED=$(SEED); it takes hours"
-	$(BIN)/python -m pytest tests/torture $(PLANTED) --torture --torture-seed $(SEED) --durations 20
+	$(BIN)/python -m pytest tests/torture $(PLANTED) -m "" --torture --torture-seed $(SEED) --durations 20
 
-soak: install
-	$(BIN)/python -m pytest tests/torture/test_soak.py --torture --torture-seed $(SEED) --soak-minutes $(SOAK_MINUTES)
+soak: develop
+	$(BIN)/python -m pytest tests/torture/test_soak.py -m "" --torture --torture-seed $(SEED) --soak-minutes $(SOAK_MINUTES)
 
-format: install
+format: develop
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-lock: install
+lock: develop
 	for name in run dev build; do CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/pip-compile --quiet --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --strip-extras --allow-unsafe \
 	  --output-file requirements/$$name.txt requirements/$$name.in || exit 1; done

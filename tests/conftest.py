@@ -1,6 +1,12 @@
 """What tests of every package share: a plant of numbers, a clock, results, readings of films."""
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers share the cores: threads only wait
+
 import asyncio
+import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
@@ -21,6 +27,23 @@ from core.stiffness_history import StiffnessHistory
 
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Refuse a test that would be in two tiers."""
+    for item in items:
+        if item.get_closest_marker("long") and item.get_closest_marker("torture"):
+            raise pytest.UsageError(f"{item.nodeid} is marked both long and torture")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the optional tools that are missing, and how many tests were left out for each."""
+    skipped = terminalreporter.stats.get("skipped", ())
+    reasons = [report.longrepr[2].removeprefix("Skipped: ") for report in skipped]
+    if reasons:
+        counts = Counter(re.sub(r"^needs ", "", reason) for reason in reasons)
+        left_out = "; ".join(f"{n} need {reason}" for reason, n in counts.most_common())
+        terminalreporter.write_line(f"left out: {left_out}", yellow=True)
 
 
 def pytest_asyncio_loop_factories() -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:

@@ -52,7 +52,7 @@ async def test_how_often_alarms_come_is_said_in_one_line(running_plant, page) ->
         await expect(line).to_contain_text(words)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_a_lost_link_is_announced_acknowledged_shelved_and_returns(
     new_plant, page, picture_of, complaints_of
 ) -> None:

@@ -32,7 +32,7 @@ def alarmed_plant(new_plant, tmp_path: Path) -> Iterator[object]:
     return new_plant
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
     alarmed_plant, page, complaints_of, picture_of
 ) -> None:

@@ -26,7 +26,7 @@ async def data_age_s(page: Page) -> int:
     return 60 * int(minutes or 0) + int(seconds)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_a_stopped_daq_turns_age_and_quality_bad_and_takes_every_number_away(
     new_plant, page, picture_of
 ) -> None:
@@ -55,7 +55,7 @@ async def test_a_stopped_daq_turns_age_and_quality_bad_and_takes_every_number_aw
     await picture_of(page, "bearing")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_a_restarted_service_comes_back_without_a_reload(new_plant, page, picture_of) -> None:
     new_plant.start_daq()
     new_plant.start_service()

@@ -83,7 +83,7 @@ def by_id(answer: Any) -> dict[str, Any]:
     return {alarm["id"]: alarm for alarm in answer["alarms"]}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_a_lost_probe_outlives_a_lost_link_and_kill_9(
     start: Start, tmp_path: Path, demo_file: Path
 ) -> None:

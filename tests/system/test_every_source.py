@@ -84,7 +84,7 @@ def plant_file(folder: Path, found: dict[str, dict[str, Any]] | None = None) -> 
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_the_service_reads_every_kind_of_source_over_every_wire(
     start: Callable, tmp_path: Path
 ) -> None:

@@ -58,7 +58,7 @@ def verdicts(day: Day) -> tuple[Verdicts, Verdicts]:
     return given, mixed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_stiffness_off_samples_is_that_of_readings_within_its_uncertainty(day: Day) -> None:
     numbers = (*AROUND_CHANGE, *AFTER_DAMAGE)
@@ -73,7 +73,7 @@ def test_stiffness_off_samples_is_that_of_readings_within_its_uncertainty(day: D
     assert np.max(np.abs(ratio)) < 5.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_conditions_off_samples_are_those_of_readings(day: Day) -> None:
     for number in (*AROUND_CHANGE, *AFTER_DAMAGE):
@@ -85,7 +85,7 @@ def test_conditions_off_samples_are_those_of_readings(day: Day) -> None:
                 assert abs(apart) < 5.0 * np.hypot(one.u_random, other.u_random)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_the_condition_change_raises_nothing_and_the_loss_is_announced_at_the_same_place(
     verdicts: tuple[Verdicts, Verdicts],

@@ -47,7 +47,7 @@ def value(latest: Any, name: str) -> float:
     return math.nan if found is None else float(found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 async def test_a_reference_set_beside_the_running_service_changes_the_eccentricity(
     start: Start, plant_path: Path, tmp_path: Path
 ) -> None:

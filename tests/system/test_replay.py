@@ -20,7 +20,7 @@ LONGEST_RUN_S = 100.0
 MOST_QUANTITIES = 40
 WIRES = ["modbus_tcp", "modbus_rtu", "can", "can_fd"]
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def known(unit: str) -> dict[str, Any]:

@@ -33,7 +33,7 @@ RUNS = {"U1": RECORDINGS / "part_load", "U2": RECORDINGS / "full_load"}
 OF_THE_HOST = {"clock", "sampled_s"}
 """What a block says of when it has come, not of what it is."""
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 class Digest:

@@ -101,7 +101,7 @@ async def twenty_minutes_over_modbus(
     return newest
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("condition", CONDITIONS)
 async def test_equation_5_finds_the_film_through_the_whole_chain(
     unit: UnitSettings, condition: int

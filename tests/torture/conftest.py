@@ -22,14 +22,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--soak-minutes", type=float, default=20.0, help="of the whole torture's soak")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Note which tests plant a bug; leave those that take long to the whole torture."""
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Note which tests plant a bug."""
     summary.note_planted(items)
-    if config.getoption("--torture", False):
-        return
-    long = [item for item in items if item.get_closest_marker("long") is not None]
-    config.hook.pytest_deselected(items=long)
-    items[:] = [item for item in items if item.get_closest_marker("long") is None]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -73,7 +73,7 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.long
+@pytest.mark.torture
 def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
     plant: LedgerPlant,
     tmp_path: Path,
@@ -105,7 +105,7 @@ def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
         pytest.param(0.0, (), "America/Sao_Paulo", id="another time zone"),
     ],
 )
-@pytest.mark.long
+@pytest.mark.torture
 def test_a_host_whose_clock_is_wrong_loses_and_doubles_nothing_and_says_so(
     plant: LedgerPlant,
     tmp_path: Path,

@@ -16,7 +16,7 @@ DRIFTS_WITHIN_S = 600.0
 
 SLOTS = (1, 2, 20, 200)
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.torture
 
 
 @pytest.mark.timeout(3600)

@@ -55,7 +55,7 @@ def _planted(bug: str, kind: str) -> object:
         _planted("letter_forgotten", "alarms"),
     ],
 )
-@pytest.mark.long
+@pytest.mark.torture
 def test_a_bug_in_the_service_is_found_out(
     plant: LedgerPlant,
     daq: LedgerDaq,

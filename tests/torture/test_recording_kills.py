@@ -98,7 +98,7 @@ def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
         )
     ],
 )
-@pytest.mark.long
+@pytest.mark.torture
 def test_a_bug_in_recording_is_found_out(
     plant: LedgerPlant,
     daq: LedgerDaq,

@@ -20,7 +20,7 @@ N_ROUNDS, N_KILLS = 5, 10
 LIFE_S, LONGEST_S = 2.0, 8.0
 
 pytestmark = [
-    pytest.mark.long,  # programs and servers that are started again so often
+    pytest.mark.torture,  # programs and servers that are started again so often
     pytest.mark.skipif(why_not() is not None, reason=str(why_not())),
 ]
 

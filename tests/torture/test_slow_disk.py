@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="strace i
 
 
 @pytest.mark.timeout(900)
-@pytest.mark.long
+@pytest.mark.torture
 def test_a_slow_disk_holds_up_nothing_but_itself(
     torture_seed: int,
     tmp_path: Path,

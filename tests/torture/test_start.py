@@ -45,7 +45,7 @@ def fill(database: Path, n_bytes: int) -> int:
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.long
+@pytest.mark.torture
 def test_a_killed_service_with_a_gigabyte_is_ready_again(
     tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
 ) -> None:

@@ -21,7 +21,7 @@ PLANT = LedgerPlant(n_units=2, load=1.0, segment_samples=2048, n_segments=2)
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.long
+@pytest.mark.torture
 def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_process(
     tmp_path: Path,
     torture_seed: int,

@@ -59,7 +59,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, read: Read, csv_job: Imp
     assert "not a regular file" in refusal(read, tmp_path, csv_job)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_million_columns_are_refused_or_read_in_bounded_memory(
     tmp_path: Path, job: ImportJob, placed: Placed
 ) -> None:

@@ -29,7 +29,7 @@ from service.back_test.periods import DAY_NS, Learning, MachineEvent
 from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 START_NS = 19_723 * DAY_NS
 DAMAGED_NS = START_NS + 400 * DAY_NS
