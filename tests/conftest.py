@@ -1,8 +1,13 @@
 """What tests of every package share: a plant of numbers, a clock, results, readings of films."""
 
 import os
+import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers share the cores: threads only wait
+
+# Without bytecode every worker and every started program compiles a thousand files again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 import asyncio
 import re
