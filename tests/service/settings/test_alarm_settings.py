@@ -1,4 +1,4 @@
-"""Limits and captures in the plant file: what fits is a rule, what does not is named."""
+"""Alarms and captures in the plant file: what fits is a rule, what does not is named."""
 
 import tomllib
 from collections.abc import Callable
@@ -6,26 +6,30 @@ from collections.abc import Callable
 import pytest
 
 from core.alarms.alarm import AlarmRule
+from core.alarms.chatter import ChatterRule
 from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule
 from core.alarms.state_limits import AT_SPEED, EVERY_STATE
+from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
-from service.alarms.rules import rules_of
+from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.origin import Origin
 from service.settings.plant import PlantFile
 from service.wiring.captures import captures_of
 
 Changed = Callable[[str, str], tuple[str, int]]
 Mistakes = Callable[[str | bytes], list[str]]
+PlantOf = Callable[..., PlantFile]
 
 SECOND = 1_000_000_000
 EVERY_KNOWN_STATE = EVERY_STATE - {OperatingState.UNKNOWN}
+FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
 UJB = "unit[1].bearing[1].alarms."
 OIL = 'oil_temperature = "ujb_oil_temperature"'
 
 
 @pytest.fixture
-def plant_of(plant_text: str) -> Callable[..., PlantFile]:
+def plant_of(plant_text: str) -> PlantOf:
     """Builds the demonstration plant with more keys for its first bearing, and more tables."""
 
     def build(bearing: str = "", tables: str = "") -> PlantFile:
@@ -37,7 +41,18 @@ def plant_of(plant_text: str) -> Callable[..., PlantFile]:
     return build
 
 
-def test_without_limits_nothing_of_a_bearing_is_watched(plant_of: Callable[..., PlantFile]) -> None:
+@pytest.fixture
+def rules(plant_of: PlantOf) -> Callable[[str], BearingRules]:
+    """Builds the rules of the first bearing from its keys."""
+
+    def build(keys: str) -> BearingRules:
+        plant = plant_of(keys)
+        return rules_of(plant.unit[0], plant.alarms, Origin.LIVE).bearings["UJB"]
+
+    return build
+
+
+def test_without_limits_nothing_of_a_bearing_is_watched(plant_of: PlantOf) -> None:
     plant = plant_of()
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.LIVE)
@@ -49,13 +64,15 @@ def test_without_limits_nothing_of_a_bearing_is_watched(plant_of: Callable[..., 
     assert rules.clock.offset.limits == Limits(2.0, deadband=0.2)
 
 
-def test_limits_of_a_bearing_become_its_rules(plant_of: Callable[..., PlantFile]) -> None:
-    plant = plant_of(
+def test_limits_of_a_bearing_become_its_rules(rules: Callable[[str], BearingRules]) -> None:
+    found = rules(
         "alarms.shaft_order1_um_pk = { alert = 150.0, danger = 250.0, on_delay_s = 0.0 }\n"
-        "alarms.oil_temperature_c = { danger = 75.0, deadband = 2.0, off_delay_s = 1.5 }"
+        "alarms.oil_temperature_c = { danger = 75.0, deadband = 2.0, off_delay_s = 1.5 }\n"
+        "alarms.shaft_overall_um_pp = { alert = 300.0,"
+        ' states = ["part_load", "run_down"], latching = true }\n'
+        "alarms.gap_um = { danger_below = 400.0, alert_below = 600.0,"
+        " alert = 2400.0, danger = 2600.0 }"
     )
-
-    found = rules_of(plant.unit[0], plant.alarms, Origin.LIVE).bearings["UJB"]
 
     assert found.shaft_order1 == LimitRule(
         Limits(150.0, 250.0, 5.0), AlarmRule(0, 30 * SECOND), AT_SPEED
@@ -63,11 +80,59 @@ def test_limits_of_a_bearing_become_its_rules(plant_of: Callable[..., PlantFile]
     assert found.oil_temperature == LimitRule(
         Limits(None, 75.0, 2.0), AlarmRule(10 * SECOND, 3 * SECOND // 2), EVERY_KNOWN_STATE
     )
+    assert found.shaft_overall is not None
+    assert found.shaft_overall.states == {PART, OperatingState.RUN_DOWN}
+    assert found.shaft_overall.rule.is_latching
+    assert found.gap is not None
+    assert found.gap.limits == Limits(2400.0, 2600.0, 10.0, 600.0, 400.0)
 
 
-def test_a_replay_has_no_rules_for_link_and_clock_and_keeps_no_captures(
-    plant_of: Callable[..., PlantFile],
+def test_limits_of_vibration_count_at_speed_unless_said_otherwise(
+    rules: Callable[[str], BearingRules],
 ) -> None:
+    found = rules(
+        "alarms.bearing_overall_mm_s_rms = { alert = 2.0 }\n"
+        "alarms.eccentricity_ratio = { danger = 0.9 }\n"
+        "alarms.shaft_order1_change_um_pk = { alert = 30.0 }"
+    )
+
+    for rule in (found.bearing_overall, found.eccentricity, found.shaft_change):
+        assert isinstance(rule, LimitRule)
+        assert rule.states == AT_SPEED
+        assert not rule.rule.is_latching
+
+
+def test_zones_differ_from_state_to_state(rules: Callable[[str], BearingRules]) -> None:
+    found = rules(
+        "alarms.zones.shaft_um_pp = { off_delay_s = 5.0, table = [\n"
+        '  { states = ["full_load"], a_b = 100.0, b_c = 200.0, c_d = 300.0 },\n'
+        '  { states = ["part_load"], a_b = 150.0, b_c = 250.0, c_d = 400.0, deadband = 1.0 }] }'
+    ).shaft_zones
+
+    assert found is not None
+    full, part = found.by_state.at(FULL), found.by_state.at(PART)
+    assert full is not None
+    assert part is not None
+    assert (full.alert, full.danger, full.deadband) == (200.0, 300.0, 5.0)
+    assert (part.alert, part.danger, part.deadband) == (250.0, 400.0, 1.0)
+    assert found.by_state.at(OperatingState.SPEED_NO_LOAD) is None
+    assert found.rule.off_delay_ns == 5 * SECOND
+
+
+def test_a_reference_holds_in_each_state_it_names(plant_of: PlantOf) -> None:
+    found = references_of(
+        plant_of(
+            "alarms.order1_reference = ["
+            ' { states = ["part_load", "full_load"], shaft_x = [60.0], bearing_y = [20.0] }]'
+        ).unit[0]
+    )
+
+    vectors = {"shaft_x": OrderVector(60.0), "bearing_y": OrderVector(20.0)}
+    expected = [VectorReference("U1", "UJB", state, vectors) for state in (PART, FULL)]
+    assert sorted(found, key=lambda r: r.state) == expected
+
+
+def test_a_replay_has_no_rules_for_link_and_clock_and_keeps_no_captures(plant_of: PlantOf) -> None:
     plant = plant_of()
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.REPLAY)
@@ -77,60 +142,112 @@ def test_a_replay_has_no_rules_for_link_and_clock_and_keeps_no_captures(
     assert set(captures_of(plant, Origin.LIVE, None)._histories) == {"U1", "U2"}  # type: ignore[arg-type]
 
 
-def test_clocks_and_captures_can_be_left_alone(plant_of: Callable[..., PlantFile]) -> None:
-    plant = plant_of(tables='[alarms]\nclock = "ignored"\n[capture]\nsamples = "not_kept"')
+def test_clocks_captures_and_chattering_can_be_set(plant_of: PlantOf) -> None:
+    plant = plant_of(
+        tables='[alarms]\nclock = "ignored"\nchattering_activations = 5\n'
+        'chattering_window_s = 600.0\n[capture]\nsamples = "not_kept"'
+    )
 
     assert rules_of(plant.unit[0], plant.alarms, Origin.LIVE).clock is None
     assert captures_of(plant, Origin.LIVE, None)._histories == {}  # type: ignore[arg-type]
+    assert chatter_rule_of(plant.alarms) == ChatterRule(5, 600 * SECOND)
+    assert chatter_rule_of(plant_of().alarms) == ChatterRule(3, 60 * SECOND)
+
+
+ORDER1, SPAN, ECCENTRICITY = "shaft_order1_um_pk", "shaft_overall_um_pp", "eccentricity_ratio"
+VELOCITY, OIL_C = "bearing_overall_mm_s_rms", "oil_temperature_c"
+ZONES, REFERENCE = "zones.bearing_mm_s_rms", "order1_reference"
+TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
 
 
 @pytest.mark.parametrize(
-    ("limits", "key", "said"),
+    ("name", "value", "key", "said"),
     [
-        ("shaft_order1_um_pk = {}", "shaft_order1_um_pk.alert", "gives no limit"),
+        (ORDER1, "{}", ".alert", "gives no limit"),
+        (ORDER1, "{ alert = 0.0 }", ".alert = 0.0", "greater than 0"),
+        (ORDER1, "{ alert = -1.0 }", ".alert = -1.0", "greater"),
+        (ORDER1, "{ alert = nan }", ".alert = nan", "finite"),
+        (ORDER1, "{ alert = 9.0, danger = 8.0 }", ".danger = 8.0", "must be above alert, 9"),
+        (ORDER1, "{ alert = 9.0, deadband = 9.0 }", ".deadband = 9.0", "below the lowest limit, 9"),
+        (ORDER1, "{ alert = 4.0 }", ".deadband (by default)", "must be below the lowest limit, 4"),
+        (ORDER1, "{ alert = 9.0, on_delay_s = -1.0 }", ".on_delay_s = -1.0", "or equal to 0"),
+        ("shaft_order1_um", "{ alert = 1.0 }", "", "known here: bearing_order1_change_um_pk"),
+        (OIL_C, "{ alert = 300.0 }", ".alert = 300.0", "200"),
+        (SPAN, "{ alert = nan }", ".alert = nan", "finite"),
+        (SPAN, "{ danger = 0.0 }", ".danger = 0.0", "than 0"),
+        (VELOCITY, "{ alert = 4.0, danger = 2.0 }", ".danger = 2.0", "must be above alert, 4"),
+        (ECCENTRICITY, "{ alert = 0.7, deadband = 0.8 }", ".deadband = 0.8", "lowest limit, 0.7"),
+        (ECCENTRICITY, "{ alert = -0.7 }", ".alert = -0.7", "than 0"),
+        (ECCENTRICITY, '{ alert = 1.0, states = ["x"] }', ".states[1] = 'x'", "'full_load'"),
+        (ECCENTRICITY, "{ alert = 0.7, states = [] }", ".states", "least"),
         (
-            "shaft_order1_um_pk = { alert = 0.0 }",
-            "shaft_order1_um_pk.alert = 0.0",
-            "greater than 0",
+            ECCENTRICITY,
+            '{ alert = 0.7, states = ["run_up", "run_up"] }',
+            ".states[2] = 'run_up'",
+            "used twice",
         ),
-        ("shaft_order1_um_pk = { alert = -1.0 }", "shaft_order1_um_pk.alert = -1.0", "greater"),
-        ("shaft_order1_um_pk = { alert = nan }", "shaft_order1_um_pk.alert = nan", "finite"),
+        (ECCENTRICITY, "{ alert = 0.7, latching = 1 }", ".latching = 1", "boolean"),
+        ("gap_um", "{ deadband = 1.0 }", ".alert", "alert_below or danger_below"),
         (
-            "shaft_order1_um_pk = { alert = 250.0, danger = 150.0 }",
-            "shaft_order1_um_pk.danger = 150.0",
-            "must be above alert, 250",
-        ),
-        (
-            "shaft_order1_um_pk = { alert = 150.0, deadband = 150.0 }",
-            "shaft_order1_um_pk.deadband = 150.0",
-            "must be below the lowest limit, 150",
+            "gap_um",
+            "{ alert_below = 600.0, danger_below = 700.0 }",
+            ".alert_below = 600.0",
+            "must be above danger_below, 700",
         ),
         (
-            "shaft_order1_um_pk = { alert = 4.0 }",
-            "shaft_order1_um_pk.deadband (by default)",
-            "must be below the lowest limit, 4",
+            "gap_um",
+            "{ alert_below = 600.0, alert = 500.0 }",
+            ".alert = 500.0",
+            "must be above alert_below, 600",
         ),
         (
-            "shaft_order1_um_pk = { alert = 150.0, on_delay_s = -1.0 }",
-            "shaft_order1_um_pk.on_delay_s = -1.0",
-            "greater than or equal to 0",
+            "gap_um",
+            "{ alert_below = 600.0, alert = 700.0, deadband = 50.0 }",
+            ".deadband = 50.0",
+            "must be below half the room between, 50",
         ),
         (
-            "shaft_order1_um = { alert = 1.0 }",
-            "shaft_order1_um",
-            "known here: bearing_order1_change_um_pk",
+            ZONES,
+            "{ table = [{ a_b = 2.0, b_c = 2.0, c_d = 3.0 }] }",
+            ".table[1].b_c = 2.0",
+            "a_b, 2",
         ),
-        ("oil_temperature_c = { alert = 300.0 }", "oil_temperature_c.alert = 300.0", "200"),
+        (
+            ZONES,
+            "{ table = [{ a_b = 1.0, b_c = 2.0, c_d = 1.5 }] }",
+            ".table[1].c_d = 1.5",
+            "b_c, 2",
+        ),
+        (
+            ZONES,
+            "{ table = [{ a_b = 0.0, b_c = 2.0, c_d = 3.0 }] }",
+            ".table[1].a_b = 0.0",
+            "than 0",
+        ),
+        (ZONES, f"{{ table = [{{ {TABLE}, deadband = 2.0 }}] }}", ".table[1].deadband", "b_c, 2"),
+        (ZONES, f"{{ table = [{{ {TABLE} }}, {{ {TABLE} }}] }}", ".table[2].states[1]", "twice"),
+        (ZONES, "{ table = [] }", ".table", "at least 1"),
+        (
+            "zones.x",
+            f"{{ table = [{{ {TABLE} }}] }}",
+            "",
+            "known here: bearing_mm_s_rms, shaft",
+        ),
+        (REFERENCE, "[{}]", "[1].shaft_x", "gives no vector"),
+        (REFERENCE, "[{ shaft_x = [-1.0] }]", "[1].shaft_x[1] = -1.0", "must be 0 to 5000"),
+        (REFERENCE, "[{ shaft_x = [6.0, 400.0] }]", "[1].shaft_x[2] = 400.0", "be -360 to 360"),
+        (REFERENCE, "[{ shaft_x = [6.0, 30.0] }]", "[1].shaft_x", "needs the unit's key_phase"),
+        (REFERENCE, "[{ shaft_x = [6.0] }, { shaft_x = [5.0] }]", "[2].states[1]", "used twice"),
     ],
 )
 def test_limits_that_do_not_fit_are_named_with_what_is_allowed(
-    changed: Changed, mistakes: Mistakes, limits: str, key: str, said: str
+    changed: Changed, mistakes: Mistakes, name: str, value: str, key: str, said: str
 ) -> None:
-    text, line = changed(OIL, f"{OIL}\nalarms.{limits}")
+    text, line = changed(OIL, f"{OIL}\nalarms.{name} = {value}")
 
     [mistake] = mistakes(text)
 
-    assert mistake.startswith(f"{line + 1}: {UJB}{key}"), mistake
+    assert mistake.startswith(f"{line + 1}: {UJB}{name}{key}"), mistake
     assert said in mistake
 
 
@@ -145,24 +262,37 @@ def test_a_limit_of_an_oil_that_nobody_measures_is_refused(
     assert "needs the bearing's oil_temperature" in mistake
 
 
+def test_no_unit_is_called_as_alarms_of_the_whole_plant_are(
+    changed: Changed, mistakes: Mistakes
+) -> None:
+    text, _ = changed('id = "U1"', 'id = "plant"')
+
+    assert "kept for alarms of the whole plant" in mistakes(text)[0]
+
+
 @pytest.mark.parametrize(
     ("table", "key", "said"),
     [
-        ("[capture]\nmax_s = 100.0", "capture.max_s = 100.0", "at least pre_s + post_s, 180"),
-        ("[capture]\npre_s = 601.0", "capture.pre_s = 601.0", "600"),
-        ("[capture]\nmax_gb = 0.0", "capture.max_gb = 0.0", "greater than 0"),
-        ('[capture]\nsamples = "some"', "capture.samples = 'some'", "'kept' or 'not_kept'"),
-        ("[alarms]\nlink_lost_after_s = 0.5", "alarms.link_lost_after_s = 0.5", "equal to 1"),
-        ("[alarms]\nmax_clock_offset_s = 0.0", "alarms.max_clock_offset_s = 0.0", "than 0"),
-        ('[alarms]\nclock = "off"', "alarms.clock = 'off'", "'judged' or 'ignored'"),
+        ("capture", "max_s = 100.0", "at least pre_s + post_s, 180"),
+        ("capture", "pre_s = 601.0", "600"),
+        ("capture", "max_gb = 0.0", "greater than 0"),
+        ("capture", "samples = 'some'", "'kept' or 'not_kept'"),
+        ("alarms", "link_lost_after_s = 0.5", "equal to 1"),
+        ("alarms", "max_clock_offset_s = 0.0", "than 0"),
+        ("alarms", "clock = 'off'", "'judged' or 'ignored'"),
+        ("alarms", "chattering_activations = 1", "equal to 2"),
+        ("alarms", "chattering_window_s = 0.0", "equal to 1"),
+        ("alarms", "max_waiting_share = 1.0", "less than 1"),
+        ("alarms", "max_samples_lost_share = 0.0", "than 0"),
+        ("alarms", "store_failing_after_s = -1.0", "equal to 0"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused(
     changed: Changed, mistakes: Mistakes, table: str, key: str, said: str
 ) -> None:
-    text, _ = changed("[[unit]]", f"{table}\n\n[[unit]]")
+    text, _ = changed("[[unit]]", f"[{table}]\n{key}\n\n[[unit]]")
 
     [mistake] = mistakes(text)
 
-    assert key in mistake
+    assert f"{table}.{key}" in mistake
     assert said in mistake
