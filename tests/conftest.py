@@ -1,4 +1,5 @@
 """What tests of every package share: a plant of numbers, a clock, results, readings of films."""
+# ruff: noqa: E402 - what is set first must be set before numpy is imported
 
 import os
 import sys
