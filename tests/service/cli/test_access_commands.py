@@ -30,15 +30,6 @@ Padwatch = Callable[..., Result]
 
 
 @pytest.fixture
-def plant_path(plant_text: str, tmp_path: Path) -> Path:
-    path, folder = tmp_path / "plant.toml", tmp_path / "data"
-    old = 'data_folder = "var/demo"'
-    assert old in plant_text
-    path.write_text(plant_text.replace(old, f'data_folder = "{folder}"'), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
 def padwatch(plant_path: Path) -> Padwatch:
     """Runs a command on that plant; a password is handed over by a pipe."""
 

@@ -1,10 +1,8 @@
-"""The command line as a process: exit codes, one line for people, no traceback."""
+"""The command line as a whole: exit codes, one line for people, no traceback."""
 
 import json
 import re
 import socket
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,27 +10,20 @@ from typing import Any
 import pytest
 
 Changed = Callable[[str, str], tuple[str, int]]
-
-
-def padwatch(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "service.cli.main", *arguments]
-    environment = {"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}
-    return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=60, check=False
-    )
+Padwatch = Callable[..., Any]
 
 
 @pytest.mark.parametrize("command", [("run",), ("config", "check"), ("daq",)], ids=" ".join)
 def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistake(
-    changed: Changed, tmp_path: Path, command: tuple[str, ...]
+    padwatch: Padwatch, changed: Changed, tmp_path: Path, command: tuple[str, ...]
 ) -> None:
     text, line = changed("bracket_stiffness_n_per_m = 1.18e9", "bracket_stiffness_n_per_m = 1.18")
     path = tmp_path / "plant.toml"
     path.write_text(text, encoding="utf-8")
 
-    result = padwatch(*command, str(path))
+    result = padwatch(*command, path)
 
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert result.stdout == ""
     assert result.stderr.startswith(
         f"{path}:{line}: unit[1].bearing[1].bracket_stiffness_n_per_m = 1.18: "
@@ -40,23 +31,24 @@ def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistak
     assert result.stderr.count("\n") == 1
 
 
-def test_a_plant_file_that_is_not_there_ends_with_2_in_one_line(tmp_path: Path) -> None:
-    result = padwatch("run", str(tmp_path / "absent.toml"))
+def test_a_plant_file_that_is_not_there_ends_with_2_in_one_line(
+    padwatch: Padwatch, tmp_path: Path
+) -> None:
+    result = padwatch("run", tmp_path / "absent.toml")
 
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert result.stderr == f"{tmp_path / 'absent.toml'}: No such file or directory\n"
 
 
-def test_a_port_in_use_is_one_line_and_exit_1(changed: Changed, tmp_path: Path) -> None:
-    text, _ = changed('data_folder = "var/demo"', f'data_folder = "{tmp_path}/data"')
-    path = tmp_path / "plant.toml"
-    path.write_text(text, encoding="utf-8")
+def test_a_port_in_use_is_one_line_and_exit_1(
+    padwatch: Padwatch, plant_path: Path, tmp_path: Path
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
 
-        result = padwatch("run", str(path), "--port", str(port))
+        result = padwatch("run", plant_path, "--port", port)
 
-    assert result.returncode == 1
+    assert result.exit_code == 1
     assert result.stderr == (
         f"padwatch: cannot listen on 127.0.0.1 port {port}: Address already in use\n"
     )
@@ -65,30 +57,31 @@ def test_a_port_in_use_is_one_line_and_exit_1(changed: Changed, tmp_path: Path) 
 
 
 def test_a_database_of_another_program_is_one_line_and_exit_1(
-    changed: Changed, tmp_path: Path
+    padwatch_program: Padwatch, plant_path: Path, tmp_path: Path
 ) -> None:
-    text, _ = changed('data_folder = "var/demo"', f'data_folder = "{tmp_path}"')
-    path = tmp_path / "plant.toml"
-    path.write_text(text.replace("port = 0", "port = 502"), encoding="utf-8")
-    (tmp_path / "padwatch.sqlite3").write_bytes(b"not a database at all, but some text" * 100)
+    plant_path.write_text(plant_path.read_text().replace("port = 0", "port = 502"))
+    database = tmp_path / "data" / "padwatch.sqlite3"
+    database.parent.mkdir()
+    database.write_bytes(b"not a database at all, but some text" * 100)
 
-    result = padwatch("run", str(path), "--port", "0")
+    result = padwatch_program("run", plant_path, "--port", "0")
 
-    assert result.returncode == 1
-    assert result.stderr == f"padwatch: {tmp_path}/padwatch.sqlite3: file is not a database\n"
+    assert result == (1, "", f"padwatch: {database}: file is not a database\n")
 
 
-def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path: Path) -> None:
+def test_the_example_is_a_plant_file_that_passes_the_check(
+    padwatch: Padwatch, padwatch_program: Padwatch, tmp_path: Path
+) -> None:
     path = tmp_path / "plant.toml"
     path.write_text(padwatch("config", "example").stdout, encoding="utf-8")
 
-    result = padwatch("config", "check", "--json", str(path))
+    result = padwatch_program("config", "check", "--json", path)
 
-    assert result.returncode == 0
+    assert result.exit_code == 0
     assert json.loads(result.stdout)["units"] >= 1
 
 
-def test_the_schema_says_what_every_key_means() -> None:
+def test_the_schema_says_what_every_key_means(padwatch: Padwatch) -> None:
     schema = json.loads(padwatch("config", "schema").stdout)
 
     assert schema["type"] == "object"
@@ -104,16 +97,16 @@ def test_the_schema_says_what_every_key_means() -> None:
         assert reference in schema["$defs"]
 
 
-def test_help_names_every_command() -> None:
+def test_help_names_every_command(padwatch: Padwatch) -> None:
     result = padwatch("--help")
 
-    assert result.returncode == 0
+    assert result.exit_code == 0
     for command in ("run", "demo", "daq", "validate", "config"):
         assert re.search(rf"\b{command}\b", result.stdout)
 
 
-def test_a_command_that_does_not_exist_ends_with_2() -> None:
-    assert padwatch("runn").returncode == 2
+def test_a_command_that_does_not_exist_ends_with_2(padwatch: Padwatch) -> None:
+    assert padwatch("runn").exit_code == 2
 
 
 def _keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -1,15 +1,14 @@
-"""`padwatch delivery` as a process."""
+"""`padwatch delivery test|retry`."""
 
 import asyncio
 import json
-import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+Padwatch = Callable[..., Any]
 
 RECEIVER = """
 [[delivery.receiver]]
@@ -19,21 +18,10 @@ url = "http://127.0.0.1:{port}/"
 """
 
 
-async def padwatch(*arguments: object) -> tuple[int, str, str]:
-    program = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "service.cli.main", "delivery", *map(str, arguments)),
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-        env={"PYTHONPATH": str(ROOT), "PATH": ""},
-    )
-    said, complained = await program.communicate()
-    return program.returncode or 0, said.decode(), complained.decode()
-
-
 @pytest.fixture
-async def desk(plant_text: str, tmp_path: Path) -> AsyncIterator[dict[str, Any]]:
+async def desk(plant_path: Path) -> AsyncIterator[dict[str, Any]]:
     """A web server with the plant file that names it; answers what it is told to."""
-    found: dict[str, Any] = {"answer": "200 OK", "bodies": [], "plant": tmp_path / "plant.toml"}
+    found: dict[str, Any] = {"answer": "200 OK", "bodies": [], "plant": plant_path}
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
@@ -44,17 +32,18 @@ async def desk(plant_text: str, tmp_path: Path) -> AsyncIterator[dict[str, Any]]
 
     server = await asyncio.start_server(serve, "127.0.0.1", 0)
     receiver = RECEIVER.format(port=server.sockets[0].getsockname()[1])
-    text = plant_text.replace("var/demo", str(tmp_path / "data")) + receiver
-    found["plant"].write_text(text, encoding="utf-8")
+    plant_path.write_text(plant_path.read_text(encoding="utf-8") + receiver, encoding="utf-8")
     yield found
     server.close()
     await server.wait_closed()
 
 
-async def test_a_test_message_arrives_and_says_that_it_is_one(desk: dict[str, Any]) -> None:
-    code, said, complained = await padwatch("test", desk["plant"], "desk")
+async def test_a_test_message_arrives_and_says_that_it_is_one(
+    padwatch_program: Padwatch, desk: dict[str, Any]
+) -> None:
+    done = await asyncio.to_thread(padwatch_program, "delivery", "test", desk["plant"], "desk")
 
-    assert (code, said, complained) == (0, "desk: delivered: 200\n", "")
+    assert done == (0, "desk: delivered: 200\n", "")
     (body,) = desk["bodies"]
     assert (body["type"], body["plant"]) == ("test", "Demo plant")
 
@@ -63,25 +52,28 @@ async def test_a_test_message_arrives_and_says_that_it_is_one(desk: dict[str, An
     ("answer", "outcome"), [("401 No", "refused"), ("503 Away", "not delivered")]
 )
 async def test_a_test_message_that_is_not_taken_says_why(
-    answer: str, outcome: str, desk: dict[str, Any]
+    padwatch: Padwatch, answer: str, outcome: str, desk: dict[str, Any]
 ) -> None:
     desk["answer"] = answer
-    code, said, _ = await padwatch("test", desk["plant"], "desk", "--json")
+    command = ("delivery", "test", desk["plant"], "desk", "--json")
+    done = await asyncio.to_thread(padwatch, *command)
 
-    assert code == 1
-    (found,) = json.loads(said)
+    assert done.exit_code == 1
+    (found,) = json.loads(done.stdout)
     assert (found["outcome"], found["answer"]) == (outcome, answer[:3])
 
 
-async def test_a_receiver_that_there_is_not_is_refused(desk: dict[str, Any]) -> None:
-    code, _, complained = await padwatch("test", desk["plant"], "office")
+@pytest.mark.parametrize(
+    ("command", "receiver", "code", "said"),
+    [
+        ("test", "office", 2, "there is no receiver office; the plant file has desk"),
+        ("retry", "desk", 1, "there is no such database"),
+    ],
+)
+async def test_what_needs_a_receiver_or_a_database_is_refused_without(
+    padwatch: Padwatch, desk: dict[str, Any], command: str, receiver: str, code: int, said: str
+) -> None:
+    done = await asyncio.to_thread(padwatch, "delivery", command, desk["plant"], receiver)
 
-    assert code == 2
-    assert "there is no receiver office; the plant file has desk" in complained
-
-
-async def test_a_new_try_needs_a_database(desk: dict[str, Any]) -> None:
-    code, _, complained = await padwatch("retry", desk["plant"], "desk")
-
-    assert code == 1
-    assert "there is no such database" in complained
+    assert done.exit_code == code
+    assert said in done.stderr

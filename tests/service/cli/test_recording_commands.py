@@ -1,13 +1,12 @@
-"""`padwatch record` and `padwatch reanalyse` as processes."""
+"""`padwatch record` and `padwatch reanalyse`."""
 
 import asyncio
 import json
 import signal
-import subprocess
-import sys
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,17 +24,9 @@ from service.settings.units import UnitSettings
 from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of
 from service.wiring.simulations import simulated_feed as feed_of
 
-COMMAND = [sys.executable, "-m", "service.cli.main"]
-ENVIRONMENT = {"PYTHONFAULTHANDLER": "1", "PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}
+Padwatch = Callable[..., Any]
 
 SMALL = "[analysis]\nsegment_samples = 4096\nn_segments = 4\n\n[service]"
-
-
-def padwatch(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [*COMMAND, *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, env=ENVIRONMENT, timeout=60, check=False
-    )
 
 
 @pytest.fixture
@@ -64,17 +55,20 @@ def recording(plant: PlantFile, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> None:
+def test_a_recorded_unit_can_be_read_back(
+    padwatch: Padwatch, padwatch_program: Padwatch, plant_path: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "run"
-    result = padwatch("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
-    assert (result.returncode, result.stderr) == (0, "")
+    command = ("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
+    result = padwatch_program(*command)
+    assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout == f"{out}: 0.5 s of unit U2, 12 channels, 0.0 MB\n"
     manifest = recording_of(out).manifest
     assert (manifest.unit, manifest.n_samples, manifest.n_blocks) == ("U2", 300, 6)
     assert manifest.made_by.startswith("padwatch 0")
 
-    again = padwatch("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
-    assert (again.returncode, again.stdout) == (1, "")
+    again = padwatch(*command)
+    assert (again.exit_code, again.stdout) == (1, "")
     assert again.stderr == (
         f"padwatch record: {out}: is there already; a recording is never overwritten\n"
     )
@@ -120,36 +114,41 @@ async def test_a_lost_link_ends_a_recording_and_keeps_it(plant: PlantFile, tmp_p
     assert recording_of(tmp_path / "run").manifest.n_samples == 180
 
 
-def test_no_source_leaves_no_recording(plant_path: Path, tmp_path: Path) -> None:
+def test_no_source_leaves_no_recording(
+    padwatch: Padwatch, plant_path: Path, tmp_path: Path
+) -> None:
     text = plant_path.read_text().replace(
         'kind = "simulated"', 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = 1'
     )
     plant_path.write_text(text)
     result = padwatch("record", plant_path, "--unit", "U1", "--out", tmp_path / "run")
-    assert result.returncode == 1
+    assert result.exit_code == 1
     assert result.stderr.startswith("padwatch record: 127.0.0.1:1: ")
     assert result.stderr.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plant.toml"]
 
 
-def test_a_unit_has_to_be_chosen_and_to_exist(plant_path: Path, tmp_path: Path) -> None:
+def test_a_unit_has_to_be_chosen_and_to_exist(
+    padwatch: Padwatch, plant_path: Path, tmp_path: Path
+) -> None:
     result = padwatch("record", plant_path, "--out", tmp_path / "run")
-    assert (result.returncode, result.stderr) == (
+    assert (result.exit_code, result.stderr) == (
         2,
         f"{plant_path}: has units U1, U2; choose one with --unit\n",
     )
     result = padwatch("record", plant_path, "--unit", "U3", "--out", tmp_path / "run")
-    assert (result.returncode, result.stderr) == (
+    assert (result.exit_code, result.stderr) == (
         2,
         f"{plant_path}: has no unit U3, it has U1, U2\n",
     )
 
 
 async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_digit(
-    plant: PlantFile, plant_path: Path, recording: Path
+    padwatch: Padwatch, plant: PlantFile, plant_path: Path, recording: Path
 ) -> None:
-    result = padwatch("reanalyse", recording, "--plant", plant_path, "--json")
-    assert (result.returncode, result.stderr) == (0, "")
+    command = ("reanalyse", recording, "--plant", plant_path, "--json")
+    result = await asyncio.to_thread(padwatch, *command)
+    assert (result.exit_code, result.stderr) == (0, "")
 
     opened, unit = recording_of(recording), plant.unit[0]
     source = recording_source(opened, selection_of(opened, unit), None, SystemClock())
@@ -161,13 +160,15 @@ async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_d
     assert len(expected) == 3 * 5
     assert json.loads(result.stdout) == expected
 
-    last = padwatch("reanalyse", recording, "--plant", plant_path, "--json", "--window", "last")
+    last = await asyncio.to_thread(padwatch, *command, "--window", "last")
     assert json.loads(last.stdout) == expected[-3:]
 
 
-def test_people_get_a_table_for_each_bearing(plant_path: Path, recording: Path) -> None:
+def test_people_get_a_table_for_each_bearing(
+    padwatch: Padwatch, plant_path: Path, recording: Path
+) -> None:
     result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.returncode, result.stderr) == (0, "")
+    assert (result.exit_code, result.stderr) == (0, "")
     for bearing in ("UJB", "LJB", "TJB"):
         assert f"\nU1 {bearing}, " in result.stdout
     assert result.stdout.count("4 of 4 segments") == 3
@@ -175,7 +176,7 @@ def test_people_get_a_table_for_each_bearing(plant_path: Path, recording: Path) 
 
 
 def test_another_calibration_is_told_and_used_only_when_asked_for(
-    plant_path: Path, recording: Path
+    padwatch: Padwatch, plant_path: Path, recording: Path
 ) -> None:
     text = plant_path.read_text()
     plant_path.write_text(text.replace("sensitivity = 4.0", "sensitivity = 3.9", 1))
@@ -206,28 +207,30 @@ def test_another_calibration_is_told_and_used_only_when_asked_for(
     ],
 )
 def test_a_recording_of_something_else_is_refused_naming_both(
-    plant_path: Path, recording: Path, old: str, new: str, words: str
+    padwatch: Padwatch, plant_path: Path, recording: Path, old: str, new: str, words: str
 ) -> None:
     text = plant_path.read_text()
     plant_path.write_text(text.replace(old, new))
     result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.returncode, result.stdout) == (1, ""), result.stderr
+    assert (result.exit_code, result.stdout) == (1, ""), result.stderr
     assert words in result.stderr
     assert result.stderr.count("\n") == 1
 
 
-def test_a_damaged_recording_is_one_line_and_exit_1(plant_path: Path, recording: Path) -> None:
+def test_a_damaged_recording_is_one_line_and_exit_1(
+    padwatch: Padwatch, plant_path: Path, recording: Path
+) -> None:
     (recording / "samples.parquet").write_bytes(b"PAR1")
     result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.returncode, result.stdout) == (1, ""), result.stderr
+    assert (result.exit_code, result.stdout) == (1, ""), result.stderr
     assert result.stderr.startswith(f"padwatch reanalyse: {recording}/samples.parquet: 4 bytes, ")
 
 
 def test_a_recording_too_short_for_a_segment_says_so(
-    plant: PlantFile, plant_path: Path, tmp_path: Path
+    padwatch: Padwatch, plant: PlantFile, plant_path: Path, tmp_path: Path
 ) -> None:
     with recording_writer(plant.unit[0], tmp_path / "short", "a test") as writer:
         writer.write(feed_of(plant.unit[0], SystemClock()).advance(4095))
     result = padwatch("reanalyse", tmp_path / "short", "--plant", plant_path)
-    assert (result.returncode, result.stdout) == (1, ""), result.stderr
+    assert (result.exit_code, result.stdout) == (1, ""), result.stderr
     assert "no segment of 4096 samples without a gap" in result.stderr

@@ -1,56 +1,37 @@
-"""`padwatch reference` as a process."""
+"""`padwatch reference set|list`."""
 
 import json
-import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-COMMAND = [sys.executable, "-m", "service.cli.main", "reference"]
-ENVIRONMENT = {"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""}
+Padwatch = Callable[..., Any]
+
 OPTIONS = {"unit": "U1", "bearing": "UJB", "author": "A. Name", "x-um": 1998.5, "y-um": 2003.1}
 
 
-def padwatch(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        env=ENVIRONMENT,
-        timeout=60,
-        check=False,
-    )
-
-
-def set_reference(plant: Path, *flags: str, **changes: Any) -> subprocess.CompletedProcess[str]:
+def set_reference(run: Padwatch, plant: Path, *flags: str, **changes: Any) -> Any:
     named = {name.replace("_", "-"): value for name, value in changes.items()}
     options = [f"--{name}={v}" for name, v in (OPTIONS | named).items() if v is not None]
-    return padwatch("set", plant, *options, *flags)
+    return run("reference", "set", plant, *options, *flags)
 
 
-@pytest.fixture
-def plant_path(plant_text: str, tmp_path: Path) -> Path:
-    path, folder = tmp_path / "plant.toml", tmp_path / "data"
-    old = 'data_folder = "var/demo"'
-    assert old in plant_text
-    path.write_text(plant_text.replace(old, f'data_folder = "{folder}"'), encoding="utf-8")
-    return path
-
-
-def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path: Path) -> None:
-    first = set_reference(plant_path)
+def test_what_was_set_is_listed_with_time_author_and_what_was_before(
+    padwatch: Padwatch, padwatch_program: Padwatch, plant_path: Path
+) -> None:
+    first = set_reference(padwatch_program, plant_path)
     second = set_reference(
-        plant_path, "--json", x_um=1990.25, author=" B. Name ", note="after the overhaul"
+        padwatch, plant_path, "--json", x_um=1990.25, author=" B. Name ", note="after the overhaul"
     )
-    text = padwatch("list", plant_path)
+    text = padwatch("reference", "list", plant_path)
     listed = {
         (r["unit"], r["bearing"]): r
-        for r in json.loads(padwatch("list", plant_path, "--json").stdout)
+        for r in json.loads(padwatch("reference", "list", plant_path, "--json").stdout)
     }
 
-    assert [result.returncode for result in (first, second, text)] == [0, 0, 0]
+    assert [result.exit_code for result in (first, second, text)] == [0, 0, 0]
     assert first.stdout.startswith("U1 UJB: 1998.5, 2003.1 µm, given, set 20")
     assert first.stdout.endswith("Z by A. Name\n")
     assert first.stderr.endswith("a new database; is that where the service runs?\n")
@@ -86,49 +67,55 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
     ids=lambda value: None if isinstance(value, str) else "-".join(value),
 )
 def test_a_wrong_reference_is_one_line_with_value_and_limit_and_leaves_nothing_behind(
-    plant_path: Path, changes: dict[str, Any], said: str
+    padwatch: Padwatch, plant_path: Path, changes: dict[str, Any], said: str
 ) -> None:
-    result = set_reference(plant_path, **changes)
+    result = set_reference(padwatch, plant_path, **changes)
 
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
     assert result.stdout == ""
     assert not (plant_path.parent / "data").exists()
 
 
-def test_a_measured_reference_without_results_is_refused(plant_path: Path) -> None:
-    result = set_reference(plant_path, "--measured", x_um=None, y_um=None)
+def test_a_measured_reference_without_results_is_refused(
+    padwatch: Padwatch, plant_path: Path
+) -> None:
+    result = set_reference(padwatch, plant_path, "--measured", x_um=None, y_um=None)
 
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert result.stderr.endswith("there is no stored result yet whose gaps could be taken\n")
 
 
-def test_gaps_are_given_or_measured_but_not_both(plant_path: Path) -> None:
-    result = set_reference(plant_path, "--measured")
+def test_gaps_are_given_or_measured_but_not_both(padwatch: Padwatch, plant_path: Path) -> None:
+    result = set_reference(padwatch, plant_path, "--measured")
 
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert result.stderr == "padwatch reference set: give gaps or --measured, not both\n"
 
 
-def test_looking_at_references_creates_no_database(plant_path: Path) -> None:
-    result = padwatch("list", plant_path)
+def test_looking_at_references_creates_no_database(padwatch: Padwatch, plant_path: Path) -> None:
+    result = padwatch("reference", "list", plant_path)
 
-    assert result.returncode == 0
+    assert result.exit_code == 0
     assert result.stderr == ""
     assert not (plant_path.parent / "data").exists()
 
 
 @pytest.mark.parametrize("command", ["set", "list"])
 def test_a_database_that_cannot_be_used_is_one_line_and_exit_1(
-    plant_path: Path, command: str
+    padwatch: Padwatch, plant_path: Path, command: str
 ) -> None:
     folder = plant_path.parent / "data"
     folder.mkdir()
     (folder / "padwatch.sqlite3").write_bytes(b"speed;power\n92.3;700\n" * 100)
 
-    result = set_reference(plant_path) if command == "set" else padwatch("list", plant_path)
+    result = (
+        set_reference(padwatch, plant_path)
+        if command == "set"
+        else padwatch("reference", "list", plant_path)
+    )
 
-    assert result.returncode == 1
+    assert result.exit_code == 1
     assert "file is not a database" in result.stderr
     assert result.stderr.count("\n") == 1
