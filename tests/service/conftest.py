@@ -1,12 +1,14 @@
 """What the service's tests share: plant files as text, and a way to change one line of them."""
 
+import os
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
 
 import pytest
 from harness.places import Place, PostgresPlace, SqlitePlace
-from harness.postgres_server import PostgresServer, why_not
+from harness.postgres_server import PostgresServer, shared_server, why_not
+from rigs.memory_folder import memory_folder
 
 from service.origin import Origin
 from service.settings.loading import PlantFileError, load_plant_file
@@ -61,25 +63,46 @@ def mistakes(tmp_path: Path) -> Callable[[str | bytes], list[str]]:
 
 
 @pytest.fixture(scope="session")
-def postgres_server() -> Iterator[PostgresServer]:
-    """A server that all tests of a process share, with a database that is up to date."""
+def worker() -> str:
+    """Name of this process among those that run the tests."""
+    return os.environ.get("PYTEST_XDIST_WORKER", "main")
+
+
+@pytest.fixture(scope="session")
+def postgres_server(
+    tmp_path_factory: pytest.TempPathFactory, worker: str
+) -> Iterator[PostgresServer]:
+    """A server that all tests of a run share, with a database that is up to date."""
     why = why_not()
     if why is not None:
         pytest.skip(why)
-    with PostgresServer() as server:
-        server.create(TEMPLATE)
-        address = PostgresAddress(server.conninfo(TEMPLATE))
-        PostgresDatabase(address, Origin.LIVE).close()
+    own = tmp_path_factory.getbasetemp()
+    with shared_server(own if worker == "main" else own.parent, make_template) as server:
         yield server
 
 
+def make_template(server: PostgresServer) -> None:
+    """Make the database that fresh ones are copied from."""
+    server.create(TEMPLATE)
+    PostgresDatabase(PostgresAddress(server.conninfo(TEMPLATE)), Origin.LIVE).close()
+
+
 @pytest.fixture
-def postgres_place(postgres_server: PostgresServer, tmp_path: Path) -> Iterator[PostgresPlace]:
+def postgres_place(
+    postgres_server: PostgresServer, tmp_path: Path, worker: str
+) -> Iterator[PostgresPlace]:
     """A fresh database."""
-    name = f"padwatch_{next(NUMBERS)}"
+    name = f"padwatch_{worker}_{next(NUMBERS)}"
     postgres_server.create(name, TEMPLATE)
     yield PostgresPlace(postgres_server, name, tmp_path / "data")
     postgres_server.drop(name)
+
+
+@pytest.fixture
+def folder_in_memory() -> Iterator[Path]:
+    """A folder in which a sync costs nothing, if the machine has one."""
+    with memory_folder() as folder:
+        yield folder
 
 
 @pytest.fixture

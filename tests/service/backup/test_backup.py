@@ -34,6 +34,12 @@ def gaps_in(path: Path) -> int:
 
 
 @pytest.fixture
+def tmp_path(folder_in_memory: Path) -> Path:
+    """A folder in memory: most of the time went into syncs of the disk."""
+    return folder_in_memory
+
+
+@pytest.fixture
 def database(tmp_path: Path) -> Path:
     return tmp_path / "data" / "padwatch.sqlite3"
 

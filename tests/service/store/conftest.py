@@ -31,6 +31,12 @@ def gap() -> Callable[..., UnitGap]:
 
 
 @pytest.fixture
+def tmp_path(folder_in_memory: Path) -> Path:
+    """A folder in memory: most of the time went into syncs of the disk."""
+    return folder_in_memory
+
+
+@pytest.fixture
 def path(tmp_path: Path) -> Path:
     """Where the database is."""
     return tmp_path / "data" / "padwatch.sqlite3"

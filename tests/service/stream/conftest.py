@@ -1,12 +1,14 @@
 """Blocks that use everything a block can hold, and a real server."""
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from harness.nats_server import NatsServer, nats_server, nats_server_command
+from nats import connect
+from rigs.memory_folder import memory_folder
 
 from core.blocks import Rejection, SampleBlock
 from core.device_clock import DeviceClock, StampFault
@@ -57,8 +59,28 @@ def plant() -> PlantFile:
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[NatsServer]:
+def tmp_path(folder_in_memory: Path) -> Path:
+    """A folder in memory: most of the time went into syncs of the disk."""
+    return folder_in_memory
+
+
+@pytest.fixture(scope="session")
+def nats_of_process() -> Iterator[NatsServer]:
+    """The server that all tests of a process share."""
     if nats_server_command() is None:
-        pytest.skip("no nats-server is installed")
-    with nats_server(tmp_path / "nats") as server:
-        yield server
+        pytest.skip("needs nats-server")
+    with memory_folder() as folder, nats_server(folder) as running:
+        yield running
+
+
+@pytest.fixture
+async def server(nats_of_process: NatsServer) -> AsyncIterator[NatsServer]:
+    """A server that keeps nothing of earlier tests; it may be killed and started."""
+    yield nats_of_process
+    if not nats_of_process.is_running:
+        nats_of_process.start()
+    client = await connect(nats_of_process.url)
+    stream = client.jetstream()
+    for info in await stream.streams_info():
+        await stream.delete_stream(str(info.config.name))
+    await client.close()

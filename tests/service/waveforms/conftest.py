@@ -101,6 +101,12 @@ class Rig:
 
 
 @pytest.fixture
+def tmp_path(folder_in_memory: Path) -> Path:
+    """A folder in memory: most of the time went into syncs of the disk."""
+    return folder_in_memory
+
+
+@pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Rig]:
     built = Rig(tmp_path)
     yield built

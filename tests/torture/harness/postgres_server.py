@@ -1,21 +1,27 @@
 """A PostgreSQL server of its own for tests, out of a wheel: in a new folder, stopped at the end."""
 
+import fcntl
 import os
+import pickle
 import shutil
 import socket
 import subprocess
 import tempfile
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
+from typing import IO
 
 import psycopg
+from rigs.memory_folder import memory
 
 NOBODY = "nobody"
 """PostgreSQL refuses to run as root."""
 
 SETTINGS = {
-    "max_connections": "60",
+    "max_connections": "200",
     "shared_buffers": "32MB",
     "max_wal_size": "64MB",
     "log_min_messages": "fatal",
@@ -27,8 +33,8 @@ def why_not() -> str | None:
     """Why no server can be started on this machine; None if one can."""
     try:
         programs()
-    except ImportError as error:
-        return f"no PostgreSQL is installed: {error}"
+    except ImportError:
+        return "needs PostgreSQL"
     return None
 
 
@@ -44,27 +50,30 @@ def programs() -> Path:
 
 
 class PostgresServer:
-    """A server on a free port of loopback and on a unix socket.
+    """A server on a free port of loopback and on a unix socket; its files are in memory.
 
     Parameters
     ----------
+    like
+        Server whose empty databases are copied, which is quicker than to make new ones.
     settings
         Of ``postgresql.conf``, over those of every test.
     """
 
     PASSWORD = "a password of tests"  # noqa: S105
 
-    def __init__(self, **settings: str) -> None:
+    def __init__(self, like: "PostgresServer | None" = None, **settings: str) -> None:
         self._programs = programs()
-        self.folder = Path(tempfile.mkdtemp(prefix="padwatch-postgresql-"))
-        self.data = self.folder / "data"
+        self._is_in_memory = memory() is not None
+        self.folder = Path(tempfile.mkdtemp(prefix="padwatch-postgresql-", dir=memory()))
+        self.data, self._empty = self.folder / "data", self.folder / "empty"
         self._settings = {**SETTINGS, **settings}
         self._user = NOBODY if os.geteuid() == 0 else None
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port: int = free.getsockname()[1]
         try:
-            self._make()
+            self._make(like)
             self.start()
         except BaseException:
             self.close()
@@ -120,7 +129,9 @@ class PostgresServer:
 
     def create(self, database: str, template: str = "template0") -> str:
         """Make a database; how to reach it."""
-        self.execute(f"CREATE DATABASE {database} TEMPLATE {template}")
+        # copied files need a checkpoint, which takes seconds on a disk and nothing in memory
+        strategy = "file_copy" if self._is_in_memory else "wal_log"
+        self.execute(f"CREATE DATABASE {database} TEMPLATE {template} STRATEGY {strategy}")
         return self.conninfo(database)
 
     def drop(self, database: str) -> None:
@@ -131,21 +142,27 @@ class PostgresServer:
         """Run one of PostgreSQL's own programs; what it prints."""
         return self._run(program, *arguments)
 
-    def _make(self) -> None:
+    def _make(self, like: "PostgresServer | None") -> None:
         if self._user is not None:
             shutil.chown(self.folder, self._user)
         self.folder.chmod(0o755)
+        if like is None:
+            self._make_empty()
+        empty = self._empty if like is None else like._empty
+        subprocess.run(["cp", "-a", empty, self.data], check=True)  # noqa: S607
+        with (self.data / "postgresql.conf").open("a") as file:
+            file.write(f"port = {self.port}\nlisten_addresses = '127.0.0.1'\n")
+            file.write(f"unix_socket_directories = '{self.folder}'\n")
+
+    def _make_empty(self) -> None:
         password = self.folder / "password"
         password.write_text(self.PASSWORD)
         password.chmod(0o644)
         self._run(
-            *("initdb", "-D", self.data, "-U", "postgres", "--no-sync", "--no-instructions"),
+            *("initdb", "-D", self._empty, "-U", "postgres", "--no-sync", "--no-instructions"),
             *("--encoding=utf8", "--locale=C.UTF-8", "--wal-segsize=4"),
             *("--auth-local=trust", "--auth-host=scram-sha-256", f"--pwfile={password}"),
         )
-        with (self.data / "postgresql.conf").open("a") as file:
-            file.write(f"port = {self.port}\nlisten_addresses = '127.0.0.1'\n")
-            file.write(f"unix_socket_directories = '{self.folder}'\n")
 
     def _run(self, program: str, *arguments: object) -> str:
         command = [str(self._programs / program), *(str(argument) for argument in arguments)]
@@ -159,3 +176,46 @@ class PostgresServer:
             log = self.folder / "log"
             raise RuntimeError(f"{program}: {text}\n{log.read_text() if log.exists() else ''}")
         return text
+
+
+@contextmanager
+def shared_server(
+    folder: Path, prepare: Callable[[PostgresServer], None]
+) -> Iterator[PostgresServer]:
+    """Use the one server of all processes that name the same folder; the last one stops it.
+
+    Parameters
+    ----------
+    prepare
+        Is done once, by the process that starts the server.
+    """
+    found = folder / "postgresql.pickle"
+    with (folder / "turn.lock").open("w") as turn, (folder / "users.lock").open("w") as users:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        fcntl.flock(users, fcntl.LOCK_SH)  # ends with the process, however that ends
+        if found.exists():
+            server: PostgresServer = pickle.loads(found.read_bytes())  # noqa: S301
+        else:
+            server = PostgresServer()
+            try:
+                prepare(server)
+            except BaseException:
+                server.close()
+                raise
+            found.write_bytes(pickle.dumps(server))
+        fcntl.flock(turn, fcntl.LOCK_UN)
+        try:
+            yield server
+        finally:
+            fcntl.flock(turn, fcntl.LOCK_EX)
+            if _is_last(users):
+                found.unlink()
+                server.close()
+
+
+def _is_last(users: IO[str]) -> bool:
+    try:
+        fcntl.flock(users, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

@@ -1,6 +1,7 @@
-"""A server of a module's own, which its tests may stop; and ways that are cut."""
+"""A second server, which tests may stop; and ways that are cut."""
 
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -11,18 +12,20 @@ from harness.postgres_server import PostgresServer
 from service.store.postgres import PostgresStore
 from service.store.postgres.address import PostgresAddress
 
+NUMBERS = count()
 
-@pytest.fixture(scope="module")
-def own_server(postgres_server: PostgresServer) -> Iterator[PostgresServer]:  # noqa: ARG001
+
+@pytest.fixture(scope="session")
+def own_server(postgres_server: PostgresServer) -> Iterator[PostgresServer]:
     """A server that may be stopped; there is one only where there is the shared one."""
-    with PostgresServer(wal_writer_delay="10s") as server:
+    with PostgresServer(postgres_server, wal_writer_delay="10s") as server:
         yield server
 
 
 @pytest.fixture
 def own_place(own_server: PostgresServer, tmp_path: Path) -> Iterator[PostgresPlace]:
     """An empty database of the server that may be stopped."""
-    name = f"padwatch_{tmp_path.name.lower()[-20:]}"
+    name = f"padwatch_{next(NUMBERS)}"
     own_server.create(name)
     yield PostgresPlace(own_server, name, tmp_path / "data")
     own_server.drop(name)

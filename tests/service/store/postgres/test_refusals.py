@@ -115,8 +115,10 @@ def test_a_migration_that_fails_leaves_the_database_as_it_was(
     postgres_place.open().close()
 
 
-def test_a_server_that_loses_results_at_a_power_cut_is_refused(tmp_path: Path) -> None:
-    with PostgresServer(fsync="off") as careless:
+def test_a_server_that_loses_results_at_a_power_cut_is_refused(
+    postgres_server: PostgresServer, tmp_path: Path
+) -> None:
+    with PostgresServer(postgres_server, fsync="off") as careless:
         careless.create("padwatch")
         address = PostgresAddress(careless.conninfo("padwatch"))
         said = refused(address, tmp_path)
