@@ -76,6 +76,7 @@ def test_a_reading_that_is_not_good_has_no_number_but_its_reason() -> None:
         ("state", 1, "resting", "line 3: unknown state 'resting'"),
         ("k_n_per_m", 5, -1.0, "line 7: k_n_per_m must be above 0, not -1.0"),
         ("k_n_per_m", 5, float("nan"), "line 7: k_n_per_m must be above 0, not nan"),
+        ("k_n_per_m", 5, float("inf"), "line 7: k_n_per_m must be finite, not inf"),
         ("u_random", 5, 0.0, "line 7: u_random must be above 0, not 0.0"),
         ("oil_temperature_c", 2, float("inf"), "line 4: oil_temperature_c must be finite"),
         ("time_ns", 6, 0, "line 8: the same time twice"),

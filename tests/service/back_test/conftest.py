@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
+from rigs.tiers import fast_and_long
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
@@ -23,7 +24,6 @@ DAY_NS = 86_400 * 10**9
 START_NS = 19_723 * DAY_NS
 """Midnight of 1 January 2024."""
 
-DAMAGED_NS = START_NS + 400 * DAY_NS
 HEADINGS = (
     "time,unit,bearing,direction,k_n_per_m,u_random,eccentricity_ratio,oil_temperature_c,"
     "state,quality"
@@ -70,23 +70,34 @@ def text() -> Callable[..., str]:
 
 @dataclass(frozen=True)
 class TwoUnits:
-    """Two simulated units and the same readings in two files; U2 loses stiffness in one bearing."""
+    """Two simulated units and the same readings in two files; U2 loses stiffness in one bearing.
 
+    Baselines are learned from `learning_days`; the damage comes at `damaged_ns`.
+    """
+
+    learning_days: int
+    damaged_ns: int
     lives: Mapping[str, UnitLife]
     csv: Path
     parquet: Path
 
 
-@pytest.fixture(scope="session")
-def two_units(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TwoUnits]:
+@pytest.fixture(scope="session", params=fast_and_long((90, 110, 0.45), (365, 400, 1.3)), ids=str)
+def two_units(
+    tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> Iterator[TwoUnits]:
+    learning_days, damaged_day, years = request.param
+    damaged_ns = START_NS + damaged_day * DAY_NS
     folder = tmp_path_factory.mktemp("two_units")
-    damage = Damage(DamageKind.STIFFNESS_LOSS, "LJB", DAMAGED_NS, 0.15)
+    damage = Damage(DamageKind.STIFFNESS_LOSS, "LJB", damaged_ns, 0.15)
     lives = {
-        "U1": live(1000, START_NS, 1.3),
-        "U2": live(1001, START_NS, 1.3, [damage]),
+        "U1": live(1000, START_NS, years),
+        "U2": live(1001, START_NS, years, [damage]),
     }
     table = pa.concat_tables(_table(name, life) for name, life in lives.items())
-    found = TwoUnits(lives, folder / "readings.csv", folder / "readings.parquet")
+    found = TwoUnits(
+        learning_days, damaged_ns, lives, folder / "readings.csv", folder / "readings.parquet"
+    )
     pq.write_table(table, found.parquet)
     times = np.char.add(np.datetime_as_string(table["time"].to_numpy()), "Z")
     pacsv.write_csv(table.set_column(0, "time", pa.array(times)), found.csv)

@@ -29,11 +29,7 @@ from service.back_test.periods import DAY_NS, Learning, MachineEvent
 from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
 
-pytestmark = pytest.mark.long
-
 START_NS = 19_723 * DAY_NS
-DAMAGED_NS = START_NS + 400 * DAY_NS
-YEAR = Learning(days=365)
 BRACKETS = {
     (unit, bearing): k
     for unit in ("U1", "U2")
@@ -47,8 +43,13 @@ def histories(two_units: Any) -> Mapping[Place, BearingRows]:
 
 
 @pytest.fixture(scope="module")
-def found(histories: Mapping[Place, BearingRows]) -> Found:
-    return run_back_test(histories, BackTestRules(YEAR, bracket_n_per_m=BRACKETS))
+def learning(two_units: Any) -> Learning:
+    return Learning(days=two_units.learning_days)
+
+
+@pytest.fixture(scope="module")
+def found(histories: Mapping[Place, BearingRows], learning: Learning) -> Found:
+    return run_back_test(histories, BackTestRules(learning, bracket_n_per_m=BRACKETS))
 
 
 def test_csv_and_parquet_are_the_same_histories(
@@ -72,7 +73,7 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
         is_settled = operation_history(
             operation.time_ns, operation.speed_rpm, operation.power_mw, limits
         ).is_settled
-        learned_ns = operation.time_ns[0] + 365 * DAY_NS
+        learned_ns = operation.time_ns[0] + two_units.learning_days * DAY_NS
         n = int(np.searchsorted(operation.time_ns, learned_ns))
         for bearing, history in life.readings.items():
             baseline = _learned(unit, bearing, history.rows(0, n), is_settled[:n])
@@ -102,10 +103,10 @@ def _learned(unit: str, bearing: str, history: Any, is_settled: Any) -> BearingB
     return learn(history, is_settled, origin, BaselineSettings())
 
 
-def test_the_damage_is_told_with_its_evidence(found: Found) -> None:
+def test_the_damage_is_told_with_its_evidence(two_units: Any, found: Found) -> None:
     alarm = next(a for a in found.alarms if (a.unit, a.bearing) == ("U2", "LJB"))
     begin = alarm.begin
-    assert rfc3339(DAMAGED_NS) < begin < rfc3339(DAMAGED_NS + 3 * DAY_NS)
+    assert rfc3339(two_units.damaged_ns) < begin < rfc3339(two_units.damaged_ns + 3 * DAY_NS)
     assert alarm.end is None
     assert abs(alarm.largest.percent) >= abs(alarm.raised.percent) > 4.0
     assert 0.0 < alarm.raised.u_percent < 3.0
@@ -128,7 +129,9 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
     is_settled = operation_history(
         operation.time_ns, operation.speed_rpm, operation.power_mw, limits
     ).is_settled
-    n = int(np.searchsorted(operation.time_ns, operation.time_ns[0] + 365 * DAY_NS))
+    n = int(
+        np.searchsorted(operation.time_ns, operation.time_ns[0] + two_units.learning_days * DAY_NS)
+    )
     places = [(b, d) for b in sorted(histories) for d in DIRECTIONS]
     ordered = {b: histories[b] for b in sorted(histories)}
     response = learn_response({b: h.rows(0, n) for b, h in ordered.items()}, is_settled[:n])
@@ -152,7 +155,7 @@ def _deviation(history: Any, baselines: Any, bearing: str, direction: str) -> An
 
 
 def test_every_reading_is_counted_once(
-    histories: Mapping[Place, BearingRows], found: Found
+    two_units: Any, histories: Mapping[Place, BearingRows], found: Found
 ) -> None:
     assert len(found.films) == 12
     for film in found.films:
@@ -162,7 +165,11 @@ def test_every_reading_is_counted_once(
         assert film.baselines[0].cells_own > 10
     n_alarms = sum(film.n_alarms for film in found.films)
     assert found.rate().n_alarms == len(found.alarms) == n_alarms
-    assert found.unit_years == pytest.approx(2 * 0.3, abs=0.02)
+    compared_days = [
+        np.ptp(life.operation.time_ns) / DAY_NS - two_units.learning_days
+        for life in two_units.lives.values()
+    ]
+    assert found.unit_years == pytest.approx(sum(compared_days) / 365.25, abs=0.02)
 
 
 def test_exported_baselines_read_back_as_they_were(found: Found, tmp_path: Any) -> None:
@@ -174,37 +181,43 @@ def test_exported_baselines_read_back_as_they_were(found: Found, tmp_path: Any) 
 
 
 def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
-    histories: Mapping[Place, BearingRows],
+    two_units: Any, histories: Mapping[Place, BearingRows]
 ) -> None:
     """What has changed before it is healthy after it, and nothing is compared across it."""
-    event = MachineEvent("U2", "LJB", DAMAGED_NS, "new pads")
-    learning = Learning(days=30, until_ns=START_NS + 365 * DAY_NS)
+    event = MachineEvent("U2", "LJB", two_units.damaged_ns, "new pads")
+    learning = Learning(days=30, until_ns=START_NS + two_units.learning_days * DAY_NS)
     unit = {place: rows for place, rows in histories.items() if place[0] == "U2"}
     found = run_back_test(unit, BackTestRules(learning, events=[event]))
     baselines = {film.bearing: film.baselines for film in found.films}
     assert [b.event for b in baselines["LJB"]] == ["", "new pads"]
     assert [b.event for b in baselines["UJB"]] == [""]
-    assert not any(a.bearing == "LJB" and a.begin >= rfc3339(DAMAGED_NS) for a in found.alarms)
+    assert not any(
+        a.bearing == "LJB" and a.begin >= rfc3339(two_units.damaged_ns) for a in found.alarms
+    )
 
 
-def test_a_fault_that_was_learned_is_doubted(histories: Mapping[Place, BearingRows]) -> None:
+def test_a_fault_that_was_learned_is_doubted(
+    two_units: Any, histories: Mapping[Place, BearingRows]
+) -> None:
     place = ("U2", "LJB")
-    found = run_back_test({place: histories[place]}, BackTestRules(Learning(days=450)))
+    until_ns = two_units.damaged_ns + 50 * DAY_NS
+    learning = Learning(days=30, until_ns=until_ns)
+    found = run_back_test({place: histories[place]}, BackTestRules(learning))
     (doubt,) = found.doubts
     assert doubt.startswith("U2 LJB baseline 1: x changed by -")
     assert doubt.endswith("the service would leave it to an engineer")
 
 
 def test_an_event_of_a_bearing_without_readings_is_refused(
-    histories: Mapping[Place, BearingRows],
+    two_units: Any, histories: Mapping[Place, BearingRows], learning: Learning
 ) -> None:
-    event = MachineEvent("U3", None, DAMAGED_NS, "overhaul")
+    event = MachineEvent("U3", None, two_units.damaged_ns, "overhaul")
     with pytest.raises(ReadingsError, match="event of U3: there are no readings of it"):
-        run_back_test(histories, BackTestRules(YEAR, events=[event]))
+        run_back_test(histories, BackTestRules(learning, events=[event]))
 
 
 def test_without_attitude_or_shaft_motion_less_is_known_and_said(
-    histories: Mapping[Place, BearingRows],
+    histories: Mapping[Place, BearingRows], learning: Learning
 ) -> None:
     rows = histories["U2", "LJB"]
     nothing = np.full(len(rows.history), np.nan)
@@ -214,7 +227,7 @@ def test_without_attitude_or_shaft_motion_less_is_known_and_said(
             rows.history, attitude_deg=nothing, shaft_um_pk=np.stack([nothing, nothing])
         ),
     )
-    found = run_back_test({("U2", "LJB"): poorer}, BackTestRules(YEAR))
+    found = run_back_test({("U2", "LJB"): poorer}, BackTestRules(learning))
     assert found.doubts == ["U2 LJB: no attitude_deg, so that its baseline does without"]
     assert all(q.surface.shape.has_attitude is False for q in found.baselines[0].quantities)
     assert {a.cause.reason for a in found.alarms} == {
@@ -223,7 +236,7 @@ def test_without_attitude_or_shaft_motion_less_is_known_and_said(
 
 
 def test_states_that_are_not_told_are_followed_or_asked_for(
-    two_units: Any, histories: Mapping[Place, BearingRows], found: Found
+    two_units: Any, histories: Mapping[Place, BearingRows], learning: Learning, found: Found
 ) -> None:
     rows, life = histories["U2", "LJB"], two_units.lives["U2"]
     operation = life.operation
@@ -233,11 +246,11 @@ def test_states_that_are_not_told_are_followed_or_asked_for(
         history=replace(rows.history, speed_rpm=operation.speed_rpm, power_mw=operation.power_mw),
     )
     rated = {"U2": (operation.rated_speed_rpm, operation.rated_power_mw)}
-    followed = run_back_test({("U2", "LJB"): untold}, BackTestRules(YEAR, rated=rated))
+    followed = run_back_test({("U2", "LJB"): untold}, BackTestRules(learning, rated=rated))
     of_u2 = [film.verdicts for film in found.films if (film.unit, film.bearing) == ("U2", "LJB")]
     assert [film.verdicts for film in followed.films] == of_u2
     with pytest.raises(ReadingsError, match="unit U2: operating states are not known"):
-        run_back_test({("U2", "LJB"): untold}, BackTestRules(YEAR))
+        run_back_test({("U2", "LJB"): untold}, BackTestRules(learning))
 
 
 def test_too_little_to_learn_from_leaves_everything_without_a_baseline(
@@ -255,10 +268,10 @@ def test_too_little_to_learn_from_leaves_everything_without_a_baseline(
 
 
 def test_readings_that_are_further_apart_than_told_are_doubted(
-    histories: Mapping[Place, BearingRows],
+    histories: Mapping[Place, BearingRows], learning: Learning
 ) -> None:
     place = ("U1", "TJB")
-    rules = BackTestRules(YEAR, baseline=BaselineSettings(reading_h=1.0))
+    rules = BackTestRules(learning, baseline=BaselineSettings(reading_h=1.0))
     found = run_back_test({place: histories[place]}, rules)
     assert found.doubts == [
         "U1 TJB: readings are 10 min apart and are taken to stand for 60 min each;"
