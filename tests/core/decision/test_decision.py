@@ -2,26 +2,30 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from rigs.tiers import covering, fast_and_long
 
 from core.alarms.alarm import AlarmLevel
-from core.baseline.baseline import Watched
-from core.decision.back_test import DecisionHistory, back_test
+from core.decision.back_test import DecisionHistory
 from core.decision.decision import UNDECIDED, Decision, release
 from core.decision.limits import ChangeLimits
 from core.decision.verdict import Verdict
 from core.stiffness_history import Evidence, StiffnessHistory
 
 LIMITS = ChangeLimits()
-STIFFNESS = (Watched.STIFFNESS,)
 LATER_H = 120 * 24.0
-FilmLife = Callable[..., StiffnessHistory]
+Watch = Callable[..., Any]
 
 
 def loss(size: float, after_h: float = LATER_H + 20 * 24.0) -> Callable[[np.ndarray], np.ndarray]:
     return lambda hours: np.where(hours > after_h, np.log(1.0 - size), 0.0)
+
+
+def passing(size: float, from_h: float, to_h: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda hours: loss(size, LATER_H + from_h)(hours) - loss(size, LATER_H + to_h)(hours)
 
 
 def spoil(history: StiffnessHistory, seed: int) -> StiffnessHistory:
@@ -47,23 +51,15 @@ def assert_same(steps: list[Decision], whole: DecisionHistory) -> None:
     np.testing.assert_allclose(changes, whole.change, rtol=1e-12)
 
 
-@pytest.mark.parametrize("is_latching", [False, True])
-@pytest.mark.parametrize("size", [0.05, 0.25])
+@pytest.mark.parametrize(("size", "is_latching"), covering([0.05, 0.25], [False, True]))
 def test_a_back_test_says_what_the_plant_would_have_said(
-    film_life: FilmLife,
-    watch: Callable[..., object],
-    step_by_step: Callable[..., list[Decision]],
-    size: float,
-    is_latching: bool,
+    watch: Watch, size: float, is_latching: bool
 ) -> None:
-    def passing(hours: np.ndarray) -> np.ndarray:
-        return loss(size)(hours) - loss(size, LATER_H + 30 * 24.0)(hours)
-
     limits = replace(LIMITS, is_latching=is_latching, off_delay_h=4.0)
-    seen = watch(film_life(1, days=160, change=passing), STIFFNESS)
-    later = spoil(seen.later, 3)
-    whole = back_test(later, seen.is_settled, seen.stiffness_x, limits)
-    assert_same(step_by_step(later, seen.is_settled, seen.stiffness_x, limits), whole)
+    seen = watch(1, days=160, change=passing(size, 20 * 24.0, 30 * 24.0))
+    spoilt = replace(seen, later=spoil(seen.later, 3))
+    whole = spoilt.whole(limits)
+    assert_same(spoilt.steps(limits), whole)
     assert set(whole.verdict.tolist()) >= {
         *(Verdict.NORMAL, Verdict.ALERT, Verdict.NO_BASELINE, Verdict.TRANSIENT),
         *(Verdict.BAD_QUALITY, Verdict.INSUFFICIENT_EXCITATION, Verdict.GATHERING_EVIDENCE),
@@ -71,124 +67,96 @@ def test_a_back_test_says_what_the_plant_would_have_said(
     assert (whole.level[-1] == 0) is not is_latching
 
 
-def test_a_healthy_film_raises_nothing(film_life: FilmLife, watch: Callable[..., object]) -> None:
-    for seed in range(5):
-        seen = watch(film_life(seed, days=300), STIFFNESS)
-        found = back_test(seen.later, seen.is_settled, seen.stiffness_x, LIMITS)
+@pytest.mark.parametrize("n_seeds", fast_and_long(2, 8))
+def test_a_healthy_film_raises_nothing(watch: Watch, n_seeds: int) -> None:
+    for seed in range(n_seeds):
+        found = watch(seed, days=300).whole()
         assert found.raised().size == 0
         assert np.mean(found.verdict == Verdict.NORMAL) > 0.7
 
 
+@pytest.mark.parametrize("n_seeds", fast_and_long(2, 8))
 @pytest.mark.parametrize(("size", "within_h"), [(0.2, 24.0), (0.1, 48.0), (0.05, 196.0)])
 def test_a_softened_film_is_found_in_time(
-    film_life: FilmLife, watch: Callable[..., object], size: float, within_h: float
+    watch: Watch, size: float, within_h: float, n_seeds: int
 ) -> None:
-    for seed in range(5):
-        seen = watch(film_life(seed, days=160, change=loss(size)), STIFFNESS)
-        found = back_test(seen.later, seen.is_settled, seen.stiffness_x, LIMITS)
-        onset = int(
-            np.searchsorted(seen.later.time_ns, seen.later.time_ns[0] + 20 * 86_400 * 10**9)
-        )
+    for seed in range(n_seeds):
+        seen = watch(seed, days=160, change=loss(size))
+        found, time_ns = seen.whole(), seen.later.time_ns
+        onset = int(np.searchsorted(time_ns, time_ns[0] + 20 * 86_400 * 10**9))
         first = int(found.raised()[0])
         assert 0.0 <= (first - onset) / 6.0 <= within_h
         assert found.change[first] < -0.02
 
 
-def test_a_large_loss_is_danger_and_a_rise_of_stiffness_is_found_too(
-    film_life: FilmLife, watch: Callable[..., object]
-) -> None:
+def test_a_large_loss_is_danger_and_a_rise_of_stiffness_is_found_too(watch: Watch) -> None:
     for size, sign in ((0.3, -1.0), (-0.3, 1.0)):
-        seen = watch(film_life(1, days=140, change=loss(size, LATER_H + 24.0)), STIFFNESS)
-        found = back_test(seen.later, seen.is_settled, seen.stiffness_x, LIMITS)
+        found = watch(1, change=loss(size, LATER_H + 24.0)).whole()
         assert found.level[-1] == AlarmLevel.DANGER
         assert np.sign(found.change[-1]) == sign
 
 
-def test_the_deviation_of_a_softened_film_is_its_loss(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    seen = watch(film_life(1, days=140, change=loss(0.1, LATER_H)), STIFFNESS)
-    newest = step_by_step(seen.later, seen.is_settled, seen.stiffness_x, LIMITS)[-1]
+def test_the_deviation_of_a_softened_film_is_its_loss(watch: Watch) -> None:
+    newest = watch(1, change=loss(0.1, LATER_H)).steps()[-1]
     assert newest.finding is not None
     assert newest.finding.change == pytest.approx(np.log(0.9), abs=0.02)
 
 
-def test_spikes_raise_nothing(film_life: FilmLife, watch: Callable[..., object]) -> None:
-    seen = watch(film_life(1, days=160), STIFFNESS)
+def test_spikes_raise_nothing(watch: Watch) -> None:
+    seen = watch(1, days=160)
     rows = np.arange(len(seen.later)) % 40
     spiky = replace(seen.later, ln_k=seen.later.ln_k - np.where(rows < 2, 1.5, 0.0))
-    assert back_test(spiky, seen.is_settled, seen.stiffness_x, LIMITS).raised().size == 0
+    assert replace(seen, later=spiky).whole().raised().size == 0
 
 
-def test_nothing_is_decided_where_nothing_was_learned(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    seen = watch(film_life(1, days=140, change=loss(0.5, LATER_H)), STIFFNESS)
+def test_nothing_is_decided_where_nothing_was_learned(watch: Watch) -> None:
+    seen = watch(1, change=loss(0.5, LATER_H))
     elsewhere = replace(seen.later, oil_temperature_c=seen.later.oil_temperature_c + 60.0)
-    found = back_test(elsewhere, seen.is_settled, seen.stiffness_x, LIMITS)
+    found = replace(seen, later=elsewhere).whole()
     assert set(found.verdict[seen.is_settled].tolist()) == {Verdict.NO_BASELINE}
     assert found.level.max() == 0
-    without = step_by_step(seen.later.rows(0, 50), seen.is_settled, None, LIMITS)
+    without = replace(seen.first(50), baseline=None).steps()
     assert {w.verdict for w in without} <= {Verdict.NO_BASELINE, Verdict.TRANSIENT}
 
 
-def test_standstills_gaps_and_unknown_readings_neither_add_nor_take_away(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    seen = watch(film_life(1, days=140, change=loss(0.1, LATER_H + 24.0)), STIFFNESS)
-    before = step_by_step(seen.later.rows(0, 400), seen.is_settled, seen.stiffness_x, LIMITS)[-1]
+def test_standstills_gaps_and_unknown_readings_neither_add_nor_take_away(watch: Watch) -> None:
+    seen = watch(1, change=loss(0.1, LATER_H + 24.0))
+    before = seen.first(400).steps()[-1]
     assert before.level is not None
-    later_ns = seen.later.time_ns + 90 * 86_400 * 10**9
     idle = replace(
         seen.later,
-        time_ns=later_ns,
+        time_ns=seen.later.time_ns + 90 * 86_400 * 10**9,
         ln_k=np.full_like(seen.later.ln_k, np.nan),
         evidence=np.full_like(seen.later.evidence, Evidence.INSUFFICIENT_EXCITATION),
     )
-    after = step_by_step(idle.rows(0, 300), seen.is_settled, seen.stiffness_x, LIMITS, before)[-1]
+    after = replace(seen, later=idle).first(300).steps(begin=before)[-1]
     assert after.verdict in (Verdict.INSUFFICIENT_EXCITATION, Verdict.TRANSIENT)
-    assert (after.evidence, after.alert, after.danger) == (
-        before.evidence,
-        before.alert,
-        before.danger,
-    )
-    assert after.level is before.level
+    for part in ("evidence", "alert", "danger", "level"):
+        assert getattr(after, part) == getattr(before, part)
 
 
-def test_a_latched_level_stays_until_it_is_released(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    def passing(hours: np.ndarray) -> np.ndarray:
-        return loss(0.2, LATER_H + 24.0)(hours) - loss(0.2, LATER_H + 96.0)(hours)
-
+def test_a_latched_level_stays_until_it_is_released(watch: Watch) -> None:
     limits = replace(LIMITS, is_latching=True)
-    seen = watch(film_life(1, days=160, change=passing), STIFFNESS)
-    baseline = replace(seen.stiffness_x, time_scatter=seen.stiffness_x.time_scatter[:1])
-    steps = step_by_step(seen.later, seen.is_settled, baseline, limits)
+    seen = watch(1, change=passing(0.2, 24.0, 96.0))
+    baseline = replace(seen.baseline, time_scatter=seen.baseline.time_scatter[:1])
+    steps = replace(seen, baseline=baseline).steps(limits)
     assert steps[-1].level is not None
     assert release(steps[-1], baseline, limits).level is None
     early = next(step for step in steps if step.level is not None)
     assert release(early, baseline, limits).level is early.level
 
 
-def test_readings_that_come_too_often_count_once(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    seen = watch(film_life(1, days=140), STIFFNESS)
-    often = replace(
-        seen.later, time_ns=seen.later.time_ns[0] + np.arange(len(seen.later)) * 12 * 10**9
-    )
-    newest = step_by_step(often.rows(0, 250), np.ones(250, np.bool_), seen.stiffness_x, LIMITS)[-1]
+def test_readings_that_come_too_often_count_once(watch: Watch) -> None:
+    seen = watch(1).first(250)
+    often = replace(seen.later, time_ns=seen.later.time_ns[0] + np.arange(250) * 12 * 10**9)
+    newest = replace(seen, later=often, is_settled=np.ones(250, np.bool_)).steps()[-1]
     assert newest.evidence.n_counted <= 250 * 12 / 300 + 1
 
 
-def test_time_cannot_stand_still(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    seen = watch(film_life(1, days=140), STIFFNESS)
-    decision = replace(UNDECIDED, last_ns=int(seen.later.time_ns[0]))
+def test_time_cannot_stand_still(watch: Watch) -> None:
+    seen = watch(1)
     with pytest.raises(ValueError, match="is not after"):
-        step_by_step(seen.later, seen.is_settled, seen.stiffness_x, LIMITS, decision)
+        seen.steps(begin=replace(UNDECIDED, last_ns=int(seen.later.time_ns[0])))
 
 
 @pytest.mark.parametrize(
@@ -208,11 +176,8 @@ def test_impossible_limits_are_refused_with_key_and_value(key: str, value: float
         ChangeLimits(**{key: value})
 
 
-def test_what_is_beyond_its_limit_but_has_not_lasted_yet_is_not_called_normal(
-    film_life: FilmLife, watch: Callable[..., object], step_by_step: Callable[..., list[Decision]]
-) -> None:
-    seen = watch(film_life(3, days=150, change=loss(0.2)), STIFFNESS)
-    said = step_by_step(seen.later, seen.is_settled, seen.stiffness_x, LIMITS)
+def test_what_is_beyond_its_limit_but_has_not_lasted_yet_is_not_called_normal(watch: Watch) -> None:
+    said = watch(3, days=150, change=loss(0.2)).steps()
     raised = next(i for i, decision in enumerate(said) if decision.level is not None)
     passed = [d for d in said[:raised] if d.alert.n_passed]
     assert passed
