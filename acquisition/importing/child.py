@@ -26,9 +26,13 @@ def main() -> None:
     """Read one file."""
     confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
     job = TypeAdapter(ImportJob).validate_json(sys.stdin.buffer.read())
-    out = sys.stdout.buffer
+    answer(Path(sys.argv[1]), job, sys.stdout.buffer)
+
+
+def answer(path: Path, job: ImportJob, out: BinaryIO) -> None:
+    """Write the messages of one file; a file that is refused ends in an error message."""
     try:
-        _read(Path(sys.argv[1]), job, out)
+        _read(path, job, out)
     except ConfigError as error:
         send(out, {"kind": "error", "message": str(error)[:1000]})
     except MemoryError:

@@ -52,6 +52,7 @@ def all_frames(path: Path, job: ImportJob) -> list[FrameBatch]:
 @pytest.mark.parametrize(
     ("kind", "writer"), [("candump", can.CanutilsLogWriter), ("blf", can.BLFWriter)]
 )
+@pytest.mark.usefixtures("confined")
 def test_data_frames_come_back_with_time_to_a_microsecond(
     tmp_path: Path, log_job: Callable[..., ImportJob], kind: str, writer: type
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.tiers import covering
 
 from acquisition.calibration import calibrate
 from acquisition.importing.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
@@ -28,8 +29,8 @@ MEASURANDS = {
 SLOW = {"oil": "degC", "speed": "r/min", "power": "MW", "slow_gap": "mm"}
 
 
-@pytest.fixture(params=["float32", "int16"])
-def recording(tmp_path: Path, request: pytest.FixtureRequest) -> Recording:
+@pytest.fixture
+def recording(tmp_path: Path, sample_type: str) -> Recording:
     """A minute of four kinds of channels, with gaps on the way and a restart near the end."""
     unit = RecordedUnit(
         unit="U1",
@@ -44,7 +45,7 @@ def recording(tmp_path: Path, request: pytest.FixtureRequest) -> Recording:
             RecordedSlowChannel(id=id_, unit=u, minimum=-1e6, maximum=1e6)
             for id_, u in SLOW.items()
         ),
-        sample_type=request.param,
+        sample_type=sample_type,
     )
     chance = np.random.default_rng(5)
     with RecordingWriter(tmp_path / "recording", unit, "a test") as writer:
@@ -54,7 +55,7 @@ def recording(tmp_path: Path, request: pytest.FixtureRequest) -> Recording:
             epoch, first = (1, 50 * number) if number < 700 else (2, 50 * (number - 700))
             pause_ns = 0 if epoch == 1 else 3_334_166_000
             samples = chance.standard_normal((4, 50)).astype(np.float32)
-            if request.param == "int16":
+            if sample_type == "int16":
                 samples = chance.integers(-32767, 32767, (4, 50)).astype(np.int16)
             elif number == 300:
                 samples[2] = np.nan
@@ -103,7 +104,10 @@ def job_for(kind: Any) -> ImportJob:
     )
 
 
-@pytest.mark.parametrize("kind", ["csv", "hdf5", "tdms", "mdf4"])
+@pytest.mark.parametrize(
+    ("kind", "sample_type"), covering(["csv", "hdf5", "tdms", "mdf4"], ["float32", "int16"])
+)
+@pytest.mark.usefixtures("confined")
 def test_every_block_is_the_same_to_the_last_bit(
     recording: Recording, tmp_path: Path, read: Callable[..., Any], kind: str
 ) -> None:

@@ -14,9 +14,11 @@ import nptdms
 import numpy as np
 import pytest
 from rigs.hostile_files import Placed, Read, measured, refusal, write_hdf5
+from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError
 from acquisition.importing.job import ImportJob, Place, TimeAxis
+from acquisition.importing.reading import reading
 
 
 @pytest.fixture
@@ -72,7 +74,7 @@ def test_a_million_columns_are_refused_or_read_in_bounded_memory(
     lead = b"TDSm" + struct.pack("<IIQQ", 0x6, 4713, len(meta), len(meta))
     (tmp_path / "run.tdms").write_bytes(lead + meta)
     tdms_job = replace(placed(job), format="tdms", slow=())
-    own_mb, child_mb, said = measured(tmp_path / "run.tdms", tdms_job)
+    own_mb, child_mb, (said,) = measured(tdms_job, tmp_path / "run.tdms")
     assert "is not there" in said or "needs more than 2 GiB" in said
     assert own_mb < 200
     assert child_mb < 2200
@@ -123,16 +125,14 @@ def write_blf(path: Path) -> None:
             log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes(8)))
 
 
-def write_plain_hdf5(path: Path) -> None:
-    write_hdf5(path)
+WRITERS = {"tdms": write_tdms, "mdf4": write_mdf4, "blf": write_blf, "hdf5": write_hdf5}
 
 
-WRITERS = {"tdms": write_tdms, "mdf4": write_mdf4, "blf": write_blf, "hdf5": write_plain_hdf5}
-
-
+@pytest.mark.parametrize("n_damaged", fast_and_long(2, 8))
 @pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.usefixtures("confined")
 def test_any_damage_is_read_or_refused_but_never_more(
-    tmp_path: Path, read: Read, job: ImportJob, kind: str
+    tmp_path: Path, read: Read, job: ImportJob, kind: str, n_damaged: int
 ) -> None:
     """Cut off anywhere, and bytes changed at random: the reading process may do what it likes."""
     path = tmp_path / "run.mf4"
@@ -143,7 +143,7 @@ def test_any_damage_is_read_or_refused_but_never_more(
     if kind in ("mdf4", "blf"):
         fitting = replace(fitting, time=TimeAxis("file", 0))
     outcomes = [outcome(read, path, fitting, content)]
-    for n in range(8):
+    for n in range(n_damaged):
         damaged = bytearray(content)
         if n % 3 == 0:
             damaged = damaged[: chance.randrange(len(damaged))]
@@ -162,8 +162,6 @@ def outcome(read: Read, path: Path, job: ImportJob, content: bytes) -> str:
     path.write_bytes(content)
     try:
         if job.format == "blf":
-            from acquisition.importing.reading import reading
-
             with reading(path, job) as found:
                 list(found.frames())
         else:
@@ -182,6 +180,7 @@ def test_an_index_file_beside_a_tdms_file_is_not_believed(
     assert read(tmp_path / "run.tdms", fitting).samples.shape == (1, 100)
 
 
+@pytest.mark.usefixtures("confined")
 def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
     lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
     (tmp_path / "run").write_bytes(lead + struct.pack("<II", 1, 64) + b"\xff" * 64)

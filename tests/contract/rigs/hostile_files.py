@@ -27,11 +27,13 @@ from acquisition.errors import ConfigError
 from acquisition.importing.job import ImportJob
 from acquisition.importing.reading import reading
 
-try:
-    with reading(Path(sys.argv[1]), TypeAdapter(ImportJob).validate_json(sys.argv[2])) as found:
-        said = str(sum(block.n_samples for block in found.blocks()))
-except ConfigError as error:
-    said = str(error)
+job, said = TypeAdapter(ImportJob).validate_json(sys.argv[1]), []
+for path in sys.argv[2:]:
+    try:
+        with reading(Path(path), job) as found:
+            said.append(str(sum(block.n_samples for block in found.blocks())))
+    except ConfigError as error:
+        said.append(str(error))
 status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
 own = int(status["VmHWM"].split()[0]) // 1024
 child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024
@@ -39,9 +41,9 @@ print(json.dumps([own, child, said]))
 """
 
 
-def measured(path: Path, job: ImportJob) -> tuple[int, int, str]:
-    """Peaks of the importing and of the reading process in MB, and what was said."""
-    command = [sys.executable, "-c", READ, str(path), json.dumps(asdict(job))]
+def measured(job: ImportJob, *paths: Path) -> tuple[int, int, list[str]]:
+    """Peaks of the importing and of the reading processes in MB, and what was said of each file."""
+    command = [sys.executable, "-c", READ, json.dumps(asdict(job)), *map(str, paths)]
     result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
     own_mb, child_mb, said = json.loads(result.stdout)
     return own_mb, child_mb, said
