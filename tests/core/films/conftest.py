@@ -1,6 +1,7 @@
 """Films as results tell of them, reading by reading."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -14,38 +15,72 @@ from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
 from core.decision.limits import ChangeLimits
 from core.estimators import Estimator
+from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_rules import FilmRules
+from core.films.film_watch import FilmWatch
 from core.quality import Reading, Reason, missing
 from core.stiffness_history import StiffnessHistory
 
-READING_NS = 600_000_000_000
-LEARNING_DAYS = 100
-BRACKET_N_PER_M = 1.18e9
+READING_NS, DAY_NS = 600_000_000_000, 86_400_000_000_000
+LEARNING_DAYS, LATER_DAYS = 100, 10
+BRACKETS = {"UJB": 1.18e9}
 
-Build = Callable[..., Assessment]
-Results = Callable[[StiffnessHistory], Iterator[Assessment]]
+OPERATING = OperatingLimits(92.3, 330.0, warm_up_s=3600.0)
+RULES = FilmRules({"UJB": Estimator.DYNAMIC}, CellGrid(), OPERATING, ChangeLimits(), READING_NS)
 
 
 @pytest.fixture
 def rules() -> FilmRules:
-    return FilmRules(
-        {"UJB": Estimator.DYNAMIC},
-        CellGrid(),
-        OperatingLimits(92.3, 330.0, warm_up_s=3600.0),
-        ChangeLimits(),
-        READING_NS,
-    )
+    return RULES
 
 
-@pytest.fixture
-def results(assessment: Build) -> Results:
-    """What a monitor would say of each reading of a history."""
+@dataclass(frozen=True)
+class Films:
+    """A bearing with its baseline, learned from the first days of the life of seed 3."""
 
-    def say(history: StiffnessHistory) -> Iterator[Assessment]:
+    life: Callable[..., StiffnessHistory]
+    assessment: Callable[..., Assessment]
+    baseline: BearingBaseline
+
+    def later(self, **changes: Callable[..., object]) -> StiffnessHistory:
+        """What follows the learning period."""
+        history = self.life(3, **changes)
+        n = learned_rows(history)
+        end_ns = history.time_ns[n] + LATER_DAYS * DAY_NS
+        return history.rows(n, int(np.searchsorted(history.time_ns, end_ns)))
+
+    def watch(self, rules: FilmRules = RULES, *, has_baseline: bool = True) -> FilmWatch:
+        """A watch that begins anew."""
+        judge = FilmJudge(rules, BRACKETS)
+        judge.put_in_force("UJB", self.baseline if has_baseline else None)
+        return FilmWatch(rules, judge)
+
+    def results(self, history: StiffnessHistory) -> Iterator[Assessment]:
+        """What a monitor would say of each reading of a history."""
         for i in range(len(history)):
-            yield assessment(int(history.time_ns[i]), **readings_at(history, i))
+            yield self.assessment(int(history.time_ns[i]), **readings_at(history, i))
 
-    return say
+    def watched(self, history: StiffnessHistory, watch: FilmWatch | None = None) -> list[FilmNews]:
+        """What is found of each reading, by a watch that begins anew unless one is given."""
+        watch = watch or self.watch()
+        return [news for result in self.results(history) for news in watch.take([result])[1]]
+
+
+@pytest.fixture(scope="session")
+def films(
+    film_life: Callable[..., StiffnessHistory], assessment: Callable[..., Assessment]
+) -> Films:
+    history = film_life(3)
+    found = operation_history(history.time_ns, history.speed_rpm, history.power_mw, OPERATING)
+    n = learned_rows(history)
+    origin = Origin("U1", "UJB", "dynamic", 4, "Ada", int(history.time_ns[n]))
+    learned = learn(history.rows(0, n), found.is_settled[:n], origin, BaselineSettings())
+    return Films(film_life, assessment, learned)
+
+
+def learned_rows(history: StiffnessHistory) -> int:
+    """Readings of the learning period."""
+    return int(np.searchsorted(history.time_ns, history.time_ns[0] + LEARNING_DAYS * DAY_NS))
 
 
 def readings_at(history: StiffnessHistory, i: int) -> dict[str, Reading]:
@@ -65,26 +100,3 @@ def readings_at(history: StiffnessHistory, i: int) -> dict[str, Reading]:
         found[f"order1_shaft_{d}_um_pk"] = Reading(float(history.shaft_um_pk[row, i]))
         found[f"order1_bearing_{d}_um_pk"] = Reading(float(history.bearing_um_pk[row, i]))
     return found
-
-
-@pytest.fixture(scope="session")
-def baseline(film_life: Callable[..., StiffnessHistory]) -> BearingBaseline:
-    """Learned from the first days of the life of seed 3."""
-    history = film_life(3)
-    limits = OperatingLimits(92.3, 330.0, warm_up_s=3600.0)
-    found = operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits)
-    n = learned_rows(history)
-    origin = Origin("U1", "UJB", "dynamic", 4, "Ada", int(history.time_ns[n]))
-    return learn(history.rows(0, n), found.is_settled[:n], origin, BaselineSettings())
-
-
-def learned_rows(history: StiffnessHistory) -> int:
-    """Readings of the learning period."""
-    until_ns = history.time_ns[0] + LEARNING_DAYS * 86_400_000_000_000
-    return int(np.searchsorted(history.time_ns, until_ns))
-
-
-@pytest.fixture(scope="session")
-def later() -> Callable[[StiffnessHistory], StiffnessHistory]:
-    """What follows the learning period."""
-    return lambda history: history.rows(learned_rows(history), len(history))

@@ -1,54 +1,37 @@
 """Films watched result by result: the same verdicts as over their whole history."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from core.alarms.alarm import AlarmLevel
-from core.assessment import Assessment
-from core.baseline.baseline import BearingBaseline, Watched
+from core.baseline.baseline import Watched
 from core.condition.operating_state import OperatingState
 from core.condition.operation_history import operation_history
 from core.decision.back_test import back_test
 from core.decision.verdict import JUDGED, Verdict
 from core.films.catching_up import decision_after, operation_after
 from core.films.film_finding import FilmFinding, alarm_condition
-from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_reading import film_reading
 from core.films.film_rules import FilmRules
-from core.films.film_watch import FilmWatch
 from core.quality import Reading, Reason, missing, uncertain
-from core.stiffness_history import Evidence, StiffnessHistory
+from core.stiffness_history import Evidence
 
-BRACKETS = {"UJB": 1.18e9}
 S = 1_000_000_000
-FilmLife = Callable[..., StiffnessHistory]
-Later = Callable[[StiffnessHistory], StiffnessHistory]
-Results = Callable[[StiffnessHistory], Iterator[Assessment]]
-Build = Callable[..., Assessment]
 
 
 def loss(size: float, day: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda hours: np.where(hours > day * 24.0, np.log(1.0 - size), 0.0)
 
 
-def watch_of(rules: FilmRules, baseline: BearingBaseline | None = None) -> FilmWatch:
-    judge = FilmJudge(rules, BRACKETS)
-    judge.put_in_force("UJB", baseline)
-    return FilmWatch(rules, judge)
-
-
-def watched(watch: FilmWatch, results: Iterator[Assessment]) -> list[FilmNews]:
-    return [news for result in results for news in watch.take([result])[1]]
-
-
 def test_results_one_by_one_are_judged_as_their_whole_history_is(
-    rules: FilmRules, baseline: BearingBaseline, film_life: FilmLife, later: Later, results: Results
+    films: Any, rules: FilmRules
 ) -> None:
-    history = later(film_life(3, change=loss(0.2, 110.0)))
-    news = watched(watch_of(rules, baseline), results(history))
+    history = films.later(change=loss(0.2, 106.0))
+    news = films.watched(history)
 
     said = history.rows(1, len(history))  # the first interval may have begun before
     settled = operation_history(
@@ -57,8 +40,7 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(
     assert [n.reading.time_ns for n in news] == said.time_ns.tolist()
     assert [n.reading.condition.is_settled for n in news] == settled.tolist()
     for row, direction in enumerate("xy"):
-        learned = baseline.of(Watched.STIFFNESS, direction)
-        assert learned is not None
+        learned = films.baseline.of(Watched.STIFFNESS, direction)
         whole = back_test(said, settled, learned, rules.change)
         findings = [n.findings[row] for n in news]
         assert [f.verdict for f in findings] == whole.verdict.tolist()
@@ -69,32 +51,28 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(
         assert findings[-1].baseline_version == 4
 
 
-def test_a_restart_in_the_middle_changes_no_verdict(
-    rules: FilmRules, baseline: BearingBaseline, film_life: FilmLife, later: Later, results: Results
-) -> None:
-    history = later(film_life(3, change=loss(0.1, 110.0)))
-    through = watched(watch_of(rules, baseline), results(history))
+def test_a_restart_in_the_middle_changes_no_verdict(films: Any, rules: FilmRules) -> None:
+    history = films.later(change=loss(0.1, 106.0))
+    through = films.watched(history)
     n = len(history) // 2
-    before = watch_of(rules, baseline)
-    first = watched(before, results(history.rows(0, n)))
+    first = films.watched(history.rows(0, n))
 
-    after = watch_of(rules)
-    after.judge.put_in_force("UJB", baseline, first[-1].decisions)
+    after = films.watch(has_baseline=False)
+    after.judge.put_in_force("UJB", films.baseline, first[-1].decisions)
     after.go_on(operation_after(history.rows(n - 200, n), rules))
-    second = watched(after, results(history.rows(n - 1, len(history))))
+    second = films.watched(history.rows(n - 1, len(history)), after)
 
     assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]
 
 
 def test_decisions_caught_up_with_are_those_that_would_have_been_made(
-    rules: FilmRules, baseline: BearingBaseline, film_life: FilmLife, later: Later, results: Results
+    films: Any, rules: FilmRules
 ) -> None:
-    history = later(film_life(3))
-    made = watched(watch_of(rules, baseline), results(history))
+    history = films.later()
+    made = films.watched(history)
     settled = np.array([n.reading.condition.is_settled for n in made])
     for row, direction in enumerate("xy"):
-        learned = baseline.of(Watched.STIFFNESS, direction)
-        assert learned is not None
+        learned = films.baseline.of(Watched.STIFFNESS, direction)
         caught = decision_after(history.rows(1, len(history)), settled, learned, rules)
         through = made[-1].decisions[row]
         assert (caught.verdict, caught.level) == (through.verdict, through.level)
@@ -104,20 +82,18 @@ def test_decisions_caught_up_with_are_those_that_would_have_been_made(
         assert caught.finding.change == pytest.approx(through.finding.change, rel=1e-9)
 
 
-def test_without_a_baseline_nothing_is_called_normal(
-    rules: FilmRules, film_life: FilmLife, results: Results
-) -> None:
-    news = watched(watch_of(rules), results(film_life(3, days=2)))
+def test_without_a_baseline_nothing_is_called_normal(films: Any) -> None:
+    news = films.watched(films.life(3, days=2), films.watch(has_baseline=False))
     verdicts = {finding.verdict for told in news for finding in told.findings}
     assert verdicts == {Verdict.NO_BASELINE, Verdict.TRANSIENT}
 
 
 def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(
-    rules: FilmRules, assessment: Build
+    films: Any,
 ) -> None:
-    watch = watch_of(rules)
+    watch = films.watch(has_baseline=False)
     times = [1_000_000 * S + i * 12 * S for i in range(500)]
-    found = [watch.take([assessment(time_ns)])[1] for time_ns in times]
+    found = [watch.take([films.assessment(time_ns)])[1] for time_ns in times]
     marks = [news[0].reading.time_ns for news in found if news]
     assert len(marks) == 500 * 12 // 600
     assert all(time_ns // (600 * S) != (time_ns - 12 * S) // (600 * S) for time_ns in marks)
@@ -125,68 +101,63 @@ def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(
 
 @pytest.mark.parametrize("back_s", [300, 3 * 3600, 400 * 86_400])
 def test_a_clock_that_is_put_back_stops_neither_operation_nor_readings(
-    rules: FilmRules,
-    film_life: FilmLife,
-    later: Later,
-    results: Results,
-    baseline: BearingBaseline,
-    back_s: int,
+    films: Any, back_s: int
 ) -> None:
-    history = later(film_life(3))
-    watch = watch_of(rules, baseline)
-    watched(watch, results(history.rows(0, 60)))
+    history, watch = films.later(), films.watch()
+    films.watched(history.rows(0, 60), watch)
     again = replace(history, time_ns=history.time_ns - back_s * S).rows(60, 400)
 
-    news = watched(watch, results(again))
+    news = films.watched(again, watch)
 
     assert len(news) >= 330
     assert news[-1].findings[0].verdict in (*JUDGED, Verdict.TRANSIENT)
     assert any(told.findings[0].verdict in JUDGED for told in news)
 
 
-def test_doubtful_numbers_are_no_numbers(rules: FilmRules, assessment: Build) -> None:
+def test_doubtful_numbers_are_no_numbers(films: Any, rules: FilmRules) -> None:
     good = {
         "eccentricity_ratio": Reading(0.4),
         "oil_temperature_c": Reading(45.0),
         "dynamic_k_xx_n_per_m": Reading(0.5e9, u_random=0.01e9),
         "dynamic_k_yy_n_per_m": Reading(0.5e9, uncertain(Reason.LOW_COVERAGE), u_random=0.01e9),
     }
-    condition = watch_of(rules).take([assessment(**good)])[0][0].condition
+    condition = films.watch(has_baseline=False).take([films.assessment(**good)])[0][0].condition
     assert condition is not None
-    x, y = film_reading(assessment(**good), condition, rules.estimators["UJB"]).values
+    x, y = film_reading(films.assessment(**good), condition, rules.estimators["UJB"]).values
     assert (x.evidence, x.ln_k, x.u_random) == (Evidence.MEASURED, np.log(0.5e9), 0.02)
     assert (y.evidence, y.reason) == (Evidence.BAD_QUALITY, Reason.LOW_COVERAGE)
     assert np.isnan(y.ln_k)
 
     cold = good | {"oil_temperature_c": missing(Reason.OUT_OF_RANGE)}
-    x, _ = film_reading(assessment(**cold), condition, rules.estimators["UJB"]).values
+    x, _ = film_reading(films.assessment(**cold), condition, rules.estimators["UJB"]).values
     assert (x.evidence, x.reason) == (Evidence.BAD_QUALITY, Reason.OUT_OF_RANGE)
 
     still = good | {"dynamic_k_xx_n_per_m": missing(Reason.INSUFFICIENT_EXCITATION)}
-    x, _ = film_reading(assessment(**still), condition, rules.estimators["UJB"]).values
+    x, _ = film_reading(films.assessment(**still), condition, rules.estimators["UJB"]).values
     assert x.evidence is Evidence.INSUFFICIENT_EXCITATION
 
     soft = good | {"dynamic_k_xx_n_per_m": Reading(-1e6, u_random=1e6)}
-    x, _ = film_reading(assessment(**soft), condition, rules.estimators["UJB"]).values
+    x, _ = film_reading(films.assessment(**soft), condition, rules.estimators["UJB"]).values
     assert x.evidence is Evidence.BAD_QUALITY
 
 
-def test_results_say_the_condition_that_they_were_found_under(
-    rules: FilmRules, assessment: Build
-) -> None:
+def test_results_say_the_condition_that_they_were_found_under(films: Any) -> None:
     known = {
         "speed_rpm": Reading(92.3),
         "power_mw": Reading(200.0),
         "eccentricity_ratio": Reading(0.42),
         "oil_temperature_c": Reading(46.0),
     }
-    watch = watch_of(rules)
-    [first], _ = watch.take([assessment(10**18, **known)])
-    [last] = [watch.take([assessment(10**18 + i * 60 * S, **known)])[0][0] for i in range(1, 62)][
-        -1:
-    ]
+    watch = films.watch(has_baseline=False)
+    [first], _ = watch.take([films.assessment(10**18, **known)])
+    for i in range(1, 62):
+        [last], _ = watch.take([films.assessment(10**18 + i * 60 * S, **known)])
     [blind], _ = watch.take(
-        [assessment(10**18 + 4000 * S, **known | {"eccentricity_ratio": missing(Reason.DEAD)})]
+        [
+            films.assessment(
+                10**18 + 4000 * S, **known | {"eccentricity_ratio": missing(Reason.DEAD)}
+            )
+        ]
     )
 
     assert first.condition is not None
@@ -215,16 +186,14 @@ def test_an_alarm_says_by_how_much_and_which_limit(rules: FilmRules) -> None:
     assert alarm_condition(FilmFinding(Verdict.NORMAL), rules.change).level is None
 
 
-def test_time_that_passes_faster_asks_for_fewer_hours(
-    rules: FilmRules, baseline: BearingBaseline, film_life: FilmLife, later: Later, results: Results
-) -> None:
-    history = later(film_life(3, change=loss(0.2, 110.0)))
+def test_time_that_passes_faster_asks_for_fewer_hours(films: Any, rules: FilmRules) -> None:
+    history = films.later(change=loss(0.2, 106.0))
     start_ns = int(history.time_ns[0])
     fast_ns = start_ns + (history.time_ns - start_ns) // 50
     fast = replace(rules, reading_ns=12 * S, time_lapse=50.0)
 
-    slow_news = watched(watch_of(rules, baseline), results(history))
-    fast_news = watched(watch_of(fast, baseline), results(replace(history, time_ns=fast_ns)))
+    slow_news = films.watched(history)
+    fast_news = films.watched(replace(history, time_ns=fast_ns), films.watch(fast))
 
     levels = [[n.findings[0].level for n in news] for news in (slow_news, fast_news)]
     raised = [found.index(AlarmLevel.ALERT) for found in levels]
