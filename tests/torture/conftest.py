@@ -1,10 +1,12 @@
 """How long the torture takes, by which seed, and what is said at its end."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from harness import summary
+from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_plant import LedgerPlant
 
 N_SHORT = 25
 """By how much the short torture of every test run is less than the whole one."""
@@ -62,6 +64,13 @@ def times(pytestconfig: pytest.Config) -> Callable[[int], int]:
 def is_whole(pytestconfig: pytest.Config) -> bool:
     """Whether this is the whole torture."""
     return bool(pytestconfig.getoption("--torture", False))
+
+
+@pytest.fixture
+def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
+    """A DAQ of the test's plant; it goes on offering samples whatever happens to the service."""
+    with ledger_daq(plant, tmp_path) as running:
+        yield running
 
 
 @pytest.fixture

@@ -69,7 +69,7 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
             bench.step(TWO_H)
             until(lambda: bench.active("clock_offset"))
         figure("\n".join(["bad links", *(its.line(state) for state, its in seen.items())]))
-        assert bench.findings() == {}
+        assert bench.wrong() == {}
 
 
 @pytest.mark.timeout(3600)
@@ -93,7 +93,7 @@ def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
         assert set(bench.raised() - before) <= OF_THE_PLANT | OF_A_BUSY_HOST
         assert gaps
         assert not any(gap["is_estimated"] for gap in gaps)
-        assert bench.findings() == {}
+        assert bench.wrong() == {}
 
 
 @pytest.mark.timeout(3600)
@@ -127,5 +127,5 @@ def test_a_host_whose_clock_is_wrong_loses_and_doubles_nothing_and_says_so(
         found = bench.raised()
         assert ("clock_offset" in found) == is_wrong
         assert set(found - before) <= OF_THE_PLANT | OF_A_BUSY_HOST | {"clock_offset"}
-        assert bench.findings() == {}
+        assert bench.wrong() == {}
     figure(f"wall clock {at_start_s:+g} s at start, then {steps_s} s, {time_zone}: nothing wrong")

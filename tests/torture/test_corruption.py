@@ -109,6 +109,8 @@ def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
     assert counted["refused"]
 
 
+@pytest.mark.planted("seals that are not compared")
+@pytest.mark.long
 def test_a_store_without_seals_is_found_out(
     whole: Path,
     truth: Rows,

@@ -29,7 +29,7 @@ def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
         clock = clock_of(bench)
         drift_ppm, u_ppm = clock["drift_ppm"], clock["drift_uncertainty_ppm"]
         assert abs(drift_ppm - DRIFT_PPM) <= 4.0 * u_ppm, clock
-        assert bench.findings() == {}
+        assert bench.wrong() == {}
     figure(f"a device {DRIFT_PPM:g} ppm too fast: found {drift_ppm:.0f} +- {u_ppm:.0f} ppm, told")
 
 
@@ -47,7 +47,7 @@ def test_stamps_of_2106_are_told_and_no_result_has_their_time(
             until(lambda wanted=n_expected: clock_of(bench)["n_stamp_faults"] >= wanted)
         assert clock_of(bench)["n_stamp_faults"] == n_expected
         time.sleep(2.0 * plant.refresh_s)
-        assert bench.findings() == {}
+        assert bench.wrong() == {}
     figure(f"{n_expected} slots stamped 2106: all told, no result has that time")
 
 

@@ -10,6 +10,7 @@ import pytest
 from harness.deeds import Build, Loss, deed, letters, loss
 from harness.enduring import DATABASE, GAVE_UP
 from harness.failing_calls import Case, FailingCalls, Outcome, failing_calls, n_calls
+from harness.summary import planted
 
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -27,7 +28,7 @@ FAILURES = (
 N_CASES = 300
 """Of the fast run a twenty-fifth of it; of the long one all there are."""
 
-pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
+pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 
 
 Begun = Callable[..., AbstractContextManager[FailingCalls]]
@@ -161,7 +162,7 @@ def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
 @pytest.mark.parametrize(
     ("bug", "what"),
     [
-        pytest.param(bug, what, marks=pytest.mark.planted(f"failing call: {bug}"), id=bug)
+        planted(bug, what, mark=pytest.mark.long)
         for bug, what in (("promises_anyway", "lost"), ("in_two_parts", "torn"))
     ],
 )

@@ -1,18 +1,19 @@
 """The service is killed at random moments under load: nothing that it promised is gone."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.kill_cycles import Cycles, kill_cycles
-from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.bench import Bench
+from harness.kill_cycles import kill_cycles
+from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig
 
-N_CYCLES, N_FEW = 200, 3
+N_CYCLES, N_FEW = 200, 1
 LOAD = 2.0
 SHORT_LIFE_S = 0.7
 N_LOST_SLOTS, SILENT_S = 3, 2.0
@@ -20,16 +21,9 @@ ACCOUNTED_S = 2 * 3600.0
 
 
 @pytest.fixture
-def plant(torture_seed: int) -> LedgerPlant:
-    """Two units with twelve channels at twice 600 Hz, and a result every 0.75 s."""
-    return LedgerPlant(seed=torture_seed, load=LOAD)
-
-
-@pytest.fixture
-def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
-    """A DAQ that goes on offering samples whatever happens to the service."""
-    with ledger_daq(plant, tmp_path) as running:
-        yield running
+def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
+    """Units with twelve channels at twice 600 Hz, and a result every 0.75 s."""
+    return LedgerPlant(seed=torture_seed, n_units=2 if is_whole else 1, load=LOAD)
 
 
 @pytest.mark.timeout(ACCOUNTED_S)
@@ -43,15 +37,16 @@ def test_a_killed_service_has_kept_what_it_has_shown(
 ) -> None:
     plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
     rng = np.random.default_rng(torture_seed)
-    n_cycles = N_CYCLES if is_whole else N_FEW
     with ServiceRig(plant_file) as rig:
+        bench = Bench(plant, daq, rig, plant_file)
         if is_whole:
-            trouble = partial(also, daq)
-            done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng, trouble=trouble)
+            done = kill_cycles(bench, N_CYCLES, rng, trouble=partial(also, daq))
         else:
-            done = kill_cycles(plant, daq, rig, plant_file, n_cycles, rng, SHORT_LIFE_S)
+            done = kill_cycles(bench, N_FEW, rng, SHORT_LIFE_S)
     figure(f"kill -9 of the running service at {LOAD:g} times nominal\n{done.table()}")
-    assert_all_accounted_for(done)
+    assert done.findings.wrong == {}
+    assert done.alarms == []
+    assert done.silent_healthy_s == 0.0
     assert done.findings.n_results > 0
     assert done.findings.n_exceedances > 0 or not is_whole
     assert done.findings.n_shown > 0
@@ -65,9 +60,3 @@ def also(daq: LedgerDaq, number: int) -> None:
         daq.stop_answering()
         time.sleep(SILENT_S)
         daq.answer_again()
-
-
-def assert_all_accounted_for(done: Cycles) -> None:
-    assert done.findings.wrong == {}
-    assert done.alarms == []
-    assert done.silent_healthy_s == 0.0

@@ -94,6 +94,7 @@ def require_same(found: Trend, before: Trend) -> None:
 
 
 @pytest.mark.planted("mark of what is deleted in a transaction of its own")
+@pytest.mark.long
 def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
     old_file: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

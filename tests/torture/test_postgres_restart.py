@@ -5,7 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.postgres_server import PostgresServer, why_not
 from harness.service_rig import ServiceRig, until
@@ -29,13 +29,6 @@ EVER = "start=2020-01-01T00:00:00Z&end=2100-01-01T00:00:00Z"
 def plant(torture_seed: int) -> LedgerPlant:
     """One unit with twelve channels at 600 Hz."""
     return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
-
-
-@pytest.fixture
-def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
-    """A DAQ that goes on offering samples whatever happens to the database."""
-    with ledger_daq(plant, tmp_path) as running:
-        yield running
 
 
 @pytest.fixture

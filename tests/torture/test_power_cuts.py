@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
+from harness.summary import planted
 from harness.tape import Acknowledged, Step, python, record
 
 from service.store.sqlite import SqliteStore
@@ -24,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 DATABASE = "padwatch.sqlite3"
 
 
-pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
+pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 Record = Callable[[str], list[Step]]
 
 
@@ -98,17 +99,13 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
     figure(f"power cuts: {n_cuts}, 0 acknowledged lost, 0 torn, 0 altered, 0 corrupt")
 
 
-def _planted(bug: str, what: str) -> object:
-    return pytest.param(bug, what, marks=pytest.mark.planted(bug), id=bug)
-
-
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
     ("bug", "what"),
     [
-        _planted("synchronous_normal", "lost"),
-        _planted("acknowledged_before_commit", "lost"),
-        _planted("two_transactions", "torn"),
+        planted("synchronous_normal", "lost", mark=pytest.mark.long),
+        planted("acknowledged_before_commit", "lost", mark=pytest.mark.long),
+        planted("two_transactions", "torn", mark=pytest.mark.long),
     ],
 )
 def test_a_store_that_promises_too_much_is_found_out(

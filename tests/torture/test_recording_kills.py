@@ -1,15 +1,16 @@
 """The service is killed while it records all samples: what it called recorded is there."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.recordings_ledger import Recorded, promised, recorded
 from harness.service_rig import ServiceRig, until
+from harness.summary import planted
 
 from service.continuous.joining import clear_unfinished, join, unjoined
 
@@ -27,13 +28,6 @@ sync_s = {SYNC_S}
 def plant(torture_seed: int) -> LedgerPlant:
     """One unit with twelve channels at 600 Hz."""
     return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
-
-
-@pytest.fixture
-def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
-    """A DAQ that goes on offering samples whatever happens to the service."""
-    with ledger_daq(plant, tmp_path) as running:
-        yield running
 
 
 def killed(
@@ -88,7 +82,7 @@ def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
 @pytest.mark.parametrize(
     ("bug", "kind"),
     [
-        pytest.param(bug, kind, marks=pytest.mark.planted(bug), id=bug)
+        planted(bug, kind, mark=pytest.mark.torture)
         for bug, kind in (
             ("promised_before_it_is_synced", "lost"),
             ("parts_thrown_away_at_start", "lost"),
@@ -98,7 +92,6 @@ def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
         )
     ],
 )
-@pytest.mark.torture
 def test_a_bug_in_recording_is_found_out(
     plant: LedgerPlant,
     daq: LedgerDaq,
@@ -108,7 +101,7 @@ def test_a_bug_in_recording_is_found_out(
     kind: str,
 ) -> None:
     plant_file = write_plant(plant, daq, tmp_path)
-    with ServiceRig(plant_file, "harness.planted_recording", environment={"PLANTED": bug}) as rig:
+    with ServiceRig(plant_file, "harness.planted", environment={"PLANTED": bug}) as rig:
         root = tmp_path / "data" / "recordings"
         found = killed(plant, daq, rig, root, N_PLANTED, torture_seed)
 

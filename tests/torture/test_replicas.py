@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.checker import check
-from harness.ledger_daq import LedgerDaq, ledger_daq
+from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.nats_cluster import nats_cluster
 from harness.nats_server import nats_server_command
@@ -35,12 +35,6 @@ def seed(request: pytest.FixtureRequest, torture_seed: int) -> int:
 def plant(seed: int) -> LedgerPlant:
     """Two units with twelve channels at twice 600 Hz, and a result every 0.75 s."""
     return LedgerPlant(seed=seed, load=2.0)
-
-
-@pytest.fixture
-def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
-    with ledger_daq(plant, tmp_path) as running:
-        yield running
 
 
 @pytest.fixture

@@ -2,10 +2,12 @@
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from harness.ledger_daq import ledger_daq
+from harness.bench import Bench
+from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig
 from harness.soak import Soaked, soak
@@ -32,20 +34,24 @@ POOL_THREADS = (os.cpu_count() or 1) + 4
 """Of asyncio's own pool, which makes one more whenever more are wanted at once than ever before."""
 
 
+@pytest.fixture
+def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
+    return replace(WHOLE if is_whole else SHORT, seed=torture_seed)
+
+
 @pytest.mark.timeout(9000)
 def test_a_long_time_under_load_leaves_everything_as_it_was(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
     tmp_path: Path,
-    torture_seed: int,
     is_whole: bool,
     soak_s: float,
     figure: Callable[[str], None],
 ) -> None:
-    shape = WHOLE if is_whole else SHORT
-    plant = LedgerPlant(**{**vars(shape), "seed": torture_seed})
-    with ledger_daq(plant, tmp_path) as daq:
-        plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, FEW_BUNDLES)
-        with ServiceRig(plant_file) as rig:
-            done = soak(plant, daq, rig, plant_file, soak_s, plant.units[:2])
+    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, FEW_BUNDLES)
+    with ServiceRig(plant_file) as rig:
+        bench = Bench(plant, daq, rig, plant_file, period_s=1.0)
+        done = soak(bench, soak_s, plant.units[:2])
     figure(f"soak\n{done.table(plant)}")
     assert done.findings.wrong == {}
     assert done.findings.n_results > 0

@@ -1,6 +1,7 @@
 """What the alarms of a running service stand on in tests: a host's clock, and a failing disk."""
 
 import logging
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,15 +34,19 @@ class Host:
 
 
 class UncertainStore:
-    """A store that may refuse, or write and not say so."""
+    """A store that may refuse, wait, or write and not report it."""
 
     def __init__(self, store: SqliteStore) -> None:
         self._store = store
         self.fate = "writes"
+        self.is_asked, self.may_write = threading.Event(), threading.Event()
 
     def append(self, *found: Any) -> None:
         if self.fate == "refuses":
             raise StoreError("no space left on device")
+        if self.fate == "waits":
+            self.is_asked.set()
+            self.may_write.wait(30)
         self._store.append(*found)
         if self.fate == "writes_silently":
             raise StoreError("the answer got lost")

@@ -1,5 +1,6 @@
 """Alarms about the store and the service, from what happens to them to what is stored of them."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -184,6 +185,28 @@ def _findings(alarm: Alarm) -> Any:
         alarm.identity, 1, AlarmChange.COMMENTED, None, alarm.state, alarm.state, 0, 0
     )
     return Findings(alarms=[AlarmNews(replace(alarm, n_events=1), [event])])
+
+
+async def test_news_that_comes_during_a_write_is_stored_without_any_news_after_it(
+    stored: Callable[[], tuple[Any, Any, Any]],
+) -> None:
+    _, recorder, (store, uncertain) = stored()
+    uncertain.fate = "waits"
+    recording = asyncio.create_task(recorder.run())
+    first, second = (
+        Alarm(AlarmIdentity("U9", channel, AlarmKind.CHANNEL_NOT_OK)) for channel in ("sx", "sy")
+    )
+    recorder.put(_findings(first))
+    await asyncio.to_thread(uncertain.is_asked.wait, 30)
+    recorder.put(_findings(second))
+    uncertain.may_write.set()
+    async with asyncio.timeout(30):
+        await recorder.settled()
+    recording.cancel()
+
+    stored_ids = {alarm.identity.id for alarm in store.alarms()}
+    assert stored_ids == {first.identity.id, second.identity.id}
+    store.close()
 
 
 async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(

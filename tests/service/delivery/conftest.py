@@ -4,8 +4,8 @@ import asyncio
 import itertools
 import ssl
 import subprocess
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -55,11 +55,6 @@ class HandClock:
         await asyncio.sleep(0)
 
 
-@pytest.fixture
-def clock() -> HandClock:
-    return HandClock()
-
-
 def news(number: int, *conditions: Condition, unit: str = "U1") -> AlarmNews:
     """An alarm of its own that goes through some conditions."""
     alarm, events = Alarm(AlarmIdentity(unit, f"B{number}", AlarmKind.SHAFT_X)), []
@@ -78,24 +73,6 @@ def composer(prefix: str = "id") -> Composer:
     numbers = itertools.count()
     plant = Plant("Itaipu", "https://padwatch.example/", {"U1": "Unit 1"})
     return Composer(plant, lambda _: Surroundings(), lambda: f"{prefix}-{next(numbers)}")
-
-
-OpenStore = Callable[..., SqliteStore]
-
-
-@pytest.fixture
-def open_store(tmp_path: Path, clock: HandClock) -> Iterator[OpenStore]:
-    """Opens the database; the same one each time, with the receivers of the moment."""
-    opened: list[SqliteStore] = []
-
-    def open_(*routes: Route, prefix: str = "id") -> SqliteStore:
-        router = Router(routes or [route("desk")], composer(prefix), clock.now_ns)
-        opened.append(SqliteStore(tmp_path / "padwatch.sqlite3", address=router))
-        return opened[-1]
-
-    yield open_
-    for store in opened:
-        store.close()
 
 
 @dataclass
@@ -193,22 +170,6 @@ async def serving(
         await server.wait_closed()
 
 
-ServeWeb = Callable[..., Awaitable[WebServer]]
-
-
-@pytest.fixture
-async def web() -> AsyncIterator[ServeWeb]:
-    """Starts web servers."""
-    async with AsyncExitStack() as stack:
-
-        async def start(*behaviours: Behaviour, context: ssl.SSLContext | None = None) -> WebServer:
-            server = WebServer(list(behaviours), scheme="https" if context else "http")
-            server.port = await stack.enter_async_context(serving(server.serve, context))
-            return server
-
-        yield start
-
-
 @pytest.fixture(scope="session")
 def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A certificate of 127.0.0.1 with its key, in one file; nobody vouches for it but itself."""
@@ -236,24 +197,6 @@ def server_tls(certificate: Path) -> ssl.SSLContext:
     return context
 
 
-Desk = Callable[..., Sender]
-
-
-@pytest.fixture
-def desk(clock: HandClock) -> Desk:
-    """Makes the sender of a receiver that is told by a webhook."""
-
-    def make(
-        server: WebServer, store: SqliteStore, name: str = "desk", **changes: object
-    ) -> Sender:
-        times = Timeouts(connect_s=20.0, answer_s=20.0, total_s=20.0)
-        target = WebhookTarget(server.url, timeouts=times)
-        receiver = Receiver(name, "webhook", server.url, Webhook(target, Trust(), clock))
-        return Sender(replace(receiver, **changes), store.outbox, clock)  # type: ignore[arg-type]
-
-    return make
-
-
 @asynccontextmanager
 async def at_work(*senders: Sender) -> AsyncIterator[None]:
     """Senders that run for a while; an error of one fails the test."""
@@ -268,29 +211,63 @@ async def at_work(*senders: Sender) -> AsyncIterator[None]:
             assert task.cancelled(), task.exception()
 
 
-async def until_settled(sender: Sender, store: SqliteStore) -> None:
-    """Wait until nothing waits for a receiver any more."""
-    async with asyncio.timeout(PATIENCE_S):
-        while store.outbox.waiting(sender.receiver.name, 1):
-            await asyncio.sleep(0.01)
-
-
-@dataclass
 class Room:
-    """Everything that a test of delivery needs."""
+    """Everything that a test of delivery needs: receivers, an outbox, senders, a clock in hand."""
 
-    web: ServeWeb
-    open_store: OpenStore
-    sender: Desk
-    clock: HandClock
-    answers: Callable[..., Behaviour]
-    news: Callable[..., AlarmNews]
-    routed: Callable[..., Route]
-    running: Callable[..., AbstractAsyncContextManager[None]]
-    settled: Callable[[Sender, SqliteStore], Awaitable[None]]
-    serving: Callable[..., AbstractAsyncContextManager[int]]
+    answers = staticmethod(answer)
+    news = staticmethod(news)
+    routed = staticmethod(route)
+    running = staticmethod(at_work)
+    serving = staticmethod(serving)
+
+    def __init__(self, path: Path, stack: AsyncExitStack) -> None:
+        self.clock = HandClock()
+        self.path, self._stack = path, stack
+
+    async def web(self, *behaviours: Behaviour, context: ssl.SSLContext | None = None) -> WebServer:
+        """Start a web server."""
+        server = WebServer(list(behaviours), scheme="https" if context else "http")
+        server.port = await self._stack.enter_async_context(serving(server.serve, context))
+        return server
+
+    def open_store(self, *routes: Route, prefix: str = "id") -> SqliteStore:
+        """Open the database; the same one each time, with the receivers of the moment."""
+        router = Router(routes or [route("desk")], composer(prefix), self.clock.now_ns)
+        store = SqliteStore(self.path, address=router)
+        self._stack.callback(store.close)
+        return store
+
+    def sender(
+        self, server: WebServer, store: SqliteStore, name: str = "desk", **changes: object
+    ) -> Sender:
+        """Make the sender of a receiver that is told by a webhook."""
+        times = Timeouts(connect_s=20.0, answer_s=20.0, total_s=20.0)
+        target = WebhookTarget(server.url, timeouts=times)
+        receiver = Receiver(name, "webhook", server.url, Webhook(target, Trust(), self.clock))
+        return Sender(replace(receiver, **changes), store.outbox, self.clock)  # type: ignore[arg-type]
+
+    async def settled(self, sender: Sender, store: SqliteStore) -> None:
+        """Wait until nothing waits for a receiver any more."""
+        async with asyncio.timeout(PATIENCE_S):
+            while store.outbox.waiting(sender.receiver.name, 1):
+                await asyncio.sleep(0.01)
+
+    async def delivered(self, server: WebServer, store: SqliteStore, **changes: object) -> Sender:
+        """Let a sender work until nothing waits for its receiver any more."""
+        sender = self.sender(server, store, **changes)  # type: ignore[arg-type]
+        async with self.running(sender):
+            await self.settled(sender, store)
+        return sender
+
+    @staticmethod
+    def letters(store: SqliteStore) -> list[tuple[str, str, int, str]]:
+        """Every letter there ever was: event, state, attempts in vain and answer, by number."""
+        with store._reader() as reader:
+            columns = "event_id, state, n_attempts, answer"
+            return reader.execute(f"SELECT {columns} FROM outbox ORDER BY id").fetchall()  # noqa: S608
 
 
 @pytest.fixture
-def room(web: ServeWeb, open_store: OpenStore, desk: Desk, clock: HandClock) -> Room:
-    return Room(web, open_store, desk, clock, answer, news, route, at_work, until_settled, serving)
+async def room(folder_in_memory: Path) -> AsyncIterator[Room]:
+    async with AsyncExitStack() as stack:
+        yield Room(folder_in_memory / "padwatch.sqlite3", stack)

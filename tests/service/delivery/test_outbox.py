@@ -75,9 +75,7 @@ async def test_a_restart_goes_on_with_what_waits(room: Any) -> None:
 
     store = room.open_store(prefix="later")
     store.append([], [], [room.news(3)])
-    sender = room.sender(server, store)
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store)
 
     assert [r.id for r in server.requests] == ["id-0", "id-1", "id-2", "later-0"]
 
@@ -105,7 +103,7 @@ asyncio.run(Sender(desk, Outbox(store._writing, store._reader), clock).run())
 
 
 async def test_what_was_answered_but_not_noted_before_a_crash_comes_again_with_the_same_id(
-    room: Any, tmp_path: Path
+    room: Any,
 ) -> None:
     server = await room.web(room.answers("200 OK"))
     store = room.open_store()
@@ -113,7 +111,7 @@ async def test_what_was_answered_but_not_noted_before_a_crash_comes_again_with_t
     store.close()
 
     program = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", DELIVER_AND_HANG, str(tmp_path / "padwatch.sqlite3"), server.url),
+        *(sys.executable, "-c", DELIVER_AND_HANG, str(room.path), server.url),
         stdout=subprocess.PIPE,
         cwd=ROOT,
     )
@@ -123,9 +121,7 @@ async def test_what_was_answered_but_not_noted_before_a_crash_comes_again_with_t
     await program.wait()
 
     store = room.open_store()
-    sender = room.sender(server, store)
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store)
     assert said == b"answered\n"
     assert [r.id for r in server.requests] == ["id-0", "id-0", "id-1"]
     assert server.requests[0].body == server.requests[1].body

@@ -134,7 +134,7 @@ STEPS = [
 
 @given(steps=st.lists(st.sampled_from(STEPS), max_size=14))
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_what_was_told_last_agrees_with_the_alarm_list(steps: list[Any], room: Any) -> None:
     store = room.open_store()

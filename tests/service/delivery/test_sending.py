@@ -1,4 +1,4 @@
-"""From the outbox to a web server that does all that web servers do."""
+"""From the outbox to a web server that does all that web servers do, or answers for ever."""
 
 import asyncio
 import json
@@ -8,34 +8,26 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 import pytest
+from rigs.tiers import fast_and_long
 
 from core.alarms.alarm import AlarmLevel, Condition
+from service.delivery.outcome import Failed
 from service.delivery.quiet import QuietHours
 from service.delivery.sender import SenderState
 from service.store.outbox_port import LetterState
-from service.store.sqlite import SqliteStore
 
 DANGER = Condition(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
-
-
-def events(store: SqliteStore) -> list[tuple[str, str, int, str]]:
-    """Every letter there ever was: event, state, attempts in vain and answers, by number."""
-    with store._reader() as reader:
-        found = reader.execute("SELECT event_id, state, n_attempts, answer FROM outbox ORDER BY id")
-        return found.fetchall()
 
 
 async def test_each_event_is_told_once_and_in_order(room: Any) -> None:
     server, store = await room.web(room.answers("204 No Content")), room.open_store()
     store.append([], [], [room.news(n) for n in range(20)])
-    sender = room.sender(server, store)
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store)
 
     assert [r.id for r in server.requests] == [f"id-{n}" for n in range(20)]
     assert [json.loads(r.body)["subject"] for r in server.requests] == [f"B{n}" for n in range(20)]
-    assert {state for _, state, *_ in events(store)} == {"delivered"}
+    assert {state for _, state, *_ in room.letters(store)} == {"delivered"}
 
 
 async def test_news_is_told_as_soon_as_the_sender_is_woken(room: Any) -> None:
@@ -51,23 +43,22 @@ async def test_news_is_told_as_soon_as_the_sender_is_woken(room: Any) -> None:
     assert [r.id for r in server.requests] == ["id-0", "id-1", "id-2"]
 
 
-async def breaks_off(_: object, writer: asyncio.StreamWriter) -> None:
-    writer.write(b"HTTP/1.1 20")
+def says(words: bytes, for_ever: bytes = b"") -> Any:
+    """A web server that sends some bytes, and perhaps others for ever, whatever it is asked."""
+
+    async def behave(_: object, writer: asyncio.StreamWriter) -> None:
+        writer.write(words)
+        while for_ever:
+            writer.write(for_ever)
+            await writer.drain()
+
+    return behave
 
 
-async def says_nothing(*_: object) -> None:
-    """Closes without an answer."""
-
-
-async def talks_nonsense(_: object, writer: asyncio.StreamWriter) -> None:
-    writer.write(b"220 mail.example ESMTP\r\n\r\n" * 10)
-
-
-async def sends_endless_headers(_: object, writer: asyncio.StreamWriter) -> None:
-    writer.write(b"HTTP/1.1 200 OK\r\n")
-    while True:
-        writer.write(b"X-More: " + b"x" * 1000 + b"\r\n")
-        await writer.drain()
+BROKEN_OFF = says(b"HTTP/1.1 20")
+NO_ANSWER = says(b"")
+NONSENSE = says(b"220 mail.example ESMTP\r\n\r\n" * 10)
+ENDLESS_HEADERS = says(b"HTTP/1.1 200 OK\r\n", b"X-More: " + b"x" * 1000 + b"\r\n")
 
 
 async def announces_for_ever(_: object, writer: asyncio.StreamWriter) -> None:
@@ -86,10 +77,10 @@ async def announces_for_ever(_: object, writer: asyncio.StreamWriter) -> None:
         "429 Too Many Requests",
         "301 Moved Permanently",
         "101 Switching",
-        breaks_off,
-        says_nothing,
-        talks_nonsense,
-        sends_endless_headers,
+        pytest.param(BROKEN_OFF, id="broken off"),
+        pytest.param(NO_ANSWER, id="no answer"),
+        pytest.param(NONSENSE, id="nonsense"),
+        pytest.param(ENDLESS_HEADERS, id="endless headers"),
         announces_for_ever,
     ],
 )
@@ -97,21 +88,17 @@ async def test_what_may_pass_is_tried_again_with_the_same_message_before_any_lat
     fault: Any, room: Any
 ) -> None:
     faulty = room.answers(fault) if isinstance(fault, str) else fault
-    server, store = (
-        await room.web(faulty, faulty, faulty, room.answers("200 OK")),
-        room.open_store(),
-    )
+    server = await room.web(faulty, faulty, faulty, room.answers("200 OK"))
+    store = room.open_store()
     store.append([], [], [room.news(0), room.news(1)])
-    sender = room.sender(server, store)
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store)
 
     assert [r.id for r in server.requests] == ["id-0"] * 4 + ["id-1"]
     assert len({r.body for r in server.requests[:4]}) == 1
     first, second, third = room.clock.slept_s[:3]
     assert 0.5 <= first <= 1.0 <= second <= 2.0 <= third <= 4.0
-    assert [n for _, _, n, _ in events(store)] == [4, 1]
+    assert [n for _, _, n, _ in room.letters(store)] == [4, 1]
 
 
 async def test_a_receiver_that_asks_for_time_gets_it_up_to_the_limit(room: Any) -> None:
@@ -126,10 +113,8 @@ async def test_a_receiver_that_asks_for_time_gets_it_up_to_the_limit(room: Any) 
     )
     store = room.open_store()
     store.append([], [], [room.news(0)])
-    sender = room.sender(server, store, max_retry_s=20.0)
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store, max_retry_s=20.0)
 
     seven, capped, own, date = room.clock.slept_s[:4]
     assert (seven, capped) == (7.0, 20.0)
@@ -144,10 +129,8 @@ async def test_what_is_refused_for_ever_is_kept_as_such_and_holds_up_nothing(
     server = await room.web(room.answers(status, body="no such\r\nplant"), room.answers("200 OK"))
     store = room.open_store()
     store.append([], [], [room.news(0), room.news(1)])
-    sender = room.sender(server, store)
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store)
 
     (backlog,) = store.outbox.backlogs()
     assert [r.id for r in server.requests] == ["id-0", "id-1"]
@@ -162,25 +145,19 @@ async def test_a_redirect_is_not_followed(room: Any) -> None:
     moved = room.answers("307 Temporary Redirect", f"Location: {elsewhere.url}")
     server, store = await room.web(moved, room.answers("200 OK")), room.open_store()
     store.append([], [], [room.news(0)])
-    sender = room.sender(server, store)
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store)
 
     assert elsewhere.requests == []
     assert len(server.requests) == 2
 
 
-async def test_a_thousand_events_reach_a_receiver_that_fails_at_random(room: Any) -> None:
+@pytest.mark.parametrize("n_events", fast_and_long(100, 1000))
+async def test_many_events_reach_a_receiver_that_fails_at_random(room: Any, n_events: int) -> None:
     room.clock.held_from_s = 1e9
     chance, accepted = random.Random(5), []  # noqa: S311
-    faults = [
-        room.answers("500 Oh"),
-        room.answers("429 Slow"),
-        breaks_off,
-        says_nothing,
-        talks_nonsense,
-    ]
+    refusals = [room.answers("500 Oh"), room.answers("429 Slow")]
+    faults = [*refusals, BROKEN_OFF, NO_ANSWER, NONSENSE]
 
     async def fails_at_random(request: Any, writer: asyncio.StreamWriter) -> None:
         if chance.random() < 0.3:
@@ -190,29 +167,22 @@ async def test_a_thousand_events_reach_a_receiver_that_fails_at_random(room: Any
             await room.answers("200 OK")(request, writer)
 
     server, store = await room.web(fails_at_random), room.open_store()
-    for first in range(0, 1000, 100):
-        store.append([], [], [room.news(n) for n in range(first, first + 100)])
-    sender = room.sender(server, store, max_age_s=1e8)
+    store.append([], [], [room.news(n) for n in range(n_events)])
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store, max_age_s=1e8)
 
-    assert accepted == [f"id-{n}" for n in range(1000)]
-    assert len(server.requests) > 1000
+    assert accepted == [f"id-{n}" for n in range(n_events)]
+    assert len(server.requests) > n_events
 
 
 async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room: Any) -> None:
-    server, store = (
-        await room.web(room.answers("503 Away"), room.answers("200 OK")),
-        room.open_store(),
-    )
+    server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
+    store = room.open_store()
     store.append([], [], [room.news(n) for n in range(5)])
     room.clock.ns += 3_610 * 10**9
     store.append([], [], [room.news(5)])
-    sender = room.sender(server, store, max_age_s=3600.0)
 
-    async with room.running(sender):
-        await room.settled(sender, store)
+    await room.delivered(server, store, max_age_s=3600.0)
 
     assert [r.id for r in server.requests] == ["id-0", "id-5"]
     (backlog,) = store.outbox.backlogs()
@@ -248,6 +218,12 @@ async def test_a_clock_that_is_set_gives_nothing_up(
     assert [r.id for r in server.requests] == ["id-0", "id-0", "id-1", "id-2"]
 
 
+async def until_quiet(sender: Any) -> None:
+    async with asyncio.timeout(30):
+        while sender.status.state is not SenderState.QUIET:
+            await asyncio.sleep(0)
+
+
 async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_order(
     room: Any,
 ) -> None:
@@ -257,16 +233,12 @@ async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_orde
     sender = room.sender(server, store, quiet=always)
 
     async with room.running(sender):
-        async with asyncio.timeout(30):
-            while sender.status.state is not SenderState.QUIET:
-                await asyncio.sleep(0)
+        await until_quiet(sender)
         assert server.requests == []
         store.append([], [], [room.news(2, DANGER), room.news(3)])
         sender.wake()
         await server.until(3)
-        async with asyncio.timeout(30):
-            while sender.status.state is not SenderState.QUIET:
-                await asyncio.sleep(0)
+        await until_quiet(sender)
 
     assert [r.id for r in server.requests] == ["id-0", "id-1", "id-2"]
     assert [letter.event_id for letter in store.outbox.waiting("desk", 9)] == ["id-3"]
@@ -291,3 +263,75 @@ async def test_a_disk_that_refuses_to_note_a_delivery_never_makes_it_happen_twic
         await room.settled(sender, store)
 
     assert [r.id for r in server.requests] == ["id-0", "id-1"]
+
+
+TALKATIVE = says(b"HTTP/1.1 200 OK\r\n\r\n", b"thank you " * 1000)
+REFUSES_AT_LENGTH = says(
+    b"HTTP/1.1 410 Gone\r\nContent-Encoding: gzip\r\n\r\n", b"never again " * 1000
+)
+
+
+@pytest.mark.parametrize(
+    ("behave", "state"),
+    [(TALKATIVE, "delivered"), (REFUSES_AT_LENGTH, "refused")],
+    ids=["delivered", "refused"],
+)
+async def test_the_status_counts_and_of_an_endless_answer_no_more_is_read_than_is_shown(
+    behave: Any, state: str, room: Any
+) -> None:
+    server, store = await room.web(behave), room.open_store()
+    store.append([], [], [room.news(0)])
+
+    await room.delivered(server, store)
+
+    ((_, found, n_attempts, answer),) = room.letters(store)
+    assert (found, n_attempts) == (state, 1)
+    assert len(answer) <= 200
+
+
+async def hangs(*_: object) -> None:
+    await asyncio.Event().wait()
+
+
+async def dribbles(_: object, writer: asyncio.StreamWriter) -> None:
+    while True:
+        writer.write(b"H")
+        await writer.drain()
+        await asyncio.sleep(0.001)
+
+
+@pytest.mark.parametrize("behave", [hangs, dribbles])
+async def test_a_receiver_that_never_answers_delays_neither_another_one_nor_the_end(
+    behave: Any, room: Any
+) -> None:
+    slow, quick = await room.web(behave), await room.web(room.answers("200 OK"))
+    store = room.open_store(room.routed("slow"), room.routed("quick"))
+    store.append([], [], [room.news(n) for n in range(30)])
+    senders = room.sender(slow, store, "slow"), room.sender(quick, store, "quick")
+
+    async with room.running(*senders):
+        await slow.until(1)
+        await room.settled(senders[1], store)
+        assert senders[0].status.state is SenderState.SENDING
+
+    assert len(quick.requests) == 30
+    assert len(store.outbox.waiting("slow", 100)) == 30
+
+
+@pytest.mark.parametrize(
+    "behave",
+    [
+        says(b"", b"HTTP/1.1 100 Continue\r\n\r\n" * 1000),
+        says(b"HTTP/1.1 200 OK\r\n", b"X: y\r\n" * 1000),
+    ],
+    ids=["interim answers", "headers"],
+)
+async def test_a_flood_is_left_after_some_bytes_and_not_after_some_time(
+    behave: Any, room: Any
+) -> None:
+    server = await room.web(behave)
+    sender = room.sender(server, room.open_store())
+
+    outcome = await sender.receiver.carrier.carry({"id": "1"}, "{}")
+
+    assert outcome == Failed("the answer is longer than 32768 bytes")

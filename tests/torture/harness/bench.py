@@ -1,9 +1,9 @@
-"""`Bench`: a ledger DAQ, bad links to it, a service whose clock may be wrong, and a client."""
+"""`Bench`: a ledger DAQ, a service that reads it, and a client; perhaps bad links between them."""
 
 import signal
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 
 from harness.bad_link import BadLinks, bad_links
-from harness.checker import check
+from harness.checker import Findings, check
 from harness.ledger_daq import LedgerDaq, ledger_daq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig, until
-from harness.watch import Watch, silent_healthy_s
+from harness.watch import PERIOD_S, Watch, silent_healthy_s
 
 LINK_ALARM = "[alarms]\nlink_lost_after_s = 1.0\n"
 """Three polls of 0.5 s are to raise it."""
+
+STORE_ALARM = "[alarms]\nstore_failing_after_s = 0.5\n"
 
 FRESH_S = 0.6
 """Data that is not older came with the newest poll."""
@@ -27,50 +29,51 @@ FRESH_S = 0.6
 
 @dataclass
 class Seen:
-    """What a fault has led to, in seconds since it began or ended."""
+    """Effects of a fault, in seconds since it began or ended."""
 
     lost_s: list[float] = field(default_factory=list)
     back_s: list[float] = field(default_factory=list)
 
     def line(self, name: str) -> str:
-        """A line of the table."""
+        """Row of the table."""
         lost, back = (f"{np.max(s):5.2f}" if s else "    -" for s in (self.lost_s, self.back_s))
         return f"  {name:<34}{len(self.back_s):>4} times, alarm after {lost} s, back after {back} s"
 
 
 class Bench:
-    """A DAQ, bad links to it, a service and a client."""
+    """A DAQ, a service and a client.
+
+    Parameters
+    ----------
+    period_s
+        Time from one question of the client to the next.
+    """
 
     def __init__(
         self,
         plant: LedgerPlant,
         daq: LedgerDaq,
-        links: BadLinks,
-        folder: Path,
-        extra: str = "",
-        wrong_s: float = 0.0,
-        time_zone: str = "UTC",
+        rig: ServiceRig,
+        plant_file: Path,
+        period_s: float = PERIOD_S,
     ) -> None:
-        self.plant, self.daq, self.links = plant, daq, links
-        self._wall_clock = folder / "wall-clock"
-        self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
-        self.plant_file = plant.write(folder / "plant.toml", folder / "data", links.ports, extra)
-        environment = {"WALL_CLOCK": str(self._wall_clock), "TZ": time_zone}
-        self.rig = ServiceRig(self.plant_file, "harness.stepped_service", environment=environment)
-        self.watch = Watch(plant, daq.offered)
-        self.n_before = daq.offered().samples
+        self.plant, self.daq, self.rig, self.plant_file = plant, daq, rig, plant_file
+        self.watch = Watch(plant, daq.offered, period_s)
+        self.lives: dict[str, list[int]] = {unit: [] for unit in plant.units}
 
-    def begin(self) -> None:
-        """Start the service and the client."""
+    def begin(self) -> float:
+        """Start the service and the client; returns the seconds until the service is ready."""
+        self.note_life()
         self.rig.start()
-        self.rig.wait_ready()
+        ready_s = self.rig.wait_ready()
         self.watch.begin(self.rig.url)
-        self.wait_until_well()
+        return ready_s
 
-    def step(self, wrong_s: float) -> None:
-        """Let the service's wall clock be wrong by so much from now on."""
-        self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
-        self.rig.signal(signal.SIGUSR1)
+    def note_life(self) -> None:
+        """Note the newest samples, as the process starts or for the last time."""
+        samples = self.daq.offered().samples
+        for unit in self.plant.units:
+            self.lives[unit].append(samples.get((unit, 1), 0))
 
     def freeze(self, seconds: float) -> None:
         """Stop the service in its tracks, and let it go on."""
@@ -79,31 +82,43 @@ class Bench:
         self.rig.signal(signal.SIGCONT)
 
     def states(self) -> set[str]:
-        """Of the links, as the service sees them."""
+        """Return the states of the links, as the service sees them."""
         with self.rig.api() as api:
             return {unit["source"]["state"] for unit in api.get("/api/v1/units")}
 
     def active(self, kind: str) -> list[dict[str, Any]]:
-        """Active alarms of a kind."""
+        """Return the active alarms of a kind."""
         with self.rig.api() as api:
             found = api.get("/api/v1/alarms")["alarms"]
         return [one for one in found if one["kind"] == kind and one["level"] is not None]
 
     def raised(self) -> Counter[str]:
-        """How often alarms of a kind were raised."""
+        """Count by kind how often alarms were raised."""
         with self.rig.api() as api:
             events = api.get("/api/v1/alarms/events?limit=1000")["events"]
         return Counter(event["kind"] for event in events if event["change"] == "raised")
 
     def gaps(self) -> list[dict[str, Any]]:
-        """Recorded gaps of the first unit."""
+        """Return the recorded gaps of the first unit."""
         ever = "start=2020-01-01T00:00:00Z&end=2100-01-01T00:00:00Z"
         with self.rig.api() as api:
             found: list[dict[str, Any]] = api.get(f"/api/v1/units/U1/gaps?{ever}")
         return found
 
+    def wait_for_newer(self) -> str:
+        """Wait until a newer result is shown as current; returns its time."""
+
+        def newest() -> str:
+            with self.rig.api() as api:
+                units = api.get("/api/v1/overview")["units"]
+            return max(bearing["time"] or "" for unit in units for bearing in unit["bearings"])
+
+        shown = newest()
+        until(lambda: newest() > shown)
+        return newest()
+
     def wait_until_well(self) -> float:
-        """Until fresh samples of all units are here; in seconds."""
+        """Wait for fresh samples of all units; returns the seconds that it took."""
         begun_s = time.monotonic()
 
         def is_well() -> bool:
@@ -115,23 +130,56 @@ class Bench:
         return time.monotonic() - begun_s
 
     def wait_for_alarms(self) -> float:
-        """Until every link has its alarm; in seconds."""
+        """Wait until every link has its alarm; returns the seconds that it took."""
         begun_s = time.monotonic()
         until(lambda: len(self.active("link_lost")) == self.plant.n_units)
         return time.monotonic() - begun_s
 
-    def findings(self) -> dict[str, Any]:
-        """What is wrong with what is stored and was shown."""
-        time.sleep(3.0 * self.plant.refresh_s)
-        self.rig.stop()
+    def end(self, units: Sequence[str] = ()) -> Findings:
+        """Stop the service and the client, and compare the store with the truth."""
+        exit_code = self.rig.stop()
         self.watch.end()
+        assert exit_code == 0
+        self.note_life()
         offered = self.daq.offered()
-        lives = {unit: [self.n_before.get((unit, 1), 0)] for unit in self.plant.units}
-        for unit in self.plant.units:
-            lives[unit].append(offered.samples[unit, 1])
-        found = check(self.plant, self.plant_file, offered, lives, self.watch)
-        silent_s = silent_healthy_s(self.plant, offered, self.watch.looks)
+        return check(self.plant, self.plant_file, offered, self.lives, self.watch, units)
+
+    def silent_healthy_s(self) -> float:
+        """Return for how long the client was shown something absent or faulty as good."""
+        return silent_healthy_s(self.plant, self.daq.offered(), self.watch.looks)
+
+    def wrong(self) -> dict[str, Any]:
+        """Return what is wrong with what is stored and was shown, after some more results."""
+        time.sleep(3.0 * self.plant.refresh_s)
+        found, silent_s = self.end(), self.silent_healthy_s()
         return {**found.wrong, **({"silent-healthy seconds": silent_s} if silent_s else {})}
+
+
+class BadLinkBench(Bench):
+    """A bench with bad links, whose service has a wall clock that may be wrong."""
+
+    def __init__(
+        self,
+        plant: LedgerPlant,
+        daq: LedgerDaq,
+        links: BadLinks,
+        folder: Path,
+        extra: str = "",
+        wrong_s: float = 0.0,
+        time_zone: str = "UTC",
+    ) -> None:
+        self.links = links
+        self._wall_clock = folder / "wall-clock"
+        self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
+        plant_file = plant.write(folder / "plant.toml", folder / "data", links.ports, extra)
+        environment = {"WALL_CLOCK": str(self._wall_clock), "TZ": time_zone}
+        rig = ServiceRig(plant_file, "harness.stepped_service", environment=environment)
+        super().__init__(plant, daq, rig, plant_file)
+
+    def step(self, wrong_s: float) -> None:
+        """Let the service's wall clock be wrong by so much from now on."""
+        self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
+        self.rig.signal(signal.SIGUSR1)
 
 
 @contextmanager
@@ -142,21 +190,22 @@ def bench_of(
     extra: str = "",
     wrong_s: float = 0.0,
     time_zone: str = "UTC",
-) -> Iterator[Bench]:
-    """Build it, and let it run.
+) -> Iterator[BadLinkBench]:
+    """Build a bench with bad links, and let it run.
 
     Parameters
     ----------
     extra
         More tables of the plant file.
     wrong_s
-        By how much the service's wall clock is wrong.
+        Error of the service's wall clock.
     """
     with ledger_daq(plant, folder) as daq, bad_links(daq.ports, seed) as links:
-        bench = Bench(plant, daq, links, folder, extra, wrong_s, time_zone)
+        bench = BadLinkBench(plant, daq, links, folder, extra, wrong_s, time_zone)
         with bench.rig:
             try:
                 bench.begin()
+                bench.wait_until_well()
                 yield bench
             finally:
                 bench.watch.end()

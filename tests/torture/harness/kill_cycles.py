@@ -3,16 +3,14 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
-from harness.checker import Findings, check
-from harness.ledger_daq import LedgerDaq
-from harness.ledger_plant import LedgerPlant
+from harness.bench import Bench
+from harness.checker import Findings
 from harness.service_rig import UNREACHABLE, Api, RefusedError, ServiceRig
 from harness.truth import BEARINGS
-from harness.watch import Watch, silent_healthy_s
+from harness.watch import Watch
 
 LIFE_S, LONGEST_LIFE_S = 3.0, 12.0
 """For how long a service runs once it is ready: on average, and at most."""
@@ -54,10 +52,7 @@ class Cycles:
 
 
 def kill_cycles(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    rig: ServiceRig,
-    plant_file: Path,
+    bench: Bench,
     n_cycles: int,
     rng: np.random.Generator,
     life_s: float = LIFE_S,
@@ -73,22 +68,16 @@ def kill_cycles(
     trouble
         Called in each life with its number.
     """
-    done = Cycles()
-    watch = Watch(plant, daq.offered)
-    lives: dict[str, list[int]] = {unit: [] for unit in plant.units}
+    done, rig, watch = Cycles(), bench.rig, bench.watch
     for number in range(n_cycles):
-        for unit, n in daq.offered().samples.items():
-            lives[unit[0]].append(n)
-        rig.start()
         done.n_cycles += 1
         if number % 4 == 1:
             done.n_in_recovery += 1
+            bench.note_life()
+            rig.start()
             _kill_in_recovery(number, rig, rng, done)
             continue
-        done.ready_s.append(rig.wait_ready())
-        with rig.api() as api:
-            done.alarms += alarms_not_as_before(api)
-        watch.begin(rig.url)
+        _begin(bench, done)
         if number % 4 != 2:
             watch.wait_for_result()
         if trouble is not None:
@@ -98,18 +87,19 @@ def kill_cycles(
             act(api, number, watch)
         rig.kill()
         watch.end()
-    for unit, n in daq.offered().samples.items():
-        lives[unit[0]].append(n)
-    rig.start()
-    done.ready_s.append(rig.wait_ready())
-    with rig.api() as api:
-        done.alarms += alarms_not_as_before(api)
-    time.sleep(3.0 * plant.refresh_s)
-    rig.stop()
-    done.findings = check(plant, plant_file, daq.offered(), lives, watch)
-    done.silent_healthy_s = silent_healthy_s(plant, daq.offered(), watch.looks)
+    _begin(bench, done)
+    time.sleep(3.0 * bench.plant.refresh_s)
+    done.findings = bench.end()
+    done.silent_healthy_s = bench.silent_healthy_s()
     done.n_answers = watch.n_answers
     return done
+
+
+def _begin(bench: Bench, done: Cycles) -> None:
+    """Start the service and the client, and compare the alarms with their newest events."""
+    done.ready_s.append(bench.begin())
+    with bench.rig.api() as api:
+        done.alarms += alarms_not_as_before(api)
 
 
 def _kill_in_recovery(number: int, rig: ServiceRig, rng: np.random.Generator, done: Cycles) -> None:

@@ -3,17 +3,14 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import psutil
 
-from harness.checker import Findings, check
-from harness.ledger_daq import LedgerDaq
+from harness.bench import Bench
+from harness.checker import Findings
 from harness.ledger_plant import LedgerPlant
-from harness.service_rig import ServiceRig
 from harness.usage import Slope, Usage, look, slope
-from harness.watch import Watch, silent_healthy_s
 from service.wiring.stores import DATABASE
 
 LOOK_S = 2.0
@@ -91,14 +88,7 @@ class Soaked:
         return "\n".join(f"  {name:<32}{value}" for name, value in figures.items())
 
 
-def soak(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    rig: ServiceRig,
-    plant_file: Path,
-    seconds: float,
-    checked: Sequence[str],
-) -> Soaked:
+def soak(bench: Bench, seconds: float, checked: Sequence[str]) -> Soaked:
     """Run a service for so long, and compare some of its units bit for bit.
 
     Parameters
@@ -106,14 +96,10 @@ def soak(
     checked
         Units whose every stored number is computed again; the accounts of all are looked at.
     """
-    watch = Watch(plant, daq.offered, period_s=1.0)
-    lives = {unit: [n] for (unit, _), n in daq.offered().samples.items()}
-    rig.start()
-    ready_s = rig.wait_ready()
-    watch.begin(rig.url)
-    watch.wait_for_result()
-    log = plant_file.parent / "data" / f"{DATABASE}-wal"
-    service, device = psutil.Process(rig.pid), psutil.Process(daq.process.pid)
+    ready_s = bench.begin()
+    bench.watch.wait_for_result()
+    log = bench.plant_file.parent / "data" / f"{DATABASE}-wal"
+    service, device = psutil.Process(bench.rig.pid), psutil.Process(bench.daq.process.pid)
     begun_s, device_s = time.monotonic(), sum(device.cpu_times()[:2])
     usages = [look(service, log)]
     while usages[-1].at_s - begun_s < seconds:
@@ -121,21 +107,18 @@ def soak(
         usages.append(look(service, log))
     passed_s = time.monotonic() - begun_s
     device_s = sum(device.cpu_times()[:2]) - device_s
-    with rig.api() as api:
+    with bench.rig.api() as api:
         sources = {unit["id"]: unit["source"] for unit in api.get("/api/v1/overview")["units"]}
-    watch.end()
-    rig.stop()
-    offered = daq.offered()
     return Soaked(
         seconds=passed_s,
         ready_s=ready_s,
         usages=usages,
         daq_cores=device_s / passed_s,
-        findings=check(plant, plant_file, offered, lives, watch, checked),
-        open_accounts=[unit for unit in plant.units if not _closes(sources[unit])],
+        findings=bench.end(checked),
+        open_accounts=[unit for unit in bench.plant.units if not _closes(sources[unit])],
         n_offered=sum(int(source["n_offered"]) for source in sources.values()),
         n_gap=sum(int(source["n_gap"]) for source in sources.values()),
-        silent_healthy_s=silent_healthy_s(plant, offered, watch.looks),
+        silent_healthy_s=bench.silent_healthy_s(),
     )
 
 

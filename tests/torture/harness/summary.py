@@ -11,10 +11,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from _pytest.mark import ParameterSet
 
 FIGURE, PLANTED = "figure", "planted"
 
 Property = tuple[str, object]
+
+
+def planted(bug: str, *values: object, mark: pytest.MarkDecorator) -> ParameterSet:
+    """Parameters of a test that plants a bug, with the mark of its tier."""
+    return pytest.param(bug, *values, marks=(pytest.mark.planted(bug), mark), id=bug)
 
 
 def note_planted(items: Iterable[pytest.Item]) -> None:

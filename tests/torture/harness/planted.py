@@ -1,21 +1,26 @@
-"""The service with one bug in it: ``python -m harness.planted_service run FILE --port 0``.
+"""The service with one bug in it: ``python -m harness.planted run FILE --port 0``.
 
-The bug is named by the environment variable PLANTED; it is put in as the process starts, and the
-product knows nothing of it.
+The environment variable PLANTED names the bug; it is planted as the process starts, and the product
+knows nothing of it.
 """
 
 import asyncio
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
+from core.blocks import SampleBlock
 from core.monitored_unit import MonitoredUnit
 from core.ring import Ring
 from service.alarms.engine import AlarmEngine
 from service.cli.main import main
+from service.continuous import joining, tape, unit_tape
+from service.continuous.stretch import Stretch
 from service.live import LiveView
 from service.recorder import Findings, Recorder
 from service.store import sql_store
@@ -116,6 +121,72 @@ def letter_forgotten() -> None:
     sql_store.insert_alarms = forgetful
 
 
+def promised_before_it_is_synced() -> None:
+    """Count samples as recorded as soon as they are in memory."""
+    write = Stretch.write
+
+    def counted(self: Stretch, block: SampleBlock, now_s: float) -> None:
+        write(self, block, now_s)
+        TAPES[-1].n_written += block.n_samples
+
+    def never_again(self: Stretch) -> int:
+        finish(self)
+        return 0
+
+    finish = Stretch.finish_part
+    Stretch.write = counted  # type: ignore[method-assign]
+    Stretch.finish_part = never_again  # type: ignore[method-assign]
+    made = unit_tape.UnitTape.__init__
+
+    def noted(self: Any, *how: Any, **more: Any) -> None:
+        made(self, *how, **more)
+        TAPES.append(self)
+
+    unit_tape.UnitTape.__init__ = noted  # type: ignore[method-assign]
+
+
+def parts_thrown_away_at_start() -> None:
+    """Take what a crash has left in parts for rubbish."""
+
+    def cleared(root: Path, units: Any) -> list[Path]:
+        for folder in joining.unjoined(root, units):
+            joining._remove_parts(joining.parts_folder(folder))
+        return []
+
+    tape.unjoined = cleared
+
+
+def hole_of_the_outage_not_told() -> None:
+    """Begin after a restart as if nothing was missing."""
+    tape.last_end = lambda root, unit: None  # noqa: ARG005
+
+
+def part_joined_twice() -> None:
+    """Leave the first part in its place when a stretch is joined, and let it be joined again."""
+    write = joining._write
+
+    def doubled(folder: Path, parts: Any) -> None:
+        write(folder, parts)
+        write(folder.with_name(f"{folder.name}-2"), parts[:1])
+
+    joining._write = doubled
+
+
+def sample_altered() -> None:
+    """Write one sample otherwise than it came."""
+    write = Stretch.write
+
+    def altered(self: Stretch, block: SampleBlock, now_s: float) -> None:
+        samples = block.samples.copy()
+        samples[3, 0] = samples[3, 1]
+        samples[4, 0] = samples[4, 1]
+        write(self, replace(block, samples=samples), now_s)
+
+    Stretch.write = altered  # type: ignore[method-assign]
+
+
+TAPES: list[unit_tape.UnitTape] = []
+
 BUGS: Mapping[str, Callable[[], None]] = {
     bug.__name__: bug
     for bug in (
@@ -128,6 +199,11 @@ BUGS: Mapping[str, Callable[[], None]] = {
         finding_dropped,
         value_altered,
         letter_forgotten,
+        promised_before_it_is_synced,
+        parts_thrown_away_at_start,
+        hole_of_the_outage_not_told,
+        part_joined_twice,
+        sample_altered,
     )
 }
 

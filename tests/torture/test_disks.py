@@ -1,0 +1,98 @@
+"""Disks that are full or slow: nothing promised is lost, and alarms go on meanwhile."""
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from harness.bench import STORE_ALARM, Bench
+from harness.ledger_daq import LedgerDaq
+from harness.ledger_plant import LedgerPlant
+from harness.service_rig import RefusedError, ServiceRig, until
+from harness.small_disk import SmallDisk, small_disk
+
+N_CYCLES, N_FEW = 20, 1
+DISK_MIB = 32.0
+RESUMED_WITHIN_S = 5.0
+NOT_STORED = "results_not_stored"
+
+SLOW_US = 2_000_000
+FROM_SYNC = 60
+"""The first ones make the database."""
+
+STRACE = (
+    *("strace", "-D", "-f", "--seccomp-bpf", "-qq", "-o", "/dev/null", "-e", "trace=fdatasync"),
+    *("-e", f"inject=fdatasync:delay_enter={SLOW_US}:when={FROM_SYNC}+"),
+)
+
+
+@pytest.fixture
+def plant(torture_seed: int) -> LedgerPlant:
+    return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
+
+
+@pytest.mark.timeout(3600)
+def test_a_full_disk_costs_nothing_that_was_promised(
+    plant: LedgerPlant,
+    daq: LedgerDaq,
+    tmp_path: Path,
+    is_whole: bool,
+    figure: Callable[[str], None],
+) -> None:
+    plant_file = tmp_path / "plant.toml"
+    with small_disk(tmp_path / "small", DISK_MIB) as disk, ServiceRig(plant_file) as rig:
+        plant.write(plant_file, disk.folder / "data", daq.ports, STORE_ALARM)
+        bench = Bench(plant, daq, rig, plant_file)
+        bench.begin()
+        bench.watch.wait_for_result()
+        n_cycles = N_CYCLES if is_whole else N_FEW
+        resumed_s = [_filled_and_freed(bench, disk) for _ in range(n_cycles)]
+        bench.watch.wait_for_result()
+        found = bench.end()
+    figure(
+        f"disk full and freed\n  cycles {len(resumed_s)}, stored again after at most"
+        f" {max(resumed_s):.2f} s; {found.counts}"
+    )
+    assert found.wrong == {}
+    assert found.n_results > 0
+    assert not is_whole or max(resumed_s) <= RESUMED_WITHIN_S
+
+
+def _filled_and_freed(bench: Bench, disk: SmallDisk) -> float:
+    """Fill the disk, look at the service, make room; seconds until results are stored again."""
+    disk.fill()
+    alarm = until(lambda: bench.active(NOT_STORED))[0]["id"]
+    bench.wait_for_newer()
+    comment = {"actor": "Anna", "text": "is somebody there?"}
+    with bench.rig.api() as api:
+        with pytest.raises(RefusedError, match="Nothing was done") as refused:
+            api.post(f"/api/v1/alarms/{alarm}/comment", comment)
+        assert refused.value.status == 503
+        disk.free()
+        freed_s = time.monotonic()
+        until(lambda: api.get("/readyz")["status"] == "ok")
+    resumed_s = time.monotonic() - freed_s
+    until(lambda: not bench.active(NOT_STORED))
+    return resumed_s
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.torture
+@pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
+def test_a_slow_disk_holds_up_nothing_but_itself(
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, figure: Callable[[str], None]
+) -> None:
+    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, STORE_ALARM)
+    with ServiceRig(plant_file, before=STRACE) as rig:
+        bench = Bench(plant, daq, rig, plant_file)
+        bench.begin()
+        [alarm] = until(lambda: bench.active(NOT_STORED))
+        pace = [bench.wait_for_newer() for _ in range(3)]
+        bench.watch.wait_for_result()
+        found = bench.end()
+    figure(f"every sync takes {SLOW_US / 1e6:g} s\n  {found.counts}")
+    assert alarm["condition_reason"] == "the store does not answer"
+    assert len(set(pace)) == len(pace)
+    assert found.wrong == {}
+    assert found.n_results > 0
