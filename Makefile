@@ -13,7 +13,7 @@ SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 WORKERS ?= 4
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: install develop run axe test test-long mutants check docs screenshots bench fuzz accuracy torture soak \
+.PHONY: install develop run axe test test-long mutants check lint types contracts docs screenshots bench fuzz accuracy torture soak \
   format lock clean
 
 $(STAMP): requirements/run.txt requirements/build.txt pyproject.toml
@@ -51,15 +51,20 @@ test-long: develop axe
 mutants: develop
 	$(BIN)/python tests/mutants/run.py
 
-check: develop
+check: lint types contracts docs
+
+lint: develop
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+
+types: develop
 	$(BIN)/mypy
+
+contracts: develop
 	$(BIN)/lint-imports
-	$(BIN)/sphinx-build $(SPHINX) --quiet docs build/docs
 
 docs: develop
-	$(BIN)/sphinx-build $(SPHINX) docs build/docs
+	$(BIN)/sphinx-build $(SPHINX) --quiet docs build/docs
 
 bench: develop
 	$(BIN)/python benchmarks/ingest.py
