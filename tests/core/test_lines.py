@@ -19,28 +19,6 @@ def test_the_taper_is_the_one_of_scipy() -> None:
     np.testing.assert_allclose(hann(8192), signal.get_window("hann", 8192), atol=1e-15)
 
 
-def test_averaged_bins_are_the_welch_spectrum_of_scipy() -> None:
-    rng = np.random.default_rng(1)
-    samples = rng.normal(size=(4, 8192 + 9 * 7168)) + 5.0
-    segments = [
-        bin_phasors(tapered(samples[:, start : start + 8192]), 400)
-        for start in range(0, 10 * 7168, 7168)
-    ]
-    frequency_hz = np.arange(1, 401) * RATE_HZ / 8192
-    spectrum = average(frequency_hz, np.array(segments), np.ones((10, 4), dtype=bool))
-    _, welch = signal.welch(
-        samples, RATE_HZ, "hann", 8192, noverlap=1024, detrend="constant", scaling="spectrum"
-    )
-    for channel in range(4):  # scipy's power is mean square, ours squared zero-to-peak: twice that
-        np.testing.assert_allclose(
-            spectrum.amplitude_um_pk(channel) ** 2, 2 * welch[channel, 1:401], rtol=1e-12
-        )
-    _, cross = signal.csd(
-        samples[0], samples[2], RATE_HZ, "hann", 8192, noverlap=1024, scaling="spectrum"
-    )
-    np.testing.assert_allclose(spectrum.matrix[:, 2, 0], 2 * cross[1:401], rtol=1e-9)
-
-
 def test_exact_phasors_on_a_bin_are_the_transform_there() -> None:
     samples = tapered(np.random.default_rng(2).normal(size=(2, 1024)))
     frequency_hz = np.array([3, 10, 77]) * RATE_HZ / 1024

@@ -102,6 +102,15 @@ def test_an_axis_without_probes_leaves_the_other_but_no_eccentricity() -> None:
     assert centre.attitude_angle_deg.value is None
 
 
+def test_doubt_about_one_gap_is_doubt_about_the_position() -> None:
+    x, y = gaps(30.0, -40.0)
+    doubtful = replace(x.near, quality=uncertain(Reason.LOW_COVERAGE))
+    centre = shaft_centre((doubtful, y.near), (2000.0, 2100.0), CLEARANCE_UM)
+
+    assert centre.eccentricity_ratio.quality == uncertain(Reason.LOW_COVERAGE)
+    assert centre.y_um.quality.reason is Reason.OK
+
+
 def test_a_centred_shaft_has_an_eccentricity_of_zero_and_any_angle() -> None:
     centre = locate_shaft(*gaps(0.0, 0.0), CLEARANCE_UM)
 
@@ -174,6 +183,8 @@ def test_eccentricity_and_angle_stay_within_their_stated_uncertainty(lost: tuple
 
 
 @pytest.mark.parametrize("value", [-1.0, math.inf, math.nan])
-def test_limits_that_cannot_be_are_refused(value: float) -> None:
+def test_limits_and_clearances_that_cannot_be_are_refused(value: float) -> None:
     with pytest.raises(ValueError, match="growth_um must be a half-width"):
         GapAccuracy(growth_um=value)
+    with pytest.raises(ValueError, match="clearance must be positive"):
+        locate_shaft(*gaps(0.0, 0.0), min(value, 0.0) if value < math.inf else math.nan)

@@ -16,7 +16,6 @@ from benchmarks.accuracy import simulate
 from benchmarks.accuracy_estimates import Estimate, estimates
 from benchmarks.accuracy_plant import spectra
 from benchmarks.accuracy_rows import ROWS, Row
-from core.film import Film
 
 N_RUNS = 2
 SHORT_S = 300.0
@@ -117,10 +116,3 @@ def test_intervals_hold_the_truth_when_gains_and_brackets_are_off() -> None:
     assert np.mean([e.covered_random for key in names for e in exact[key]]) >= 0.8
     errors = [e.error for key in names for e in drawn[key]]
     assert 0.02 < np.std(errors) < 0.12  # 7 % as stated: the draws do reach the results
-
-
-def test_a_film_of_the_rows_is_not_symmetric_by_mistake() -> None:
-    film = ROWS["crossed"].run.scenario.bearings["UJB"].film
-    assert film == Film(
-        1.2e9, -0.33e9, -0.25e9, 0.7e9, 0.0125 * 1.2e9, -0.0125 * 0.33e9, -0.0125 * 0.25e9, 8.75e6
-    )

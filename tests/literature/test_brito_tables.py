@@ -61,12 +61,6 @@ def test_section_3_2_does_not_follow_in_the_order_its_sentence_has() -> None:
     assert not lowest <= 0.29 <= highest
 
 
-def test_tables_8_and_9_have_nine_rows_each_in_x_direction() -> None:
-    tables = [row.table for row in measured_rows()]
-
-    assert (tables.count(8), tables.count(9), tables.count("3.2")) == (9, 9, 2)
-
-
 @pytest.mark.parametrize(
     ("bearing", "condition", "k_eff_gn_per_m"),
     [

@@ -43,17 +43,6 @@ def test_an_alarm_that_comes_is_seen_and_goes_is_normal_again(life: Make) -> Non
     assert (returned.level, returned.occurrence) == (AlarmLevel.ALERT, 1)
 
 
-def test_one_that_goes_before_anybody_has_seen_it_stays_on_the_list(life: Make) -> None:
-    alarm = life()
-    alarm.find(ALERT, 0)
-
-    alarm.find(WITHIN, 1)
-
-    assert alarm.alarm.state is AlarmState.RETURNED_UNACKNOWLEDGED
-    alarm.ask(Acknowledge("A. Name", 1))
-    assert alarm.alarm.state is AlarmState.NORMAL
-
-
 def test_an_acknowledgement_of_the_last_occurrence_does_not_swallow_the_next(life: Make) -> None:
     alarm = life()
     for condition, now in ((ALERT, 0), (WITHIN, 1), (ALERT, 2)):
@@ -93,18 +82,6 @@ def test_a_lost_probe_keeps_an_alarm_active_and_says_that_it_is_not_known(life: 
     assert alarm.find(WITHIN, 10**12 + 1) == ["condition_known", "returned"]
 
 
-def test_what_is_pending_stays_pending_while_nothing_is_known(life: Make) -> None:
-    alarm = life(on=10)
-    alarm.find(ALERT, 0)
-    alarm.find(ALERT, 6)
-
-    assert alarm.find(LOST, 7) == []
-    assert not alarm.alarm.condition.is_known
-    assert alarm.find(ALERT, 100) == []  # what passed unseen does not count
-    assert alarm.find(ALERT, 103) == []
-    assert alarm.find(ALERT, 104) == ["raised"]
-
-
 def test_a_short_excursion_raises_nothing_and_a_short_return_ends_nothing(life: Make) -> None:
     alarm = life(on=10, off=20)
 
@@ -114,15 +91,6 @@ def test_a_short_excursion_raises_nothing_and_a_short_return_ends_nothing(life: 
     assert alarm.find(WITHIN, 22) == alarm.find(WITHIN, 41) == alarm.find(ALERT, 42) == []
     assert alarm.find(WITHIN, 43) == []
     assert alarm.find(WITHIN, 63) == ["returned"]
-
-
-def test_a_danger_too_short_to_count_counts_for_the_alert(life: Make) -> None:
-    alarm = life(on=10)
-    alarm.find(DANGER, 0)
-    alarm.find(ALERT, 6)
-
-    assert alarm.find(ALERT, 10) == ["raised"]
-    assert alarm.alarm.level is AlarmLevel.ALERT
 
 
 def test_a_clock_that_is_put_back_brings_no_delay_forward(life: Make) -> None:
@@ -236,15 +204,4 @@ def test_out_of_service_hides_more_than_the_shelf_and_ends_only_by_hand(life: Ma
     alarm.alarm, _ = expire(alarm.alarm, 60)
     assert alarm.alarm.state is AlarmState.OUT_OF_SERVICE
     assert alarm.ask(ReturnToService("B. Name"), 70) == ["returned_to_service"]
-    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
-
-
-def test_a_machine_that_stands_suppresses_and_does_not_clear(life: Make) -> None:
-    alarm = life()
-    alarm.find(DANGER, 0)
-
-    assert alarm.find(unknown("standstill", "standstill"), 1) == ["suppressed"]
-    assert alarm.alarm.state is AlarmState.SUPPRESSED
-    assert alarm.alarm.level is AlarmLevel.DANGER
-    assert alarm.find(DANGER, 2) == ["unsuppressed"]
     assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED

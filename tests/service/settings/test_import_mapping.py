@@ -44,71 +44,56 @@ def test_a_right_mapping_is_read(tmp_path: Path, text: str) -> None:
     assert mapping.time.zone == "-03:00"
 
 
+FORMAT, UNIT = 'format = "csv"', 'unit = "um"'
+
+
 @pytest.mark.parametrize(
-    ("text", "old", "new", "says"),
+    ("old", "new", "says"),
     [
-        (CSV, 'zone = "-03:00"\n', "", ":3: time.zone: Field required"),
-        (CSV, '"-03:00"', '"CET"', ":7: time.zone = 'CET': String should match pattern"),
-        (CSV, '"-03:00"', '"-15:00"', "time.zone = '-15:00': String should match"),
-        (CSV, 'format = "csv"', 'format = "wav"', ":1: format = 'wav': Input should be 'mdf4'"),
-        (
-            CSV,
-            'format = "csv"',
-            'format = "tdms"',
-            ":6: time.form = 'iso8601': is only for csv, this is tdms",
-        ),
-        (
-            CSV,
-            '"column"\n',
-            '"file"\n',
-            ":4: time.source = 'file': csv has no time of its own; write",
-        ),
-        (CSV, 'form = "iso8601"\n', "", 'time.form: is needed for source "column"'),
-        (CSV, "iso8601", "elapsed_s", "time.start: is needed: what time counts from"),
-        (CSV, "iso8601", "timestamp", "time.form = 'timestamp': is only for tdms, this is csv"),
-        (CSV, "zone = ", "start = 2026-01-01\nzone = ", "time.start"),
-        (CSV, "zone = ", "start = 2026-01-01T00:00:00\nzone = ", "time.start"),
-        (
-            CSV,
-            "zone = ",
-            "start = 2026-01-01T00:00:00Z\nzone = ",
-            "00:00+00:00': has no effect here",
-        ),
-        (CSV, 'unit = "um"', "", ":9: channel[1].unit: Field required"),
-        (
-            CSV,
-            'unit = "um"',
-            "unit = 3",
-            ":12: channel[1].unit = 3: Input should be a valid string",
-        ),
-        (
-            CSV,
-            'unit = "um"',
-            'unit = "um"\ngroup = "a"',
-            ":13: channel[1].group: csv has no groups",
-        ),
-        (CSV, 'unit = "um"', 'unit = "um"\ngain = 2', ":13: channel[1].gain = 2: Extra inputs"),
-        (CSV, "[[channel]]", "[[chanel]]", "chanel"),
-        (CSV, CSV[CSV.index("[[channel]]") :], "", "channel: needs at least one for csv"),
-        (CSV, "[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
-        (MDF, "[[channel]]", "[csv]\n[[channel]]", "csv: is for CSV files, this one is mdf4"),
-        (
-            MDF,
-            "[time]",
-            'bus = "can0"\n[time]',
-            ":3: bus = 'can0': is for CAN logs, this one is mdf4",
-        ),
-        (MDF, "mdf4", "tdms", ":5: time.zone = '-03:00': tdms is in UTC; write"),
-        (MDF, "mdf4", "candump", "candump is in UTC"),
-        (MDF.replace("-03:00", "UTC"), "mdf4", "candump", "channel: are those of the DBC file for"),
-        (MDF, 'source = "file"', 'source = "start"', "time.start: is needed"),
-        (CSV, "[time]", "[time", "not TOML"),
+        ('zone = "-03:00"\n', "", ":3: time.zone: Field required"),
+        ('"-03:00"', '"CET"', ":7: time.zone = 'CET': String should match pattern"),
+        ('"-03:00"', '"-15:00"', "time.zone = '-15:00': String should match"),
+        (FORMAT, 'format = "wav"', ":1: format = 'wav': Input should be 'mdf4'"),
+        (FORMAT, 'format = "tdms"', ":6: time.form = 'iso8601': is only for csv, this is tdms"),
+        ('"column"\n', '"file"\n', ":4: time.source = 'file': csv has no time of its own; write"),
+        ('form = "iso8601"\n', "", 'time.form: is needed for source "column"'),
+        ("iso8601", "elapsed_s", "time.start: is needed: what time counts from"),
+        ("iso8601", "timestamp", "time.form = 'timestamp': is only for tdms, this is csv"),
+        ("zone = ", "start = 2026-01-01\nzone = ", "time.start"),
+        ("zone = ", "start = 2026-01-01T00:00:00\nzone = ", "time.start"),
+        ("zone = ", "start = 2026-01-01T00:00:00Z\nzone = ", "00:00+00:00': has no effect here"),
+        (UNIT, "", ":9: channel[1].unit: Field required"),
+        (UNIT, "unit = 3", ":12: channel[1].unit = 3: Input should be a valid string"),
+        (UNIT, f'{UNIT}\ngroup = "a"', ":13: channel[1].group: csv has no groups"),
+        (UNIT, f"{UNIT}\ngain = 2", ":13: channel[1].gain = 2: Extra inputs"),
+        ("[[channel]]", "[[chanel]]", "chanel"),
+        (CSV[CSV.index("[[channel]]") :], "", "channel: needs at least one for csv"),
+        ("[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
+        ("[time]", "[time", "not TOML"),
     ],
 )
 def test_a_wrong_mapping_is_refused_with_line_and_key(
-    tmp_path: Path, text: str, old: str, new: str, says: str
+    tmp_path: Path, old: str, new: str, says: str
 ) -> None:
-    assert old in text
+    assert old in CSV
+    assert says in refusal(tmp_path, CSV.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[[channel]]", "[csv]\n[[channel]]", "csv: is for CSV files, this one is mdf4"),
+        ("[time]", 'bus = "can0"\n[time]', ":3: bus = 'can0': is for CAN logs, this one is mdf4"),
+        ("mdf4", "tdms", ":5: time.zone = '-03:00': tdms is in UTC; write"),
+        ("mdf4", "candump", "candump is in UTC"),
+        ("-03:00", "UTC", "channel: are those of the DBC file for"),
+        ('source = "file"', 'source = "start"', "time.start: is needed"),
+    ],
+)
+def test_a_wrong_mapping_of_another_format_is_refused_too(
+    tmp_path: Path, old: str, new: str, says: str
+) -> None:
+    text = MDF.replace("mdf4", "candump") if new == "UTC" else MDF
     assert says in refusal(tmp_path, text.replace(old, new, 1))
 
 

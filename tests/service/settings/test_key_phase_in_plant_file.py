@@ -59,72 +59,32 @@ def test_key_phase_and_vector_reach_the_numerics(text: str, tmp_path: Path) -> N
     assert machine.channels[0].unit_per_count == calibration.channels[0].unit_per_count != 0.0
 
 
+KEY = 'transducer = "key_phase"'
+CHANNEL_13, BEARING_X = "unit[1].channel[13].", 'id = "ujb_bearing_x"\n'
+ROLL = f"{CHANNEL_1}slow_roll."
+
+
 @pytest.mark.parametrize(
     ("old", "new", "key", "said"),
     [
-        ('key_phase = "kp"', 'key_phase = "kq"', "unit[1].key_phase = 'kq'", "there is kp"),
-        (
-            'key_phase = "kp"',
-            'key_phase = "ujb_bearing_x"',
-            "unit[1].key_phase = 'ujb_bearing_x'",
-            'transducer "key_phase"',
-        ),
-        (
-            'shaft_x = "ujb_shaft_x"',
-            'shaft_x = "kp"',
-            "unit[1].bearing[1].shaft_x = 'kp'",
-            "no vibration",
-        ),
-        (
-            'transducer = "key_phase"',
-            'transducer = "key_phase"\nsensitivity = 1.0',
-            "unit[1].channel[13].sensitivity = 1.0",
-            "leave it out",
-        ),
-        (
-            'transducer = "key_phase"',
-            'transducer = "key_phase"\nsensitivity_unit = "V/mm"',
-            "unit[1].channel[13].sensitivity_unit = 'V/mm'",
-            "leave it out",
-        ),
-        (
-            'transducer = "key_phase"',
-            f'transducer = "key_phase"\n{VECTOR}',
-            "unit[1].channel[13].slow_roll",
-            "leave it out",
-        ),
-        (
-            'id = "ujb_bearing_x"\n',
-            'id = "ujb_bearing_x"\nprobe = "SN9"\n',
-            "unit[1].channel[3].probe = 'SN9'",
-            "this is a velocity",
-        ),
-        ("um_pk = 8.0", "um_pk = -8.0", f"{CHANNEL_1}slow_roll.um_pk = -8.0", "equal to 0"),
-        ("um_pk = 8.0", "um_pk = nan", f"{CHANNEL_1}slow_roll.um_pk = nan", "finite"),
-        ("= 30.0", "= 400.0", f"{CHANNEL_1}slow_roll.phase_deg = 400.0", "360"),
-        ("= 8.0, taken", "= 0.0, taken", f"{CHANNEL_1}slow_roll.speed_rpm = 0.0", "than 0"),
-        (
-            "10:00:00Z",
-            "10:00:00",
-            f"{CHANNEL_1}slow_roll.taken = 2026-03-01T10:00:00",
-            "timezone",
-        ),
-        ("taken = 2026-03-01T10:00:00Z, ", "", f"{CHANNEL_1}slow_roll.taken is missing", "offset"),
-        (', probe = "SN123" }', " }", f"{CHANNEL_1}slow_roll.probe is missing", "Another one"),
-        (', probe = "SN123" }', ', probe = "" }', f"{CHANNEL_1}slow_roll.probe = ''", "1 char"),
+        ('e = "kp"', 'e = "kq"', "unit[1].key_phase = 'kq'", "there is kp"),
+        ('e = "kp"', 'e = "ujb_bearing_x"', "unit[1].key_phase = 'ujb_", 'transducer "key_phase"'),
+        ('_x = "ujb_shaft_x"', '_x = "kp"', "unit[1].bearing[1].shaft_x = 'kp'", "no vibration"),
+        (KEY, f"{KEY}\nsensitivity = 1.0", f"{CHANNEL_13}sensitivity = 1.0", "leave it out"),
+        (KEY, f'{KEY}\nsensitivity_unit = "V/mm"', f"{CHANNEL_13}sensitivity_unit", "leave it out"),
+        (KEY, f"{KEY}\n{VECTOR}", f"{CHANNEL_13}slow_roll", "leave it out"),
+        (BEARING_X, f'{BEARING_X}probe = "S"\n', "unit[1].channel[3].probe = 'S'", "is a velocity"),
+        ("um_pk = 8.0", "um_pk = -8.0", f"{ROLL}um_pk = -8.0", "equal to 0"),
+        ("um_pk = 8.0", "um_pk = nan", f"{ROLL}um_pk = nan", "finite"),
+        ("= 30.0", "= 400.0", f"{ROLL}phase_deg = 400.0", "360"),
+        ("= 8.0, taken", "= 0.0, taken", f"{ROLL}speed_rpm = 0.0", "than 0"),
+        ("10:00:00Z", "10:00:00", f"{ROLL}taken = 2026-03-01T10:00:00", "timezone"),
+        ("taken = 2026-03-01T10:00:00Z, ", "", f"{ROLL}taken is missing", "offset"),
+        (', probe = "SN123" }', " }", f"{ROLL}probe is missing", "Another one"),
+        (', probe = "SN123" }', ', probe = "" }', f"{ROLL}probe = ''", "1 char"),
         (SHAFT_X + 'probe = "SN123"\n', SHAFT_X, f"{CHANNEL_1}probe (by default)", "slow_roll"),
-        (
-            "sensitivity = 4.0\n",
-            "",
-            f"{CHANNEL_1}sensitivity (by default)",
-            "0.5 to 50 V/mm",
-        ),
-        (
-            'sensitivity_unit = "V/mm"\n',
-            "",
-            f"{CHANNEL_1}sensitivity_unit (by default)",
-            '"V/mm" or "mV/um"',
-        ),
+        ("sensitivity = 4.0\n", "", f"{CHANNEL_1}sensitivity (by default)", "0.5 to 50 V/mm"),
+        ('sensitivity_unit = "V/mm"\n', "", f"{CHANNEL_1}sensitivity_unit (by", '"V/mm" or "mV/'),
     ],
 )
 def test_a_wrong_key_phase_or_vector_is_refused_with_key_and_value(

@@ -15,6 +15,11 @@ CHANNEL_1 = "unit[1].channel[1]."
 UJB = "unit[1].bearing[1]."
 
 
+KIND, HOST = 'kind = "modbus_ring"', 'host = "127.0.0.1"\nport = 0'
+SLOW = f"{UNIT_1}slow_channel"
+SIMULATION = f"{UNIT_1}simulation."
+
+
 @pytest.mark.parametrize(
     ("old", "new", "key", "said"),
     [
@@ -34,85 +39,30 @@ UJB = "unit[1].bearing[1]."
         ("= 600.0", "= 2026-11-21", f"{UNIT_1}rate_hz = datetime.date(", "valid number"),
         ("port = 0", "port = 70000", f"{UNIT_1}source.port = 70000", "65535"),
         ("port = 0", "port = 502.5", f"{UNIT_1}source.port = 502.5", "integer"),
-        (
-            'host = "127.0.0.1"\nport = 0',
-            'host = "127.0.0.1"\ndevice = "/dev/ttyS0"',
-            f"{UNIT_1}source.host = '127.0.0.1'",
-            "host (Modbus TCP) or device (serial line) must be given, found both",
-        ),
-        (
-            'host = "127.0.0.1"\nport = 0',
-            'device_id = 250\ndevice = "/dev/ttyS0"',
-            f"{UNIT_1}source.device_id = 250",
-            "on a serial line must be 1 to 247",
-        ),
-        (
-            'kind = "modbus_ring"',
-            'kind = "opc"',
-            f"{UNIT_1}source.kind = 'opc'",
-            "must be 'modbus_ring' or 'modbus_fifo' or 'modbus_polled'",
-        ),
+        (HOST, f'{HOST[:18]}\ndevice = "x"', f"{UNIT_1}source.host = '127", "found both"),
+        (HOST, 'device_id = 250\ndevice = "x"', f"{UNIT_1}source.device_id = 250", "be 1 to 247"),
+        (KIND, 'kind = "opc"', f"{UNIT_1}source.kind = 'opc'", "must be 'modbus_ring' or 'modbus_"),
         ('id = "U1"', 'id = "U/1"', f"{UNIT_1}id = 'U/1'", "match"),
         ('id = "U2"', 'id = "U1"', "unit[2].id = 'U1'", "used twice"),
-        ('id = "LJB"', 'id = "UJB"', "unit[1].bearing[2].id = 'UJB'", "used twice"),
+        ('id = "LJB"', 'id = "UJB"', f"{UNIT_1}bearing[2].id = 'UJB'", "used twice"),
+        ('"ujb_shaft_y"', '"ujb_shaft_x"', f"{UNIT_1}channel[2].id = 'ujb_shaft_x'", "used twice"),
+        ('id = "active_power"', 'id = "speed"', f"{SLOW}[2].id = 'speed'", "used twice"),
+        ('id = "speed"', 'id = "ujb_shaft_x"', f"{SLOW}[1].id = 'ujb_shaft_x'", "waveform channel"),
+        ('_x = "ujb_shaft_x"', '_x = "z"', f"{UJB}shaft_x = 'z'", "there are ujb_shaft_x, ujb_"),
+        ('_x = "ujb_bearing_x"', '_x = "ujb_shaft_x"', f"{UJB}bearing_x = 'ujb_", "used twice"),
+        ('l = "speed"', 'l = "rpm"', f"{UNIT_1}speed_channel = 'rpm'", "there are speed, active_"),
         (
-            'id = "ujb_shaft_y"',
-            'id = "ujb_shaft_x"',
-            "unit[1].channel[2].id = 'ujb_shaft_x'",
-            "used twice",
-        ),
-        (
-            'id = "active_power"',
-            'id = "speed"',
-            "unit[1].slow_channel[2].id = 'speed'",
-            "used twice",
-        ),
-        (
-            'id = "speed"',
-            'id = "ujb_shaft_x"',
-            "unit[1].slow_channel[1].id = 'ujb_shaft_x'",
-            "waveform channel",
-        ),
-        (
-            'shaft_x = "ujb_shaft_x"',
-            'shaft_x = "ujb_shaft_z"',
-            f"{UJB}shaft_x = 'ujb_shaft_z'",
-            "there are ujb_shaft_x, ujb_shaft_y",
-        ),
-        (
-            'bearing_x = "ujb_bearing_x"',
-            'bearing_x = "ujb_shaft_x"',
-            f"{UJB}bearing_x = 'ujb_shaft_x'",
-            "used twice",
-        ),
-        (
-            'speed_channel = "speed"',
-            'speed_channel = "rpm"',
-            f"{UNIT_1}speed_channel = 'rpm'",
-            "there are speed, active_power",
-        ),
-        (
-            'oil_temperature = "ujb_oil_temperature"',
-            'oil_temperature = "speed"',
+            're = "ujb_oil_temperature"',
+            're = "speed"',
             f"{UJB}oil_temperature = 'speed'",
-            "needed is one in degC",
+            "in degC",
         ),
-        ("minimum = 0.0", "minimum = 200.0", "unit[1].slow_channel[1].minimum = 200.0", "maximum"),
+        ("minimum = 0.0", "minimum = 200.0", f"{SLOW}[1].minimum = 200.0", "maximum"),
         ('"127.0.0.1"', '"0.0.0.0"', "service.host = '0.0.0.0'", "[service.tls]"),
-        ("seed = 1\n", "seed = -1\n", "unit[1].simulation.seed = -1", "greater than or equal to 0"),
-        (
-            'bearing = "LJB"',
-            'bearing = "UJB"',
-            "unit[1].simulation.bearing[2].bearing = 'UJB'",
-            "used twice",
-        ),
+        ("seed = 1\n", "seed = -1\n", f"{SIMULATION}seed = -1", "greater than or equal to 0"),
+        ('g = "LJB"', 'g = "UJB"', f"{SIMULATION}bearing[2].bearing = 'UJB'", "used twice"),
         ('id = "UJB"', 'id = "GEN"', f"{UJB}id = 'GEN'", "UJB or LJB or TJB"),
-        (
-            "cutoff_hz = 20.0",
-            "cutoff_hz = 300.0",
-            "unit[1].simulation.hydraulic_cutoff_hz = 300.0",
-            "300 Hz",
-        ),
+        ("off_hz = 20.0", "off_hz = 300.0", f"{SIMULATION}hydraulic_cutoff_hz = 300.0", "300 Hz"),
     ],
 )
 def test_a_wrong_value_is_named_with_its_line_key_value_and_what_is_allowed(
