@@ -4,18 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import Result
-from typer.testing import CliRunner
-
-from service.cli.commands import app
+from rigs.command_line import padwatch
 
 HEADINGS = (
     "time,unit,bearing,direction,k_n_per_m,u_random,eccentricity_ratio,oil_temperature_c,quality"
 )
-
-
-def backtest(*arguments: object) -> Result:
-    return CliRunner().invoke(app, ["backtest", *map(str, arguments)])
 
 
 def rows(n: int, bearing: str = "UJB", cells: str = "1e9,0.01,0.3,40.5") -> list[str]:
@@ -35,15 +28,8 @@ def readings(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def plant_path(plant_text: str, tmp_path: Path) -> Path:
-    path = tmp_path / "plant.toml"
-    path.write_text(plant_text, encoding="utf-8")
-    return path
-
-
 def test_a_report_is_one_json_document(readings: Path) -> None:
-    result = backtest(readings, "--learn-days", 2, "--json")
+    result = padwatch("backtest", readings, "--learn-days", 2, "--json")
     assert result.exit_code == 0, result.stderr
     report = json.loads(result.stdout)
     assert report["rows"] == 2 * 576
@@ -66,26 +52,26 @@ def test_a_report_is_one_json_document(readings: Path) -> None:
 
 
 def test_people_get_tables(readings: Path) -> None:
-    result = backtest(readings)
+    result = padwatch("backtest", readings)
     assert result.exit_code == 0
     for words in ("Readings by verdict", "U1 UJB x", "too few readings to learn", "Alarms: 0"):
         assert words in result.stdout
 
 
 def test_every_row_counts_whatever_is_to_be_learned_first(readings: Path) -> None:
-    until = backtest(readings, "--learn-until", "2025-01-02T00:00:00Z", "--json")
+    until = padwatch("backtest", readings, "--learn-until", "2025-01-02T00:00:00Z", "--json")
     assert json.loads(until.stdout)["films"][1]["learning"] == 144
     event = ["--event", "U1/UJB 2025-01-03T00:00:00Z new pads", "--learn-days", 1]
-    film = json.loads(backtest(readings, *event, "--json").stdout)["films"][0]
+    film = json.loads(padwatch("backtest", readings, *event, "--json").stdout)["films"][0]
     assert [b["event"] for b in film["baselines"]] == ["", "new pads"]
     assert film["learning"] == 2 * 144
 
 
 def test_units_are_those_of_the_plant_file(readings: Path, plant_path: Path) -> None:
-    assert backtest(readings, "--plant", plant_path).exit_code == 0
+    assert padwatch("backtest", readings, "--plant", plant_path).exit_code == 0
     text = readings.read_text(encoding="utf-8").replace(",U1,UJB,y", ",U7,UJB,y", 1)
     readings.write_text(text, encoding="utf-8")
-    result = backtest(readings, "--plant", plant_path)
+    result = padwatch("backtest", readings, "--plant", plant_path)
     assert result.exit_code == 1
     assert result.stderr == f"padwatch backtest: {readings}: line 3: unknown unit 'U7'\n"
 
@@ -95,15 +81,15 @@ def test_settings_are_tried_and_wrong_ones_refused_with_their_line(
 ) -> None:
     settings = tmp_path / "settings.toml"
     settings.write_text("reading_period_s = 3600.0\nlearning_days = 1.0\n", encoding="utf-8")
-    report = json.loads(backtest(readings, "--settings", settings, "--json").stdout)
+    report = json.loads(padwatch("backtest", readings, "--settings", settings, "--json").stdout)
     assert report["films"][0]["learning"] == 144
     assert any("are 10 min apart" in doubt for doubt in report["doubts"])
     settings.write_text("[change]\nalert_change = 0.2\ndanger_change = 0.1\n", encoding="utf-8")
-    result = backtest(readings, "--settings", settings)
+    result = padwatch("backtest", readings, "--settings", settings)
     assert result.exit_code == 2
     assert f"{settings}:3: change.danger_change = 0.1: must be above alert_change" in result.stderr
     settings.write_text("[change]\nalert = 0.2\n", encoding="utf-8")
-    assert backtest(readings, "--settings", settings).exit_code == 2
+    assert padwatch("backtest", readings, "--settings", settings).exit_code == 2
 
 
 @pytest.mark.parametrize(
@@ -119,7 +105,7 @@ def test_settings_are_tried_and_wrong_ones_refused_with_their_line(
 def test_wrong_options_are_refused(
     readings: Path, options: list[str], code: int, says: str
 ) -> None:
-    result = backtest(readings, *options)
+    result = padwatch("backtest", readings, *options)
     assert (result.exit_code, result.stdout) == (code, "")
     assert says in result.stderr
 
@@ -129,7 +115,7 @@ def test_states_are_neither_guessed_nor_needed_where_speed_and_power_tell(
 ) -> None:
     lines = [HEADINGS, *rows(20)]
     readings.write_text("\n".join(lines), encoding="utf-8")
-    result = backtest(readings)
+    result = padwatch("backtest", readings)
     assert result.exit_code == 1
     assert "unit U1: operating states are not known: give a column state" in result.stderr
     lines = [HEADINGS + ",speed_rpm,power_mw", *(line + ",92.3,500" for line in rows(20))]
@@ -139,11 +125,11 @@ def test_states_are_neither_guessed_nor_needed_where_speed_and_power_tell(
             "rated_speed_rpm", "rated_power_mw = 700.0\nrated_speed_rpm", 1
         )
         plant_path.write_text(plant_text, encoding="utf-8")
-    assert backtest(readings, "--plant", plant_path).exit_code == 0
+    assert padwatch("backtest", readings, "--plant", plant_path).exit_code == 0
 
 
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
-    result = backtest(tmp_path / "none.csv")
+    result = padwatch("backtest", tmp_path / "none.csv")
     assert result.exit_code == 1
     assert (
         result.stderr == f"padwatch backtest: {tmp_path / 'none.csv'}: No such file or directory\n"

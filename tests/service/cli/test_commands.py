@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rigs.command_line import padwatch, padwatch_program
 
 Changed = Callable[[str, str], tuple[str, int]]
-Padwatch = Callable[..., Any]
 
 
 @pytest.mark.parametrize("command", [("run",), ("config", "check"), ("daq",)], ids=" ".join)
 def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistake(
-    padwatch: Padwatch, changed: Changed, tmp_path: Path, command: tuple[str, ...]
+    changed: Changed, tmp_path: Path, command: tuple[str, ...]
 ) -> None:
     text, line = changed("bracket_stiffness_n_per_m = 1.18e9", "bracket_stiffness_n_per_m = 1.18")
     path = tmp_path / "plant.toml"
@@ -31,18 +31,14 @@ def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistak
     assert result.stderr.count("\n") == 1
 
 
-def test_a_plant_file_that_is_not_there_ends_with_2_in_one_line(
-    padwatch: Padwatch, tmp_path: Path
-) -> None:
+def test_a_plant_file_that_is_not_there_ends_with_2_in_one_line(tmp_path: Path) -> None:
     result = padwatch("run", tmp_path / "absent.toml")
 
     assert result.exit_code == 2
     assert result.stderr == f"{tmp_path / 'absent.toml'}: No such file or directory\n"
 
 
-def test_a_port_in_use_is_one_line_and_exit_1(
-    padwatch: Padwatch, plant_path: Path, tmp_path: Path
-) -> None:
+def test_a_port_in_use_is_one_line_and_exit_1(plant_path: Path, tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
 
@@ -57,7 +53,7 @@ def test_a_port_in_use_is_one_line_and_exit_1(
 
 
 def test_a_database_of_another_program_is_one_line_and_exit_1(
-    padwatch_program: Padwatch, plant_path: Path, tmp_path: Path
+    plant_path: Path, tmp_path: Path
 ) -> None:
     plant_path.write_text(plant_path.read_text().replace("port = 0", "port = 502"))
     database = tmp_path / "data" / "padwatch.sqlite3"
@@ -69,9 +65,7 @@ def test_a_database_of_another_program_is_one_line_and_exit_1(
     assert result == (1, "", f"padwatch: {database}: file is not a database\n")
 
 
-def test_the_example_is_a_plant_file_that_passes_the_check(
-    padwatch: Padwatch, padwatch_program: Padwatch, tmp_path: Path
-) -> None:
+def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path: Path) -> None:
     path = tmp_path / "plant.toml"
     path.write_text(padwatch("config", "example").stdout, encoding="utf-8")
 
@@ -81,7 +75,7 @@ def test_the_example_is_a_plant_file_that_passes_the_check(
     assert json.loads(result.stdout)["units"] >= 1
 
 
-def test_the_schema_says_what_every_key_means(padwatch: Padwatch) -> None:
+def test_the_schema_says_what_every_key_means() -> None:
     schema = json.loads(padwatch("config", "schema").stdout)
 
     assert schema["type"] == "object"
@@ -97,7 +91,7 @@ def test_the_schema_says_what_every_key_means(padwatch: Padwatch) -> None:
         assert reference in schema["$defs"]
 
 
-def test_help_names_every_command(padwatch: Padwatch) -> None:
+def test_help_names_every_command() -> None:
     result = padwatch("--help")
 
     assert result.exit_code == 0
@@ -105,7 +99,7 @@ def test_help_names_every_command(padwatch: Padwatch) -> None:
         assert re.search(rf"\b{command}\b", result.stdout)
 
 
-def test_a_command_that_does_not_exist_ends_with_2(padwatch: Padwatch) -> None:
+def test_a_command_that_does_not_exist_ends_with_2() -> None:
     assert padwatch("runn").exit_code == 2
 
 

@@ -2,13 +2,12 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-Padwatch = Callable[..., Any]
+from rigs.command_line import padwatch, padwatch_program
 
 RECEIVER = """
 [[delivery.receiver]]
@@ -38,9 +37,7 @@ async def desk(plant_path: Path) -> AsyncIterator[dict[str, Any]]:
     await server.wait_closed()
 
 
-async def test_a_test_message_arrives_and_says_that_it_is_one(
-    padwatch_program: Padwatch, desk: dict[str, Any]
-) -> None:
+async def test_a_test_message_arrives_and_says_that_it_is_one(desk: dict[str, Any]) -> None:
     done = await asyncio.to_thread(padwatch_program, "delivery", "test", desk["plant"], "desk")
 
     assert done == (0, "desk: delivered: 200\n", "")
@@ -52,7 +49,7 @@ async def test_a_test_message_arrives_and_says_that_it_is_one(
     ("answer", "outcome"), [("401 No", "refused"), ("503 Away", "not delivered")]
 )
 async def test_a_test_message_that_is_not_taken_says_why(
-    padwatch: Padwatch, answer: str, outcome: str, desk: dict[str, Any]
+    answer: str, outcome: str, desk: dict[str, Any]
 ) -> None:
     desk["answer"] = answer
     command = ("delivery", "test", desk["plant"], "desk", "--json")
@@ -71,7 +68,7 @@ async def test_a_test_message_that_is_not_taken_says_why(
     ],
 )
 async def test_what_needs_a_receiver_or_a_database_is_refused_without(
-    padwatch: Padwatch, desk: dict[str, Any], command: str, receiver: str, code: int, said: str
+    desk: dict[str, Any], command: str, receiver: str, code: int, said: str
 ) -> None:
     done = await asyncio.to_thread(padwatch, "delivery", command, desk["plant"], receiver)
 

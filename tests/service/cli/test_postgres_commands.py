@@ -4,24 +4,20 @@ from pathlib import Path
 
 import pytest
 from harness.places import PostgresPlace
-from typer.testing import CliRunner
-
-from service.cli.commands import app
+from rigs.command_line import padwatch
 
 
 @pytest.fixture
-def plant_path(postgres_place: PostgresPlace, plant_text: str, tmp_path: Path) -> Path:
+def plant_path(plant_path: Path, postgres_place: PostgresPlace) -> Path:
     """A plant file that names the database; its data folder is empty."""
-    path = tmp_path / "plant.toml"
-    text = plant_text.replace('data_folder = "var/demo"', f'data_folder = "{tmp_path / "data"}"')
-    address = postgres_place.address.conninfo
-    path.write_text(f'{text}\n[store]\npostgresql = "{address}"\n', encoding="utf-8")
-    return path
+    text, address = plant_path.read_text(), postgres_place.address.conninfo
+    plant_path.write_text(f'{text}\n[store]\npostgresql = "{address}"\n')
+    return plant_path
 
 
 def run(*arguments: object, exit_code: int = 0) -> str:
     """Run a command; what it says."""
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    done = padwatch(*arguments)
     assert done.exit_code == exit_code, done.output
     return done.output
 

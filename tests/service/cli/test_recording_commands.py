@@ -6,9 +6,9 @@ import signal
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
+from rigs.command_line import padwatch, padwatch_program
 
 from acquisition.calibration import calibrate
 from acquisition.clock import SystemClock
@@ -23,8 +23,6 @@ from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of
 from service.wiring.simulations import simulated_feed as feed_of
-
-Padwatch = Callable[..., Any]
 
 SMALL = "[analysis]\nsegment_samples = 4096\nn_segments = 4\n\n[service]"
 
@@ -55,9 +53,7 @@ def recording(plant: PlantFile, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def test_a_recorded_unit_can_be_read_back(
-    padwatch: Padwatch, padwatch_program: Padwatch, plant_path: Path, tmp_path: Path
-) -> None:
+def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     command = ("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)
     result = padwatch_program(*command)
@@ -114,9 +110,7 @@ async def test_a_lost_link_ends_a_recording_and_keeps_it(plant: PlantFile, tmp_p
     assert recording_of(tmp_path / "run").manifest.n_samples == 180
 
 
-def test_no_source_leaves_no_recording(
-    padwatch: Padwatch, plant_path: Path, tmp_path: Path
-) -> None:
+def test_no_source_leaves_no_recording(plant_path: Path, tmp_path: Path) -> None:
     text = plant_path.read_text().replace(
         'kind = "simulated"', 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = 1'
     )
@@ -128,9 +122,7 @@ def test_no_source_leaves_no_recording(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plant.toml"]
 
 
-def test_a_unit_has_to_be_chosen_and_to_exist(
-    padwatch: Padwatch, plant_path: Path, tmp_path: Path
-) -> None:
+def test_a_unit_has_to_be_chosen_and_to_exist(plant_path: Path, tmp_path: Path) -> None:
     result = padwatch("record", plant_path, "--out", tmp_path / "run")
     assert (result.exit_code, result.stderr) == (
         2,
@@ -144,7 +136,7 @@ def test_a_unit_has_to_be_chosen_and_to_exist(
 
 
 async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_digit(
-    padwatch: Padwatch, plant: PlantFile, plant_path: Path, recording: Path
+    plant: PlantFile, plant_path: Path, recording: Path
 ) -> None:
     command = ("reanalyse", recording, "--plant", plant_path, "--json")
     result = await asyncio.to_thread(padwatch, *command)
@@ -164,9 +156,7 @@ async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_d
     assert json.loads(last.stdout) == expected[-3:]
 
 
-def test_people_get_a_table_for_each_bearing(
-    padwatch: Padwatch, plant_path: Path, recording: Path
-) -> None:
+def test_people_get_a_table_for_each_bearing(plant_path: Path, recording: Path) -> None:
     result = padwatch("reanalyse", recording, "--plant", plant_path)
     assert (result.exit_code, result.stderr) == (0, "")
     for bearing in ("UJB", "LJB", "TJB"):
@@ -176,7 +166,7 @@ def test_people_get_a_table_for_each_bearing(
 
 
 def test_another_calibration_is_told_and_used_only_when_asked_for(
-    padwatch: Padwatch, plant_path: Path, recording: Path
+    plant_path: Path, recording: Path
 ) -> None:
     text = plant_path.read_text()
     plant_path.write_text(text.replace("sensitivity = 4.0", "sensitivity = 3.9", 1))
@@ -207,7 +197,7 @@ def test_another_calibration_is_told_and_used_only_when_asked_for(
     ],
 )
 def test_a_recording_of_something_else_is_refused_naming_both(
-    padwatch: Padwatch, plant_path: Path, recording: Path, old: str, new: str, words: str
+    plant_path: Path, recording: Path, old: str, new: str, words: str
 ) -> None:
     text = plant_path.read_text()
     plant_path.write_text(text.replace(old, new))
@@ -217,9 +207,7 @@ def test_a_recording_of_something_else_is_refused_naming_both(
     assert result.stderr.count("\n") == 1
 
 
-def test_a_damaged_recording_is_one_line_and_exit_1(
-    padwatch: Padwatch, plant_path: Path, recording: Path
-) -> None:
+def test_a_damaged_recording_is_one_line_and_exit_1(plant_path: Path, recording: Path) -> None:
     (recording / "samples.parquet").write_bytes(b"PAR1")
     result = padwatch("reanalyse", recording, "--plant", plant_path)
     assert (result.exit_code, result.stdout) == (1, ""), result.stderr
@@ -227,7 +215,7 @@ def test_a_damaged_recording_is_one_line_and_exit_1(
 
 
 def test_a_recording_too_short_for_a_segment_says_so(
-    padwatch: Padwatch, plant: PlantFile, plant_path: Path, tmp_path: Path
+    plant: PlantFile, plant_path: Path, tmp_path: Path
 ) -> None:
     with recording_writer(plant.unit[0], tmp_path / "short", "a test") as writer:
         writer.write(feed_of(plant.unit[0], SystemClock()).advance(4095))

@@ -6,21 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-Padwatch = Callable[..., Any]
+from rigs.command_line import padwatch, padwatch_program
 
 OPTIONS = {"unit": "U1", "bearing": "UJB", "author": "A. Name", "x-um": 1998.5, "y-um": 2003.1}
 
 
-def set_reference(run: Padwatch, plant: Path, *flags: str, **changes: Any) -> Any:
+def set_reference(run: Callable[..., Any], plant: Path, *flags: str, **changes: Any) -> Any:
     named = {name.replace("_", "-"): value for name, value in changes.items()}
     options = [f"--{name}={v}" for name, v in (OPTIONS | named).items() if v is not None]
     return run("reference", "set", plant, *options, *flags)
 
 
-def test_what_was_set_is_listed_with_time_author_and_what_was_before(
-    padwatch: Padwatch, padwatch_program: Padwatch, plant_path: Path
-) -> None:
+def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path: Path) -> None:
     first = set_reference(padwatch_program, plant_path)
     second = set_reference(
         padwatch, plant_path, "--json", x_um=1990.25, author=" B. Name ", note="after the overhaul"
@@ -67,7 +64,7 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(
     ids=lambda value: None if isinstance(value, str) else "-".join(value),
 )
 def test_a_wrong_reference_is_one_line_with_value_and_limit_and_leaves_nothing_behind(
-    padwatch: Padwatch, plant_path: Path, changes: dict[str, Any], said: str
+    plant_path: Path, changes: dict[str, Any], said: str
 ) -> None:
     result = set_reference(padwatch, plant_path, **changes)
 
@@ -78,23 +75,21 @@ def test_a_wrong_reference_is_one_line_with_value_and_limit_and_leaves_nothing_b
     assert not (plant_path.parent / "data").exists()
 
 
-def test_a_measured_reference_without_results_is_refused(
-    padwatch: Padwatch, plant_path: Path
-) -> None:
+def test_a_measured_reference_without_results_is_refused(plant_path: Path) -> None:
     result = set_reference(padwatch, plant_path, "--measured", x_um=None, y_um=None)
 
     assert result.exit_code == 2
     assert result.stderr.endswith("there is no stored result yet whose gaps could be taken\n")
 
 
-def test_gaps_are_given_or_measured_but_not_both(padwatch: Padwatch, plant_path: Path) -> None:
+def test_gaps_are_given_or_measured_but_not_both(plant_path: Path) -> None:
     result = set_reference(padwatch, plant_path, "--measured")
 
     assert result.exit_code == 2
     assert result.stderr == "padwatch reference set: give gaps or --measured, not both\n"
 
 
-def test_looking_at_references_creates_no_database(padwatch: Padwatch, plant_path: Path) -> None:
+def test_looking_at_references_creates_no_database(plant_path: Path) -> None:
     result = padwatch("reference", "list", plant_path)
 
     assert result.exit_code == 0
@@ -104,7 +99,7 @@ def test_looking_at_references_creates_no_database(padwatch: Padwatch, plant_pat
 
 @pytest.mark.parametrize("command", ["set", "list"])
 def test_a_database_that_cannot_be_used_is_one_line_and_exit_1(
-    padwatch: Padwatch, plant_path: Path, command: str
+    plant_path: Path, command: str
 ) -> None:
     folder = plant_path.parent / "data"
     folder.mkdir()

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from rigs.command_line import padwatch
 
 from core.assessment import Assessment
-from service.cli.commands import app
 from service.store.highwater.comparison import MAX_BEHIND
 from service.store.sqlite import SqliteStore, checking
 
@@ -20,13 +19,11 @@ T0 = 1_767_225_600_000_000_000
 
 
 @pytest.fixture
-def plant(tmp_path: Path, plant_text: str, assessment: Build) -> Path:
+def plant(plant_path: Path, tmp_path: Path, assessment: Build) -> Path:
     """A plant file, with some results in its data folder."""
-    path = tmp_path / "plant.toml"
-    path.write_text(plant_text.replace('"var/demo"', f'"{tmp_path / "data"}"'))
     with closing(SqliteStore(tmp_path / "data" / "padwatch.sqlite3")) as store:
         store.append([assessment(T0 + n, speed_rpm=float(n)) for n in range(5)], [])
-    return path
+    return plant_path
 
 
 def damage(plant: Path, statement: str) -> None:
@@ -35,7 +32,7 @@ def damage(plant: Path, statement: str) -> None:
 
 
 def test_a_database_that_is_whole_is_said_to_be(plant: Path) -> None:
-    result = CliRunner().invoke(app, ["store", "check", str(plant)])
+    result = padwatch("store", "check", plant)
 
     assert result.exit_code == 0, result.output
     assert result.stdout.endswith("padwatch.sqlite3: whole\n")
@@ -45,7 +42,7 @@ def test_altered_and_missing_rows_are_named(plant: Path) -> None:
     damage(plant, f"UPDATE assessment SET coverage = 0.5 WHERE time_ns = {T0 + 1}")  # noqa: S608
     damage(plant, f"DELETE FROM assessment WHERE time_ns = {T0 + 3}")  # noqa: S608
 
-    result = CliRunner().invoke(app, ["store", "check", str(plant), "--json"])
+    result = padwatch("store", "check", plant, "--json")
 
     assert result.exit_code == 1
     found = json.loads(result.stdout)
@@ -59,7 +56,7 @@ def test_altered_and_missing_rows_are_named(plant: Path) -> None:
 def test_a_database_that_was_rolled_back_is_told(plant: Path) -> None:
     damage(plant, "UPDATE high_water SET n_commits = 1")
 
-    result = CliRunner().invoke(app, ["store", "check", str(plant)])
+    result = padwatch("store", "check", plant)
 
     assert result.exit_code == 1
     assert "high_water: the database was rolled back" in result.stdout
@@ -78,7 +75,7 @@ def test_a_service_that_writes_meanwhile_is_no_fault(
             look_at_rows(*args)
 
         monkeypatch.setattr(checking, "_look_at_rows", slowly)
-        result = CliRunner().invoke(app, ["store", "check", str(plant)])
+        result = padwatch("store", "check", plant)
 
     assert result.exit_code == 0, result.output
 
@@ -86,7 +83,7 @@ def test_a_service_that_writes_meanwhile_is_no_fault(
 def test_a_plant_without_a_database_is_told(plant: Path) -> None:
     (plant.parent / "data" / "padwatch.sqlite3").unlink()
 
-    result = CliRunner().invoke(app, ["store", "check", str(plant)])
+    result = padwatch("store", "check", plant)
 
     assert result.exit_code == 1
     assert "there is no database" in result.stderr

@@ -1,0 +1,38 @@
+"""The command line, in the test's own process and as a program of its own."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from typer.testing import CliRunner, Result
+
+from service.cli.commands import app
+
+ROOT = Path(__file__).parents[3]
+
+
+class Ended(NamedTuple):
+    """A program that has ended; fields as in `Result`."""
+
+    exit_code: int
+    stdout: str
+    stderr: str
+
+
+def padwatch(*arguments: object) -> Result:
+    """Run a command in this process, which must not serve: a service ends its process."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def padwatch_program(*arguments: object, cwd: Path | None = None) -> Ended:
+    """Run a command as a program, which takes two seconds of processor time."""
+    done = subprocess.run(
+        [sys.executable, "-m", "service.cli.main", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": str(ROOT), "PATH": ""},
+        cwd=cwd,
+        check=False,
+    )
+    return Ended(done.returncode, done.stdout, done.stderr)
