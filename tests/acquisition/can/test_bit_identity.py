@@ -4,6 +4,7 @@ import hashlib
 import itertools
 
 import pytest
+from rigs.tiers import covering, fast_and_long
 
 from acquisition.clock import SystemClock
 from acquisition.daq.can_bus import CanBusServer
@@ -41,7 +42,7 @@ def straight(feed, calibration, n_samples: int = 50) -> list:
         return blocks
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", fast_and_long(1, 2))
 @pytest.mark.parametrize("floats", [False, True], ids=["counts", "floats"])
 @pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
 async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
@@ -60,8 +61,7 @@ async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
     assert source.refused_frames == {}
 
 
-@pytest.mark.parametrize("n_samples", [1, 3, 48, 51])
-@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+@pytest.mark.parametrize(("n_samples", "fd"), covering([1, 3, 48, 51], [False, True]))
 async def test_blocks_of_any_length_come_through(
     fd, n_samples, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
 ):

@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from rigs.tiers import covering
 
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
@@ -74,10 +75,11 @@ def summary(blocks):
     return [(epoch, first, stop, rejected) for epoch, stop, first, rejected in joined]
 
 
-@pytest.mark.parametrize("counts", ["samples", "frames"])
-@pytest.mark.parametrize("n", [1, 2])
-@pytest.mark.parametrize("n_bits", WIDTHS)
-def test_a_counter_that_wraps_goes_on(n_bits, n, counts, plant):
+@pytest.mark.parametrize(
+    ("n_bits", "counted"), covering(WIDTHS, [(1, "samples"), (2, "samples"), (2, "frames")])
+)
+def test_a_counter_that_wraps_goes_on(n_bits, counted, plant):
+    n, counts = counted
     plant = plant(n_bits, n=n, counts=counts)
     start = max(0, (1 << n_bits) * (n if counts == "frames" else 1) - 300)
     blocks = []
@@ -102,14 +104,14 @@ def test_every_gap_that_a_counter_can_tell_is_exact(n_bits, plant):
     plant = plant(n_bits)
     longest = min((1 << n_bits) // 2 - 1, 3000)
     blocks, index = plant.take(range(3), 0.0), 3
-    for _ in range(1000):
+    for _ in range(300):
         index += int(random.integers(0, longest + 1))
         blocks += plant.take(range(index, index + 3), index / RATE_HZ)
         index += 3
     assert {block.epoch for block in blocks} == {0}
     assert all(block.rejected == () for block in blocks)
     assert blocks[-1].stop_index == index
-    assert sum(block.n_samples for block in blocks) == 3003
+    assert sum(block.n_samples for block in blocks) == 903
     assert_in_place(blocks)
 
 

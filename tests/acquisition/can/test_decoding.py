@@ -45,7 +45,7 @@ def random_message(random: np.random.Generator, number: int) -> str:
 
 def test_any_signal_in_any_place_is_read_as_cantools_reads_it(tmp_path):
     random = np.random.default_rng(20261121)
-    texts = [random_message(random, n) for n in range(150)]
+    texts = [random_message(random, n) for n in range(80)]
     tails = "".join(part for text in texts for part in text.split("\0")[1:])
     dbc = tmp_path / "random.dbc"
     dbc.write_text('VERSION ""\nBU_: N\n' + "".join(t.split("\0")[0] for t in texts) + tails)
@@ -66,8 +66,8 @@ def test_any_signal_in_any_place_is_read_as_cantools_reads_it(tmp_path):
                 np.testing.assert_equal(scalar_reader(signal)(data), expected[signal.name])
         n_aligned += sum(byte_offset(s) is not None for s in signals)
         n_other += sum(byte_offset(s) is None for s in signals)
-    assert n_aligned > 200
-    assert n_other > 100
+    assert n_aligned > 100
+    assert n_other > 50
 
 
 @pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rigs.tiers import covering
 
 from acquisition.calibration import calibrate
 from acquisition.can.assembly import Assembler
@@ -19,8 +20,7 @@ LINK = CanLinkSettings(interface="virtual", channel="none")
 LETTERS = list(b"tTrRdDbBse0123456789ABCDEFabcdefzZVvNF gx-+_")
 
 
-@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
-@pytest.mark.parametrize("share", [0.02, 0.3, 1.0])
+@pytest.mark.parametrize(("share", "fd"), covering([0.02, 0.3, 1.0], [False, True]))
 def test_random_frames_of_a_mad_device_never_break_the_account(
     share, fd, shape_of, counts_calibration, counting_feed
 ):
@@ -33,7 +33,7 @@ def test_random_frames_of_a_mad_device_never_break_the_account(
     encoder, feed = FrameEncoder(shape), counting_feed(n_channels=12)
     ring = Ring(12, 6000)
     arrived_ns = START_NS
-    for _ in range(300):
+    for _ in range(150):
         frames = []
         for frame in encoder.frames(feed.advance(50)):
             mad = random.random() < share
@@ -48,7 +48,7 @@ def test_random_frames_of_a_mad_device_never_break_the_account(
 def test_a_random_line_is_a_frame_only_if_it_is_written_just_so():
     random = np.random.default_rng(20261121)
     n_frames = n_refused = 0
-    for _ in range(30_000):
+    for _ in range(8_000):
         length = int(random.integers(0, 30))
         line = bytes(random.choice(LETTERS, length).tolist())
         if random.random() < 0.5:
@@ -77,5 +77,5 @@ def test_a_random_line_is_a_frame_only_if_it_is_written_just_so():
             again, found = again[:-1], found[:-1]  # a request says how much it asks for
         assert again[1:] == found[1:].upper()
         assert again[0] == {"d": "b", "D": "B"}.get(found[0], found[0])
-    assert n_frames > 5000
-    assert n_refused > 5000
+    assert n_frames > 1300
+    assert n_refused > 1300

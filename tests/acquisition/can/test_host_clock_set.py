@@ -4,6 +4,7 @@ import asyncio
 
 import can
 import pytest
+from rigs.tiers import covering
 
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
@@ -28,7 +29,7 @@ class SetClock:
         return self.steady_s
 
 
-@pytest.fixture(params=[0, 8, 16, 32], ids=lambda n_bits: f"counter of {n_bits} bits")
+@pytest.fixture
 def plant(request, tmp_path, counts_calibration, fake_bus):
     """A message with or without a counter, and a sample that is its own number."""
     dbc, clock, n_bits = tmp_path / "device.dbc", SetClock(), request.param
@@ -51,7 +52,11 @@ def frame(number: int, n_bits: int) -> can.Message:
     return can.Message(arbitration_id=256, is_extended_id=False, data=data)
 
 
-@pytest.mark.parametrize("step_s", [7200.0, 1.5, -1.5, -3600.0, -HOST_NS / 1e9])
+@pytest.mark.parametrize(
+    ("step_s", "plant"),
+    covering([7200.0, 1.5, -1.5, -3600.0, -HOST_NS / 1e9], [16, 0, 32, 8]),
+    indirect=["plant"],
+)
 async def test_a_host_clock_that_is_set_makes_no_gap_and_no_restart(plant, fake_bus, step_s):
     source, clock, n_bits = plant
     blocks, number = [], 0

@@ -6,13 +6,13 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from rigs.tiers import covering, fast_and_long
 
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.errors import LinkError
 
 N_EACH = 200
-N_LOSSES = 10_000
 N_CHANNELS = 4
 LINE_FAULTS = ["non_hex_line", "long_line", "truncated_line"]
 LOSING = {
@@ -58,9 +58,10 @@ class Watch:
             self.stop = block.stop_index
 
 
-@pytest.fixture(params=[False, True], ids=["classic", "fd"])
+@pytest.fixture(params=["classic", pytest.param("fd", marks=pytest.mark.long)])
 def shape(request, shape_of):
-    return shape_of(n_channels=12 if request.param else N_CHANNELS, fd=request.param)
+    fd = request.param == "fd"
+    return shape_of(n_channels=12 if fd else N_CHANNELS, fd=fd)
 
 
 @pytest.fixture
@@ -68,7 +69,11 @@ def device(shape, counting_feed):
     return CanDevice(counting_feed(n_channels=len(shape.channels)), shape)
 
 
-@pytest.mark.parametrize("fault", sorted({*COUNTED_AS, "drop", "flood"}))
+@pytest.mark.parametrize(
+    ("fault", "shape"),
+    covering(sorted({*COUNTED_AS, "drop", "flood"}), ["classic", "fd"]),
+    indirect=["shape"],
+)
 async def test_two_hundred_of_each_fault_and_no_false_sample(fault, shape, device, source_of):
     async with SlcanTcpServer(device) as server:
         source = source_of(shape, server.endpoint, when_full="wait")
@@ -99,7 +104,9 @@ async def test_two_hundred_of_each_fault_and_no_false_sample(fault, shape, devic
         assert lost == Counter()
 
 
-async def test_ten_thousand_seeded_losses_over_the_wire_are_exact(shape, device, source_of):
+@pytest.mark.parametrize("most_losses", fast_and_long(1000, 10_000))
+@pytest.mark.parametrize("shape", ["classic", "fd"], indirect=True)
+async def test_seeded_losses_over_the_wire_are_exact(most_losses, shape, device, source_of):
     random = np.random.default_rng(20261121)
     n_losses, n_expected = 0, 0
     n_waves = len(shape.waves)
@@ -108,7 +115,7 @@ async def test_ten_thousand_seeded_losses_over_the_wire_are_exact(shape, device,
         async with source.connect() as stream:
             watch = Watch(stream)
             await watch.up_to(50)
-            while n_losses < N_LOSSES:
+            while n_losses < most_losses:
                 for _ in range(20):
                     n_instants = int(random.integers(0, 50 // shape.samples_per_frame))
                     server.inject("drop", n_instants * n_waves)

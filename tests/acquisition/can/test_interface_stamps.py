@@ -105,10 +105,10 @@ async def test_a_busy_host_neither_hides_nor_makes_losses_where_the_interface_st
         closing.callback(adapter.close)
         async with source_by("interface", channel).connect() as stream:
             blocks = []
-            for _ in range(200):
+            for _ in range(80):
                 adapter.send(late_s=float(random.uniform(0.003, 0.050)))
                 blocks += await taken(stream, adapter.n_samples)
-    assert blocks[-1].stop_index == 200 * BLOCK
+    assert blocks[-1].stop_index == 80 * BLOCK
     assert [r for b in blocks for r in b.rejected] == []
     assert {b.stamp_fault for b in blocks} == {None}
     assert blocks[-1].clock.n_faults == 0

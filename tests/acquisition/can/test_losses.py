@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.tiers import fast_and_long
 
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
@@ -97,10 +98,11 @@ def assembler_of(counts_calibration):
     return build
 
 
+@pytest.mark.parametrize("n_losses", fast_and_long(500, 3000))
 @pytest.mark.parametrize("n_channels", [2, 4, 12])
 @pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
 def test_thousands_of_losses_are_counted_exactly(
-    fd, n_channels, shape_of, assembler_of, counting_feed
+    fd, n_channels, n_losses, shape_of, assembler_of, counting_feed
 ):
     shape = shape_of(n_channels=n_channels, fd=fd)
     feed = counting_feed(n_channels=n_channels)
@@ -108,7 +110,7 @@ def test_thousands_of_losses_are_counted_exactly(
     assembler = assembler_of(shape)
     random = np.random.default_rng(1)
     blocks, batch, arrived_ns = [], bus.block(0.0), START_NS
-    while bus.n_losses < 3000:
+    while bus.n_losses < n_losses:
         batch += bus.block(float(random.choice([0.0, 0.05, 0.5])))
         arrived_ns += 83_333_333
         cut = int(random.integers(0, len(batch)))

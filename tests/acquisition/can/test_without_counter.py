@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.tiers import covering
 
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
@@ -107,23 +108,27 @@ def test_frames_are_counted(assembler):
     assert_true_samples(blocks)
 
 
-@pytest.mark.parametrize("n_lost", [1, 2, 7, 100, 600, 5000])
+@pytest.mark.parametrize("n_lost", [1, 7, 600, 5000])
 def test_a_loss_is_found_by_the_clock_flagged_and_counted(n_lost, assembler):
     blocks = run(assembler, 0, 1200)
-    blocks += run(assembler, 1200 + n_lost, 6000 + n_lost)
+    blocks += run(assembler, 1200 + n_lost, 3600 + n_lost)
     assert_true_samples(blocks)
     assert_never_joined_over_a_loss(blocks)
     rejected = [r for b in blocks for r in b.rejected]
     assert {r.reason for r in rejected} == {"uncounted_loss"}
-    assert blocks[-1].stop_index == 6000 + n_lost
+    assert blocks[-1].stop_index == 3600 + n_lost
     n_stored = sum(b.n_samples for b in blocks)
-    assert n_stored + sum(r.n_samples for r in rejected) == 6000 + n_lost
-    assert len(blocks) > 600
+    assert n_stored + sum(r.n_samples for r in rejected) == 3600 + n_lost
+    assert len(blocks) > 400
 
 
 def at_rate(settings, counts_calibration, rate_hz: float) -> Assembler:
     calibration = replace(counts_calibration(n_channels=12, n_slow=1), rate_hz=rate_hz)
     return Assembler(compile_plan(settings, calibration), 12, 1, rate_hz, settings.hold_s)
+
+
+def nothing_at_all(_number: int):
+    return []
 
 
 def two_sets_that_lose_one(number: int):
@@ -132,8 +137,12 @@ def two_sets_that_lose_one(number: int):
     return [*first[:2], *second[2:]]
 
 
-@pytest.mark.parametrize("what_is_left", [lambda _: [], two_sets_that_lose_one])
-@pytest.mark.parametrize("rate_hz", [100.0, 500.0, 600.0, 625.0, 1000.0, 1250.0])
+@pytest.mark.parametrize(
+    ("rate_hz", "what_is_left"),
+    covering(
+        [100.0, 500.0, 600.0, 625.0, 1250.0, 1000.0], [nothing_at_all, two_sets_that_lose_one]
+    ),
+)
 def test_the_loss_of_a_single_instant_is_found_at_every_rate(
     rate_hz, what_is_left, settings, counts_calibration
 ):
@@ -141,7 +150,7 @@ def test_the_loss_of_a_single_instant_is_found_at_every_rate(
     assembler = at_rate(settings, counts_calibration, rate_hz)
     n_seen = 2 if what_is_left is two_sets_that_lose_one else 1
     blocks, number = [], 0
-    while number < 12_000:
+    while number < 8_000:
         frames = [f for n in range(number, number + 6) for f in instant(n)]
         number += 6
         if number % 3000 == 0:
@@ -186,10 +195,10 @@ def test_a_host_clock_that_is_set_and_frames_that_had_waited_are_not_too_many(st
 def test_late_frames_are_no_loss(assembler):
     random = np.random.default_rng(4)
     blocks = []
-    for start in range(0, 30_000, 30):
+    for start in range(0, 12_000, 30):
         blocks += run(assembler, start, start + 30, 30, float(random.exponential(0.003)))
-    blocks += run(assembler, 30_000, 30_600, 600, 0.0)
-    assert blocks[-1].stop_index == 30_600
+    blocks += run(assembler, 12_000, 12_600, 600, 0.0)
+    assert blocks[-1].stop_index == 12_600
     assert all(b.rejected == () for b in blocks)
 
 
@@ -208,18 +217,18 @@ def test_a_set_with_a_frame_missing_is_dropped_whole_and_counted(lost, assembler
 def test_random_single_losses_never_mix_two_instants(assembler):
     random = np.random.default_rng(5)
     blocks, n_lost = [], 0
-    for start in range(0, 24_000, 6):
+    for start in range(0, 9_000, 6):
         frames = [f for n in range(start, start + 6) for f in instant(n)]
         if random.random() < 0.1:
             del frames[int(random.integers(0, len(frames)))]
             n_lost += 1
         blocks += assembler.take(frames, at((start + 6) / RATE_HZ))
-    assert n_lost > 350
+    assert n_lost > 120
     assert_true_samples(blocks)
     assert_never_joined_over_a_loss(blocks)
     n_stored = sum(b.n_samples for b in blocks)
     assert n_stored + sum(r.n_samples for b in blocks for r in b.rejected) == blocks[-1].stop_index
-    assert blocks[-1].stop_index == pytest.approx(24_000, abs=6)
+    assert blocks[-1].stop_index == pytest.approx(9_000, abs=6)
 
 
 def test_a_duplicate_and_a_frame_out_of_turn_spoil_their_set_only(assembler):

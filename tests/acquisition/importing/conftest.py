@@ -53,7 +53,7 @@ class _ReadingHere:
     def _answer(self) -> None:
         try:
             answer(self._path, TypeAdapter(ImportJob).validate_json(self._job), self.found)
-        except Exception as error:  # noqa: BLE001  as the end of a process
+        except Exception as error:  # as the end of a process
             self._last_words = traceback.format_exception_only(error)[-1].strip()
 
     def last_words(self) -> str:
@@ -70,7 +70,7 @@ def _without_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def _reads_here(module: str, path: Path, environment: object) -> Iterator[_ReadingHere]:
+def _reads_here(_module: str, path: Path, _environment: object) -> Iterator[_ReadingHere]:
     with tempfile.TemporaryFile() as found:
         yield _ReadingHere(path.absolute(), found)
 

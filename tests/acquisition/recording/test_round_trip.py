@@ -95,7 +95,7 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
     return unit, blocks
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(recordings())
 def test_any_stream_of_blocks_comes_back_bit_for_bit(
     recording: tuple[RecordedUnit, list[RawBlock]],

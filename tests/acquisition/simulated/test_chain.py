@@ -175,10 +175,11 @@ def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_against_eac
 def test_the_growth_of_the_gaps_wanders_and_moves_nothing_else(
     build_unit: BuildUnit, full_load: Scenario
 ) -> None:
-    wandering = with_bearing(full_load, gap_growth_wander_um_rms=20.0)
-    one, other = build_unit(wandering), build_unit(full_load)
-    one.advance(600_000)
-    other.advance(600_000)
+    steady = replace(full_load, wander_time_s=60.0)
+    wandering = with_bearing(steady, gap_growth_wander_um_rms=20.0)
+    one, other = build_unit(wandering), build_unit(steady)
+    one.advance(60_000)
+    other.advance(60_000)
 
     assert abs(one.truth().bearings["UJB"].gap_growth_um) > 1.0
     assert one.truth().bearings["UJB"].centre_x_um == other.truth().bearings["UJB"].centre_x_um

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.tiers import covering
 
 from acquisition.simulated.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.scenario import BearingScenario, HydraulicNoise, Scenario
@@ -54,8 +55,9 @@ def order1_pk(machine: Unit, scenario: Scenario) -> FloatArray:
     return amplitude
 
 
-@pytest.mark.parametrize("plane", [ForcePlane.MASS_CENTRE, ForcePlane.RUNNER])
-@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize(
+    ("condition", "plane"), covering(list(CONDITIONS), [ForcePlane.MASS_CENTRE, ForcePlane.RUNNER])
+)
 def test_equation_5_finds_the_film_of_a_noisy_simulated_machine(
     machine: Unit, condition: int, plane: ForcePlane
 ) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rigs.tiers import fast_and_long
 
 from acquisition.delivery import Delivery
 from acquisition.simulated.life.damage import Damage, DamageKind
@@ -39,7 +40,7 @@ def test_a_unit_watched_again_tomorrow_has_the_same_past() -> None:
         assert np.array_equal(again, history.eccentricity_ratio[both])
 
 
-@pytest.mark.parametrize("damage_h", [-1.0, 24.0])
+@pytest.mark.parametrize("damage_h", fast_and_long(-1.0, 24.0))
 def test_samples_go_on_where_readings_stop(damage_h: float) -> None:
     """Five minutes of samples read as the life says, with a film that is damaged, or will be."""
     onset_ns = NOW_NS + round(damage_h * 3600) * NS_PER_S
