@@ -1,17 +1,19 @@
 """A small unit, and blocks made of known signals."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
-from rigs.shaken_shaft import (
-    shaken,
-)
+from rigs.shaken_shaft import shaken
 
 from core.arrays import ComplexArray, FloatArray
+from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.machine import Bearing, Channel, Measurand, Unit
+from core.monitor import UnitMonitor
 from core.quality import GOOD, Reading, Reason, missing
+from core.settings import AnalysisSettings
 
 RATE_HZ = 600.0
 
@@ -32,7 +34,7 @@ def unit() -> Unit:
 
 @pytest.fixture
 def blocks() -> BlockMaker:
-    """Cut (4, n) signals into blocks of the unit."""
+    """Cut signals into blocks of the unit."""
 
     def cut(
         signals: FloatArray,
@@ -52,11 +54,42 @@ def blocks() -> BlockMaker:
                 start_ns=round((first_index + start) / RATE_HZ * 1e9),
                 rate_hz=RATE_HZ,
                 samples=samples,
-                channel_quality=(GOOD,) * 4,
+                channel_quality=(GOOD,) * len(samples),
                 slow=slow,
             )
 
     return cut
+
+
+@pytest.fixture(scope="session")
+def signals() -> Callable[..., FloatArray]:
+    """Builds signals (4, n): shaft 60 µm and bearing 20 µm at 1×, forward, a little noise."""
+
+    def turning(
+        duration_s: float,
+        noise_um: float = 0.05,
+        speed_rpm: float = 92.3,
+        gaps_um: tuple[float, float] = (2000.0, 2000.0),
+    ) -> FloatArray:
+        turn = 2 * np.pi * speed_rpm / 60 * np.arange(int(duration_s * RATE_HZ)) / RATE_HZ
+        shaft = [gaps_um[0] - 60 * np.cos(turn), gaps_um[1] - 60 * np.sin(turn)]
+        rows = np.array([*shaft, 20 * np.cos(turn - 0.1), 20 * np.sin(turn - 0.1)])
+        return rows + noise_um * np.random.default_rng(3).normal(size=rows.shape)
+
+    return turning
+
+
+@pytest.fixture
+def results(unit: Unit, blocks: BlockMaker) -> Callable[..., list[Assessment]]:
+    """Results of a monitor that begins anew; keywords are those of the blocks."""
+
+    def watch(
+        signals: FloatArray, unit: Unit = unit, settings: AnalysisSettings | None = None, **cut: Any
+    ) -> list[Assessment]:
+        monitor = UnitMonitor(unit, settings or AnalysisSettings())
+        return [found for block in blocks(signals, **cut) for found in monitor.ingest(block)]
+
+    return watch
 
 
 @pytest.fixture
