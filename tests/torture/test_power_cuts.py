@@ -20,7 +20,7 @@ from service.store.sqlite import SqliteStore
 from service.store.sqlite.trail import verify_trail
 
 N_DEEDS = 150
-N_CUTS, N_FEW = 5000, 100
+N_CUTS, N_FEW = 5000, 50
 ROOT = Path(__file__).parents[2]
 DATABASE = "padwatch.sqlite3"
 

@@ -48,14 +48,19 @@ def recorded_unit(unit: str) -> RecordedUnit:
 
 
 def block(
-    number: int, unit: str = "U1", lost: bool = False, start_ns: int | None = None
+    number: int,
+    unit: str = "U1",
+    lost: bool = False,
+    start_ns: int | None = None,
+    epoch: int = 1,
+    by: float = 0.0,
 ) -> SampleBlock:
-    """Channel a is the number of the sample."""
+    """Block of a fifth of a second; channel a is the number of the sample, plus `by`."""
     first = number * BLOCK
-    index = np.arange(first, first + BLOCK, dtype=np.float32)
+    index = np.arange(first, first + BLOCK, dtype=np.float32) + np.float32(by)
     return SampleBlock(
         unit=unit,
-        epoch=1,
+        epoch=epoch,
         first_index=first,
         start_ns=T0 + number * SECOND // 5 if start_ns is None else start_ns,
         rate_hz=RATE_HZ,

@@ -11,20 +11,31 @@ import pytest
 import structlog
 
 from core.alarms.alarm import Alarm
+from core.machine import Bearing, Channel, Measurand, Unit
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 
 SECOND = 1_000_000_000
 
 
+IDS = ("sx", "sy", "bx", "by")
+UNIT = Unit(
+    "U1",
+    60.0,
+    100.0,
+    tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
+    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0)),),
+)
+
+
 class Host:
-    """Time that only steps forward when asked to."""
+    """Time that only steps forward when asked to, and a wall clock that may be set."""
 
     def __init__(self) -> None:
-        self.ns = 1_000 * SECOND
+        self.ns, self.set_by_s = 1_000 * SECOND, 0.0
 
     def now_ns(self) -> int:
-        return self.ns
+        return self.ns + round(self.set_by_s * SECOND)
 
     def monotonic_s(self) -> float:
         return self.ns / SECOND
@@ -105,8 +116,8 @@ def host() -> Host:
 
 @pytest.fixture
 def tools() -> SimpleNamespace:
-    """What a life is led with: a store that may fail, and what is to be known of an alarm."""
-    return SimpleNamespace(uncertain=UncertainStore, expected=Expected)
+    """Parts of a random life: a store that may fail, a model of an alarm, a unit."""
+    return SimpleNamespace(uncertain=UncertainStore, expected=Expected, unit=UNIT)
 
 
 @pytest.fixture
@@ -118,13 +129,13 @@ def _quiet() -> Iterator[None]:
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Callable[[], Path]:
+def database(folder_in_memory: Path) -> Callable[[], Path]:
     """Makes a new, empty database in the place of the one before."""
-    empty, path = tmp_path / "empty.sqlite3", tmp_path / "life.sqlite3"
+    empty, path = folder_in_memory / "empty.sqlite3", folder_in_memory / "life.sqlite3"
     SqliteStore(empty).close()
 
     def make() -> Path:
-        for left in tmp_path.glob("life.sqlite3*"):
+        for left in folder_in_memory.glob("life.sqlite3*"):
             left.unlink()
         path.write_bytes(empty.read_bytes())
         return path

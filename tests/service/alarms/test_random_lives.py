@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.tiers import fast_and_long
 
 from core.alarms.alarm import AlarmLevel, AlarmState, Condition, unknown
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
@@ -32,7 +33,6 @@ from core.alarms.operation import (
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
-from core.machine import Bearing, Channel, Measurand, Unit
 from core.quality import GOOD, Reason, bad
 from service.alarms.engine import AlarmEngine
 from service.live import LiveView
@@ -44,14 +44,6 @@ N_LIVES = int(os.environ.get("PADWATCH_SEQUENCES", "150"))
 N_STEPS = 40
 
 SECOND = 1_000_000_000
-IDS = ("sx", "sy", "bx", "by")
-UNIT = Unit(
-    "U1",
-    60.0,
-    100.0,
-    tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
-    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0)),),
-)
 FILMS = ("U1:UJB:stiffness_x", "U1:UJB:stiffness_y")
 PROBE, LINK = "U1:sx:channel_not_ok", "U1:link:link_lost"
 ALARMS = (*FILMS, PROBE, LINK)
@@ -84,7 +76,7 @@ class Life:
         self.uncertain = self.tools.uncertain(self.store)
         live = LiveView(["U1"], self.host, 30.0)
         self.recorder = Recorder(self.uncertain, live, self.host)
-        units = {"U1": UnitAlarms(UNIT, self.rules)}
+        units = {"U1": UnitAlarms(self.tools.unit, self.rules)}
         self.engine = AlarmEngine(units, self.recorder.put, self.host)
         self.engine.restore(self.store.alarms())
         self.connected = False
@@ -272,10 +264,11 @@ LATCHES = (AlarmChange.LATCHED, AlarmChange.RESET)
 
 @pytest.mark.timeout(max(300, N_LIVES))
 @pytest.mark.usefixtures("_quiet")
+@pytest.mark.parametrize("n_lives", fast_and_long(min(N_LIVES, 30), N_LIVES))
 async def test_no_alarm_is_lost_and_none_is_doubled(
-    database: Callable[[], Path], host: Any, tools: Any
+    database: Callable[[], Path], host: Any, tools: Any, n_lives: int
 ) -> None:
-    for seed in range(N_LIVES):
+    for seed in range(n_lives):
         life = Life(database(), seed, host, tools)
         try:
             await life.lead(N_STEPS)

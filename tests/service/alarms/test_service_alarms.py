@@ -1,4 +1,4 @@
-"""Alarms about the store and the service, from what happens to them to what is stored of them."""
+"""Alarms about links, the store and the service, from their causes to what is stored of them."""
 
 import asyncio
 from collections.abc import Callable
@@ -12,6 +12,8 @@ from core.account import SampleAccount
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind, AlarmLevel
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Acknowledge
+from core.alarms.rules import UnitRules, rule_of
+from core.alarms.unit_alarms import UnitAlarms
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms
@@ -82,14 +84,12 @@ def test_a_queue_that_fills_is_an_alert_and_then_a_danger(watched: Watched) -> N
     assert watched.after(6.0, waiting_share=0.95) == [f"{WAITING} escalated"]
 
 
-def test_an_analysis_that_falls_behind_is_an_alarm(watched: Watched) -> None:
+def test_a_late_analysis_and_captures_that_cannot_be_written_are_alarms(watched: Watched) -> None:
     watched.after(0.0, analysis_delay_s=6.0)
     assert watched.after(6.0, analysis_delay_s=6.0) == [f"{LATE} raised"]
-
-
-def test_captures_that_cannot_be_written_are_an_alarm(watched: Watched) -> None:
-    raised = watched.after(0.5, captures_error="no space left")
-    assert raised == ["plant:captures:captures_not_kept raised"]
+    assert watched.after(0.5, analysis_delay_s=6.0, captures_error="no space left") == [
+        "plant:captures:captures_not_kept raised"
+    ]
 
 
 def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
@@ -126,6 +126,30 @@ def test_a_device_whose_samples_all_pass_for_repeated_ones_loses_them(watched: W
     assert watched.after(100.0, **account(180_000, 275_000)) == ["plant:U1:samples_lost raised"]
     later = [watched.after(100.0, **account(180_000 + n * 60_000, 275_000)) for n in range(1, 9)]
     assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
+
+
+DELAY_S = 10.0
+LINK = "U1:link:link_lost"
+
+
+@pytest.mark.parametrize("set_by_s", [0.0, 7200.0, -3600.0, 0.3])
+def test_a_lost_link_is_told_after_its_delay_whatever_the_clock_is_set_to(
+    host: Any, tools: Any, set_by_s: float
+) -> None:
+    rules = UnitRules(channel=rule_of(2.0, 4.0), link=rule_of(DELAY_S, 0.0))
+    engine = AlarmEngine({"U1": UnitAlarms(tools.unit, rules)}, lambda _: None, host)
+    engine.link("U1", True)
+    engine.link("U1", False, "not connected")
+    told: list[Any] = []
+    for second in range(30):
+        if second == 4:
+            host.set_by_s = set_by_s
+        engine.tick()
+        told.append(engine.alarm(LINK).level)
+        host.ns += SECOND
+
+    since = told.index(next(level for level in told if level is not None))
+    assert since in (round(DELAY_S), round(DELAY_S) + 1)  # the second of the step may not count
 
 
 @pytest.fixture

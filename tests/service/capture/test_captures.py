@@ -13,24 +13,25 @@ from service.capture.outcome import Outcome
 from service.capture.span import CaptureSettings
 
 
-async def test_a_capture_holds_exactly_the_samples_around_the_alarm(root: Path) -> None:
+@pytest.mark.parametrize(
+    ("at_block", "at_s", "expected"),
+    [
+        pytest.param(49, 10.0, range(35, 75), id="from 7 s to 15 s"),
+        pytest.param(50, 10.1, range(35, 76), id="blocks that are partly within are kept whole"),
+        pytest.param(2, 0.6, range(28), id="right after the start"),
+    ],
+)
+async def test_a_capture_holds_exactly_the_samples_around_the_alarm(
+    root: Path, at_block: int, at_s: float, expected: range
+) -> None:
     async with running(root) as rig:
-        # block 49 ends at 10 s, when the alarm is raised: from 7 s to 15 s
-        rig.send(0, 100, {49: raised(10.0)})
+        rig.send(0, 100, {at_block: raised(at_s)})
         [recording] = await rig.written(1)
 
-    assert samples(recording) == numbers(35, 75)
     blocks = list(recording.raw_blocks())
-    assert [raw.start_ns for raw in blocks] == [block(n).start_ns for n in range(35, 75)]
-    assert np.array_equal(blocks[0].counts, block(35).samples)
-
-
-async def test_blocks_that_are_only_partly_within_are_kept_whole(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 100, {50: raised(10.1)})
-        [recording] = await rig.written(1)
-
-    assert samples(recording) == numbers(35, 76)
+    assert [raw.start_ns for raw in blocks] == [block(n).start_ns for n in expected]
+    for raw, number in zip(blocks, expected, strict=True):
+        assert np.array_equal(raw.counts, block(number).samples)
 
 
 async def test_a_capture_says_which_alarm_it_is_for_and_bears_its_name(root: Path) -> None:
@@ -126,14 +127,6 @@ async def test_what_samples_do_not_explain_or_nobody_wants_to_see_is_not_capture
         rig.send(0, 100, {49: news})
         assert rig.captures.n_running == 0
     assert not root.exists()
-
-
-async def test_a_capture_that_begins_right_after_the_start_has_what_there_is(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 100, {2: raised(0.6)})
-        [recording] = await rig.written(1)
-
-    assert samples(recording) == numbers(0, 28)
 
 
 async def test_samples_that_are_missing_or_repeated_are_so_in_the_capture(root: Path) -> None:

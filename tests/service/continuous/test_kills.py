@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rigs.capturing import BLOCK, block, numbers, samples
 
 from acquisition.recording.manifest import RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
@@ -16,7 +17,6 @@ from service.continuous.last import last_end
 from service.continuous.pieces import TapeSettings
 from service.continuous.unit_tape import UnitTape
 
-BLOCK = 10
 SETTINGS = TapeSettings(stretch_s=4.0, part_s=2.0)
 N_BLOCKS = 30
 DEEDS = ("mkdir", "rename", "unlink", "rmdir")
@@ -58,8 +58,8 @@ def recover(root: Path) -> None:
 def record(root: Path, unit: RecordedUnit, blocks: list[SampleBlock], synced: list[int]) -> None:
     """Record as the service does, and note up to where samples were on the disk."""
     tape = UnitTape(root, unit, SETTINGS, last_end(root, unit.unit))
-    for block in blocks:
-        tape.write(block, 0.0)
+    for each in blocks:
+        tape.write(each, 0.0)
         synced[0] = max(synced[0], tape.n_written)
         for folder in tape.ended:
             join(folder)
@@ -71,7 +71,7 @@ def record(root: Path, unit: RecordedUnit, blocks: list[SampleBlock], synced: li
 
 def account(recordings: list[Recording]) -> tuple[list[int], int]:
     """Numbers of the samples, and how many are told to be missing."""
-    found = [int(v) for each in recordings for raw in each.raw_blocks() for v in raw.counts[0]]
+    found = [number for each in recordings for number in samples(each)]
     missing = sum(s.n_gap_samples + sum(s.rejected.values()) for s in map(summary_of, recordings))
     return found, missing
 
@@ -89,18 +89,18 @@ def n_deeds(
 
 
 def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
-    tmp_path: Path, unit: Any, block: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     blocks = [block(n) for n in range(N_BLOCKS)]
     later = [block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
-    total = n_deeds(tmp_path, unit("U1"), blocks, monkeypatch)
+    total = n_deeds(tmp_path, unit, blocks, monkeypatch)
     assert total > 25
     for deed in range(total):
         root, synced = tmp_path / f"{deed}", [0]
         with killed_at(deed, monkeypatch), pytest.raises(Killed):
-            record(root, unit("U1"), blocks, synced)
+            record(root, unit, blocks, synced)
         recover(root)
-        record(root, unit("U1"), later, [0])
+        record(root, unit, later, [0])
         found, missing = account(recordings_in(root))
 
         assert found == sorted(set(found)), f"killed at {deed}: twice"
@@ -112,12 +112,12 @@ def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
 
 
 def test_a_kill_during_recovery_changes_nothing(
-    tmp_path: Path, unit: Any, block: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     blocks = [block(n) for n in range(15)]
 
     def crashed(root: Path) -> None:
-        tape = UnitTape(root, unit("U1"), SETTINGS)
+        tape = UnitTape(root, unit, SETTINGS)
         for each in blocks:
             tape.write(each, 0.0)
 
@@ -131,4 +131,4 @@ def test_a_kill_during_recovery_changes_nothing(
             recover(root)
         recover(root)
 
-        assert account(recordings_in(root)) == (list(range(100)), 0), f"killed at {deed}"
+        assert account(recordings_in(root)) == (numbers(0, 10), 0), f"killed at {deed}"

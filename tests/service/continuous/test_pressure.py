@@ -1,8 +1,8 @@
 """Recording gives way to the analysis, after questions have, and before anything else does."""
 
-from typing import Any
-
 import pytest
+from rigs.capturing import block
+from rigs.standing_clock import StandingClock
 
 from service.bus import Bus
 from service.continuous import pressure as module
@@ -10,25 +10,11 @@ from service.continuous.pieces import Shed
 from service.continuous.pressure import Pressure
 
 
-class Clock:
-    def __init__(self) -> None:
-        self.s = 0.0
-
-    def now_ns(self) -> int:
-        return 0
-
-    def monotonic_s(self) -> float:
-        return self.s
-
-    async def sleep(self, duration_s: float) -> None:
-        self.s += duration_s
-
-
 class Plant:
     """A queue to the analysis, a disk, and what others have given up already."""
 
     def __init__(self) -> None:
-        self.clock = Clock()
+        self.clock = StandingClock()
         self.bus = Bus(100, self.clock)
         self.is_full, self.refuses_questions = False, True
         self.pressure = Pressure(self.bus, lambda: self.is_full, lambda: self.refuses_questions)
@@ -39,14 +25,14 @@ def plant() -> Plant:
     return Plant()
 
 
-async def test_a_service_that_keeps_up_records(plant: Plant, block: Any) -> None:
+async def test_a_service_that_keeps_up_records(plant: Plant) -> None:
     await plant.bus.publish(block(0))
     plant.clock.s = module.BEHIND_S
     assert plant.pressure.look() is None
 
 
 async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_more(
-    plant: Plant, block: Any
+    plant: Plant,
 ) -> None:
     await plant.bus.publish(block(0))
     plant.clock.s = module.BEHIND_S + 0.1
@@ -62,13 +48,13 @@ async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_mo
     assert plant.pressure.look() is None
 
 
-async def test_a_queue_that_fills_does_as_well(plant: Plant, block: Any) -> None:
+async def test_a_queue_that_fills_does_as_well(plant: Plant) -> None:
     for number in range(26):
         await plant.bus.publish(block(number))
     assert plant.pressure.look() is Shed.ANALYSIS_BEHIND
 
 
-async def test_questions_are_given_up_before_samples_are(plant: Plant, block: Any) -> None:
+async def test_questions_are_given_up_before_samples_are(plant: Plant) -> None:
     plant.refuses_questions = False
     await plant.bus.publish(block(0))
     plant.clock.s = 10 * module.BEHIND_S

@@ -1,27 +1,20 @@
 """All samples of a unit are kept, and what is not is told by number and reason."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rigs.capturing import numbers, samples
 
-from acquisition.recording.reader import Recording, open_recording
+from acquisition.recording.reader import open_recording
 from acquisition.recording.summary import summary_of
 from service.continuous import tape, unit_tape
 from service.continuous.last import last_end
 from service.continuous.pieces import Shed
 
-BLOCK = 10
-Samples = Callable[[Recording], list[int]]
-
-
-def numbers(first_block: int, stop_block: int) -> list[int]:
-    return list(range(first_block * BLOCK, stop_block * BLOCK))
-
 
 async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(
-    running: Any, root: Path, samples: Samples
+    running: Any, root: Path
 ) -> None:
     async with running(root) as rig:
         rig.send(20, 120)
@@ -60,9 +53,7 @@ async def test_how_far_a_unit_is_recorded_is_not_hidden_by_one_whose_name_begins
     assert last_end(root, "pump-b") == (1, 2000)
 
 
-async def test_two_units_are_recorded_side_by_side(
-    running: Any, root: Path, samples: Samples
-) -> None:
+async def test_two_units_are_recorded_side_by_side(running: Any, root: Path) -> None:
     async with running(root, ("U1", "U2")) as rig:
         rig.send(0, 20)
         rig.send(3, 30, "U2")
@@ -75,7 +66,7 @@ async def test_two_units_are_recorded_side_by_side(
 
 @pytest.mark.parametrize("reason", [Shed.ANALYSIS_BEHIND, Shed.DISK_FULL])
 async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
-    running: Any, root: Path, samples: Samples, reason: Shed
+    running: Any, root: Path, reason: Shed
 ) -> None:
     async with running(root) as rig:
         rig.send(0, 10)
@@ -94,7 +85,7 @@ async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
 
 
 async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
-    running: Any, root: Path, samples: Samples
+    running: Any, root: Path
 ) -> None:
     async with running(root) as rig:
         rig.send(0, 10)
@@ -109,7 +100,7 @@ async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
 
 
 async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
-    running: Any, root: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
+    running: Any, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class RefusedStretch:
         def __init__(self, *_: object) -> None:
@@ -131,7 +122,7 @@ async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
 
 
 async def test_samples_that_are_missing_or_repeated_are_so_in_the_recording(
-    running: Any, root: Path, samples: Samples
+    running: Any, root: Path
 ) -> None:
     async with running(root) as rig:
         rig.send(0, 10)
@@ -165,7 +156,7 @@ async def test_the_hole_of_an_outage_is_told_exactly(running: Any, root: Path) -
 
 
 async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(
-    running: Any, root: Path, samples: Samples
+    running: Any, root: Path
 ) -> None:
     async with running(root) as rig:
         rig.send(10, 20)
@@ -189,7 +180,7 @@ async def test_samples_that_turn_out_to_be_no_counts_begin_another_recording(
 
 
 async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
-    running: Any, root: Path, samples: Samples
+    running: Any, root: Path
 ) -> None:
     async with running(root) as rig:
         rig.send(0, 30)
@@ -204,7 +195,7 @@ async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
 
 
 async def test_samples_that_come_once_more_after_a_restart_are_not_recorded_twice(
-    running: Any, root: Path, samples: Samples
+    running: Any, root: Path
 ) -> None:
     async with running(root) as rig:
         rig.send(0, 20)
