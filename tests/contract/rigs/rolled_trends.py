@@ -1,11 +1,15 @@
 """Roll-ups are gathered, and trends out of them compared with those out of single readings."""
 
 import sqlite3
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+from core.assessment import Assessment
+from rigs.memory_folder import memory_folder
 from service.store.port import Trend
 from service.store.sql_store import SqlStore
+from service.store.sqlite import SqliteStore
 
 LATER_NS = 1 << 62
 
@@ -15,6 +19,18 @@ def gather_all(store: SqlStore, now_ns: int = LATER_NS) -> None:
     while due := store.rollups.due(now_ns):
         for series in due:
             store.rollups.gather(series, now_ns)
+
+
+def plain_and_gathered(results: Sequence[Assessment]) -> dict[str, bytes]:
+    """SQLite files that hold these results: ``plain``, and with all roll-ups ``gathered``."""
+    with memory_folder() as folder:
+        path = folder / "padwatch.sqlite3"
+        with closing(SqliteStore(path)) as store:
+            store.append(results, [])
+        plain = path.read_bytes()
+        with closing(SqliteStore(path)) as store:
+            gather_all(store)
+        return {"plain": plain, "gathered": path.read_bytes()}
 
 
 def require_same(found: Trend, wanted: Trend, within: float = 1e-12) -> None:

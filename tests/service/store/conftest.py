@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from harness.places import Place
+from harness.places import Place, SqlitePlace
 
 from core.account import Gap
 from service.store.port import TrendQuery, UnitGap
@@ -40,6 +41,12 @@ def tmp_path(folder_in_memory: Path) -> Path:
 def path(tmp_path: Path) -> Path:
     """Where the database is."""
     return tmp_path / "data" / "padwatch.sqlite3"
+
+
+@pytest.fixture
+def execute(path: Path) -> Callable[..., list[Any]]:
+    """Changes the file behind padwatch's back, which seals nothing."""
+    return SqlitePlace(path).execute
 
 
 @pytest.fixture

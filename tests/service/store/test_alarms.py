@@ -1,13 +1,13 @@
 """Alarms on the disk: as they are, with all that has ever happened to them."""
 
 import sqlite3
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rigs.store_fixtures import BuildGap
 
 from core.alarms.alarm import (
     Alarm,
@@ -22,7 +22,7 @@ from core.alarms.delays import RESTED
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
-from service.store.port import AlarmQuery, StoreError, UnitGap
+from service.store.port import AlarmQuery, StoreError
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000
@@ -110,7 +110,7 @@ def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later
 
 
 def test_news_of_alarms_stands_or_falls_with_the_gap_it_came_with(
-    store: SqliteStore, path: Path, gap: Callable[..., UnitGap]
+    store: SqliteStore, path: Path, gap: BuildGap
 ) -> None:
     with pytest.raises(StoreError, match="NOT NULL"):
         store.append([], [gap(unit=None)], [raised()])

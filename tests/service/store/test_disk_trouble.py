@@ -2,20 +2,18 @@
 
 import resource
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from rigs.store_fixtures import At, Build
 
 from core.assessment import Assessment
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore, readers, writer
 from service.store.sqlite.readers import Readers
 from service.store.sqlite.trouble import leaves_in_doubt
-
-Build = Callable[..., Assessment]
-At = Callable[[int], int]
 
 
 @contextmanager

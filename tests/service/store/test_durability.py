@@ -6,29 +6,17 @@ import sqlite3
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rigs.store_fixtures import Ask, At, Build, BuildGap
 
-from core.assessment import Assessment
 from service.origin import Origin
 from service.store import schema
-from service.store.port import StoreError, TrendQuery, UnitGap
+from service.store.port import StoreError
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.migrating import APPLICATION_IDS
-
-Build = Callable[..., Assessment]
-
-
-BuildGap = Callable[..., UnitGap]
-
-
-Ask = Callable[..., TrendQuery]
-
-
-At = Callable[[int], int]
 
 
 def run_sql(path: Path, script: str) -> None:

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from rigs.store_fixtures import At
+
 from core.account import Gap
 from core.outage import Reach
 from service.store.port import UnitGap
-
-At = Callable[[int], int]
 
 
 def test_nothing_stored_reaches_nowhere(store: Any) -> None:

@@ -1,6 +1,5 @@
 """What was appended is read back, to the last bit."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,20 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rigs.store_fixtures import Ask, At, Build, BuildGap
 
 from core.assessment import Assessment
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
 from core.quantities import CATALOGUE
 from service.store import sql_store, trends
 from service.store.codec import Layout
-from service.store.port import QueryTooLargeError, StoreError, TrendQuery, UnitGap
+from service.store.port import QueryTooLargeError, StoreError
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
-
-Build = Callable[..., Assessment]
-BuildGap = Callable[..., UnitGap]
-Ask = Callable[..., TrendQuery]
-At = Callable[[int], int]
 
 NAMES = tuple(quantity.name for quantity in CATALOGUE)
 

@@ -2,22 +2,18 @@
 
 import math
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rigs.store_fixtures import At, Build
 
-from core.assessment import Assessment
 from core.quality import Reading, Reason, missing, uncertain
 from service.store import schema, sql_store
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
-
-Build = Callable[..., Assessment]
-At = Callable[[int], int]
 
 T0 = 1_767_225_600_000_000_000
 

@@ -2,21 +2,15 @@
 
 import itertools
 import sqlite3
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rigs.store_fixtures import At, Build
 
-from core.assessment import Assessment
 from service.origin import Origin
 from service.store.port import StoreError
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
-
-Build = Callable[..., Assessment]
-
-
-At = Callable[[int], int]
 
 
 def run_sql(path: Path, script: str) -> None:

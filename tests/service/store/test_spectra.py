@@ -1,7 +1,7 @@
 """Spectra over time: what is kept, how many, how exactly, and what becomes of damage."""
 
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rigs.store_fixtures import Build
 
 from core.arrays import FloatArray
 from core.assessment import Assessment
@@ -29,7 +30,6 @@ from service.store.sqlite.migrating import migrate
 S = 1_000_000_000
 T0 = 1_767_225_600 * S
 LIMITS = SpectraLimits(TierLimits(60.0, 5), TierLimits(600.0, 4), 12)
-Build = Callable[..., Assessment]
 
 
 def spectrum(n_lines: int = 8, scale_um: float = 1.0, lost: tuple[int, ...] = ()) -> CrossSpectrum:
@@ -42,7 +42,7 @@ def spectrum(n_lines: int = 8, scale_um: float = 1.0, lost: tuple[int, ...] = ()
 
 
 @pytest.fixture
-def found(assessment: Build) -> Callable[..., Assessment]:
+def found(assessment: Build) -> Build:
     """Builds assessments with a spectrum, at seconds since the start."""
 
     def build(at_s: float, bearing: str = "UJB", **of_spectrum: object) -> Assessment:
@@ -93,7 +93,7 @@ def test_an_amplitude_comes_back_within_two_hundredths_of_a_percent(
 
 
 def test_a_spectrum_comes_back_with_what_it_was_found_under(
-    kept: SqliteStore, found: Callable[..., Assessment]
+    kept: SqliteStore, found: Build
 ) -> None:
     kept.append([found(5.0)], [])
 
@@ -109,7 +109,7 @@ def test_a_spectrum_comes_back_with_what_it_was_found_under(
 
 
 def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving(
-    kept: SqliteStore, found: Callable[..., Assessment]
+    kept: SqliteStore, found: Build
 ) -> None:
     kept.append([found(0.0, lost=(1,)), found(120.0, lost=(0, 1, 2, 3))], [])
 
@@ -119,7 +119,7 @@ def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving
 
 
 def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(
-    kept: SqliteStore, found: Callable[..., Assessment]
+    kept: SqliteStore, found: Build
 ) -> None:
     kept.append([found(12.0 * n) for n in range(16)], [])
     kept.append([found(12.0 * n) for n in range(16)], [])  # the answer to the first got lost
@@ -128,7 +128,7 @@ def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(
 
 
 def test_old_spectra_thin_out_and_their_number_stays_bounded(
-    kept: SqliteStore, path: Path, found: Callable[..., Assessment]
+    kept: SqliteStore, path: Path, found: Build
 ) -> None:
     for minute in range(60):
         kept.append([found(60.0 * minute), found(60.0 * minute, "LJB")], [])
@@ -142,7 +142,7 @@ def test_old_spectra_thin_out_and_their_number_stays_bounded(
 
 
 def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(
-    kept: SqliteStore, found: Callable[..., Assessment]
+    kept: SqliteStore, found: Build
 ) -> None:
     for n in range(5):
         kept.append([found(3e8 + 60.0 * n)], [])
@@ -153,7 +153,7 @@ def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(
 
 
 def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(
-    path: Path, found: Callable[..., Assessment]
+    path: Path, found: Build
 ) -> None:
     for at_s in (0.0, 30.0, 60.0):
         with closing(SqliteStore(path, spectra=LIMITS)) as store:
@@ -163,9 +163,7 @@ def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(
         assert times_s(read(store)) == [0.0, 60.0]
 
 
-def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(
-    kept: SqliteStore, found: Callable[..., Assessment]
-) -> None:
+def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(kept: SqliteStore, found: Build) -> None:
     kept.append([found(at_s) for at_s in (0.0, 60.0, 86_400.0)], [])
 
     assert times_s(read(kept)) == [0.0, 60.0, 86_400.0]
@@ -173,7 +171,7 @@ def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(
 
 
 def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(
-    path: Path, found: Callable[..., Assessment]
+    path: Path, found: Build
 ) -> None:
     with closing(SqliteStore(path)) as store:
         store.append([found(60.0 * n) for n in range(101)], [])
@@ -184,9 +182,7 @@ def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(
     assert times_s(spectra) == [0.0, 1500.0, 3000.0, 4500.0, 6000.0]
 
 
-def test_lines_beyond_the_limit_are_not_kept(
-    kept: SqliteStore, found: Callable[..., Assessment]
-) -> None:
+def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore, found: Build) -> None:
     kept.append([found(0.0, n_lines=50)], [])
 
     assert read(kept).spectra[0].resolution == (0.1, 12)
@@ -204,7 +200,7 @@ def test_lines_beyond_the_limit_are_not_kept(
     ],
 )
 def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
-    kept: SqliteStore, path: Path, found: Callable[..., Assessment], damage: str
+    kept: SqliteStore, path: Path, found: Build, damage: str
 ) -> None:
     kept.append([found(0.0), found(60.0)], [])
     with closing(sqlite3.connect(path)) as connection:
@@ -218,7 +214,7 @@ def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
 
 
 def test_spectra_of_a_replay_are_in_a_database_of_its_own(
-    tmp_path: Path, kept: SqliteStore, found: Callable[..., Assessment]
+    tmp_path: Path, kept: SqliteStore, found: Build
 ) -> None:
     with closing(SqliteStore(tmp_path / "replays" / "p.sqlite3", Origin.REPLAY)) as replay:
         replay.append([found(0.0)], [])
@@ -228,7 +224,7 @@ def test_spectra_of_a_replay_are_in_a_database_of_its_own(
 
 
 def test_an_older_database_gets_its_table_of_spectra(
-    path: Path, found: Callable[..., Assessment], monkeypatch: pytest.MonkeyPatch
+    path: Path, found: Build, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = MIGRATIONS[: MIGRATIONS.index(SPECTRA_TABLES)]
     path.parent.mkdir()

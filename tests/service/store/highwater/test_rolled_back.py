@@ -3,13 +3,13 @@
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
 import pytest
+from rigs.store_fixtures import Build
 
-from core.assessment import Assessment
 from service.backup.backing_up import back_up
 from service.backup.restoring import restore
 from service.store.audit_port import AuditQuery
@@ -18,7 +18,6 @@ from service.store.highwater.file import MarkFile, mark_path
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
 
-Build = Callable[..., Assessment]
 T0 = 1_767_225_600_000_000_000
 N_KEPT, N_LATER = 40, 25
 EVERYTHING = TrendQuery("U1", "UJB", ("speed_rpm",), 0, 2**62, 5000, 2**62)

@@ -1,6 +1,7 @@
 """A second server, which tests may stop; and ways that are cut."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from itertools import count
 from pathlib import Path
 
@@ -32,6 +33,20 @@ def own_place(own_server: PostgresServer, tmp_path: Path) -> Iterator[PostgresPl
 
 
 @pytest.fixture
+def own_store(own_place: PostgresPlace) -> Iterator[PostgresStore]:
+    """A store in it."""
+    with closing(own_place.open()) as opened:
+        yield opened
+
+
+@pytest.fixture
+def postgres_store(postgres_place: PostgresPlace) -> Iterator[PostgresStore]:
+    """A store in a database of the shared server."""
+    with closing(postgres_place.open()) as opened:
+        yield opened
+
+
+@pytest.fixture
 def password_file(tmp_path: Path) -> Path:
     """A file with the password of the server's administrator."""
     path = tmp_path / "password"
@@ -53,6 +68,6 @@ def cut_store(
 ) -> Iterator[PostgresStore]:
     """A store over that way."""
     conninfo = f"host=127.0.0.1 port={proxy.port} user=postgres dbname={postgres_place.database}"
-    store = PostgresStore(PostgresAddress(conninfo, password_file), postgres_place.head)
-    yield store
-    store.close()
+    address = PostgresAddress(conninfo, password_file)
+    with closing(PostgresStore(address, postgres_place.head)) as store:
+        yield store

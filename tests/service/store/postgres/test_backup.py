@@ -1,21 +1,19 @@
 """The way back from a copy that PostgreSQL's own tools have made, as the how-to shows it."""
 
-from collections.abc import Callable
 from contextlib import closing
 
 from harness.places import PostgresPlace
+from rigs.store_fixtures import Ask, At, Build
 
-from core.assessment import Assessment
 from service.audit.entry import Deed
-from service.store.port import TrendQuery
 from service.store.postgres.trail import server_trail
 
 
 def test_a_dump_of_a_live_database_is_put_back_with_all_that_it_guards(
     own_place: PostgresPlace,
-    assessment: Callable[..., Assessment],
-    at: Callable[[int], int],
-    query: Callable[..., TrendQuery],
+    assessment: Build,
+    at: At,
+    query: Ask,
 ) -> None:
     server, dump = own_place.server, own_place.server.folder / "padwatch.dump"
     with closing(own_place.open()) as store:

@@ -1,14 +1,12 @@
 """Databases and servers that cannot be used: one sentence, and what to do."""
 
-from collections.abc import Callable
 from pathlib import Path
 
-import psycopg
 import pytest
 from harness.places import PostgresPlace
 from harness.postgres_server import PostgresServer
+from rigs.store_fixtures import Build
 
-from core.assessment import Assessment
 from service.origin import Origin
 from service.store import schema
 from service.store.port import StoreError
@@ -61,14 +59,6 @@ def test_a_wrong_password_is_refused_and_not_shown(
 
     assert complaint in refused(PostgresAddress(there, path), tmp_path)
     assert "No such file" in refused(PostgresAddress(there, tmp_path / "none"), tmp_path)
-
-
-def test_the_right_password_opens(
-    postgres_place: PostgresPlace, password_file: Path, tmp_path: Path
-) -> None:
-    there = postgres_place.server.conninfo(postgres_place.database, by="tcp")
-
-    PostgresStore(PostgresAddress(there, password_file), tmp_path / "head.json").close()
 
 
 def test_a_database_of_another_program_is_refused_and_left_as_it_is(
@@ -175,37 +165,29 @@ def test_a_standby_is_refused(own_place: PostgresPlace, tmp_path: Path) -> None:
     assert "is a standby, which only reads: name the primary" in said
 
 
-def test_a_reader_can_write_nothing(postgres_place: PostgresPlace) -> None:
-    store = postgres_place.open()
-    try:
-        with (
-            pytest.raises(StoreError, match="read-only transaction"),
-            store.database.reading() as reader,
-        ):
-            reader.execute("DELETE FROM gap")
-    finally:
-        store.close()
+def test_a_reader_can_write_nothing(postgres_store: PostgresStore) -> None:
+    with (
+        pytest.raises(StoreError, match="read-only transaction"),
+        postgres_store.database.reading() as reader,
+    ):
+        reader.execute("DELETE FROM gap")
 
 
 def test_a_query_that_takes_too_long_ends_with_a_sentence(
-    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch
+    postgres_store: PostgresStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         "service.store.postgres.readers.SETTINGS", "SET statement_timeout = '20ms';"
     )
-    store = postgres_place.open()
-    try:
-        with (
-            pytest.raises(StoreError, match="it took too long: the database is too slow"),
-            store.database.reading() as reader,
-        ):
-            reader.execute("SELECT pg_sleep(10)")
-    finally:
-        store.close()
+    with (
+        pytest.raises(StoreError, match="it took too long: the database is too slow"),
+        postgres_store.database.reading() as reader,
+    ):
+        reader.execute("SELECT pg_sleep(10)")
 
 
 def test_a_full_disk_is_named_as_such(
-    postgres_place: PostgresPlace, assessment: Callable[..., Assessment]
+    postgres_store: PostgresStore, postgres_place: PostgresPlace, assessment: Build
 ) -> None:
     postgres_place.execute(
         "CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
@@ -215,12 +197,7 @@ def test_a_full_disk_is_named_as_such(
         "CREATE TRIGGER full_disk BEFORE INSERT ON assessment"
         " FOR EACH ROW EXECUTE FUNCTION full_disk()"
     )
-    store = postgres_place.open()
-    try:
-        with pytest.raises(StoreError, match="the disk of the database is full: make room there"):
-            store.append([assessment()], [])
-        postgres_place.unguard("full_disk", "assessment")
-        store.append([assessment()], [])
-    finally:
-        store.close()
-    assert psycopg.errors.DiskFull.sqlstate == "53100"
+    with pytest.raises(StoreError, match="the disk of the database is full: make room there"):
+        postgres_store.append([assessment()], [])
+    postgres_place.unguard("full_disk", "assessment")
+    postgres_store.append([assessment()], [])

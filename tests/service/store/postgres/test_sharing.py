@@ -2,7 +2,7 @@
 
 import multiprocessing
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.synchronize import Barrier
@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 from harness.places import PostgresPlace
+from rigs.store_fixtures import Build
 
 from core.assessment import Assessment
 from service.audit.entry import Deed
 from service.origin import Origin
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError
-from service.store.postgres import PostgresStore, writer
+from service.store.postgres import PostgresStore
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
 from service.store.postgres.holding import PostgresHold
@@ -27,14 +28,12 @@ N_PROCESSES = 2
 N_WRITES = 20
 
 SPAWN = multiprocessing.get_context("spawn")
-IN_TURN = f"SELECT pg_advisory_xact_lock({writer.WRITING});"
 
 
 def write(
-    conninfo: str, head: str, number: int, made: list[Assessment], begin: str, all_there: Barrier
+    conninfo: str, head: str, number: int, made: list[Assessment], all_there: Barrier
 ) -> None:
     """Write results and deeds, as one of several."""
-    writer.BEGIN = begin
     with closing(PostgresStore(PostgresAddress(conninfo), Path(head))) as store:
         all_there.wait(60)
         for n, one in enumerate(made):
@@ -42,13 +41,13 @@ def write(
             store.audit.record([Deed(n, f"process {number}", "test.done", f"{n}")])
 
 
-def all_write(place: PostgresPlace, folder: Path, build: Callable[..., Assessment]) -> list[int]:
+def all_write(place: PostgresPlace, folder: Path, build: Build) -> list[int]:
     """Let processes write at the same time; how they have ended."""
     jobs, all_there = [], SPAWN.Barrier(N_PROCESSES)
     for number in range(N_PROCESSES):
         made = [build(1_000 * n + number, unit=f"U{n % 5}") for n in range(N_WRITES)]
         head = str(folder / str(number) / "head.json")
-        arguments = (place.address.conninfo, head, number, made, writer.BEGIN, all_there)
+        arguments = (place.address.conninfo, head, number, made, all_there)
         jobs.append(SPAWN.Process(target=write, args=arguments))
     for job in jobs:
         job.start()
@@ -58,7 +57,7 @@ def all_write(place: PostgresPlace, folder: Path, build: Callable[..., Assessmen
 
 
 def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(
-    postgres_place: PostgresPlace, tmp_path: Path, assessment: Callable[..., Assessment]
+    postgres_place: PostgresPlace, tmp_path: Path, assessment: Build
 ) -> None:
     assert all_write(postgres_place, tmp_path, assessment) == [0] * N_PROCESSES
 
@@ -71,19 +70,6 @@ def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(
         assert verdict.is_whole
         assert verdict.n_entries >= N_PROCESSES * N_WRITES
         assert not verdict.told
-
-
-@pytest.mark.planted("writers of several processes at the same time, in PostgreSQL")
-def test_writers_that_do_not_wait_for_one_another_are_caught(
-    postgres_place: PostgresPlace,
-    tmp_path: Path,
-    assessment: Callable[..., Assessment],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert IN_TURN in writer.BEGIN
-    monkeypatch.setattr(writer, "BEGIN", writer.BEGIN.replace(IN_TURN, ""))
-
-    assert any(all_write(postgres_place, tmp_path, assessment))
 
 
 def test_a_database_is_brought_up_to_date_by_one_of_two_that_open_it(
@@ -111,11 +97,10 @@ def test_a_host_that_comes_later_begins_its_head_and_says_so(
 
 
 def test_a_trail_that_was_cut_is_noticed_by_every_host(
-    postgres_place: PostgresPlace,
+    postgres_store: PostgresStore, postgres_place: PostgresPlace
 ) -> None:
-    with closing(postgres_place.open()) as store:
-        for n in range(3):
-            store.audit.record([Deed(n, "anna", "test.done", str(n))])
+    for n in range(3):
+        postgres_store.audit.record([Deed(n, "anna", "test.done", str(n))])
     with pytest.raises(postgres_place.refusal, match="kept"):
         postgres_place.execute("DELETE FROM audit WHERE number = 3")
     with pytest.raises(postgres_place.refusal, match="kept"):
@@ -127,19 +112,18 @@ def test_a_trail_that_was_cut_is_noticed_by_every_host(
 
 
 def test_a_name_is_held_by_one_and_whoever_is_refused_learns_by_whom(
-    postgres_place: PostgresPlace,
+    postgres_store: PostgresStore, postgres_place: PostgresPlace
 ) -> None:
-    with closing(postgres_place.open()) as store:
-        other = PostgresDatabase(postgres_place.address, Origin.LIVE)
-        with closing(other), store.database.hold("unit U1") as hold:
-            assert hold.is_held
-            with pytest.raises(StoreError, match="unit U1 is held by another padwatch"):
-                other.hold("unit U1").__enter__()
-            with other.hold("unit U2") as second:
-                assert second.is_held
-        with held_soon(other, "unit U1") as again:
-            assert again.is_held
-        assert not hold.is_held
+    other = PostgresDatabase(postgres_place.address, Origin.LIVE)
+    with closing(other), postgres_store.database.hold("unit U1") as hold:
+        assert hold.is_held
+        with pytest.raises(StoreError, match="unit U1 is held by another padwatch"):
+            other.hold("unit U1").__enter__()
+        with other.hold("unit U2") as second:
+            assert second.is_held
+    with held_soon(other, "unit U1") as again:
+        assert again.is_held
+    assert not hold.is_held
 
 
 @contextmanager
@@ -153,11 +137,13 @@ def held_soon(database: PostgresDatabase, name: str) -> Iterator[PostgresHold]:
     pytest.fail(f"{name} is still held")
 
 
-def test_a_holder_learns_that_it_has_lost_its_name(own_place: PostgresPlace) -> None:
-    with closing(own_place.open()) as store, store.database.hold("unit U1") as hold:
+def test_a_holder_learns_that_it_has_lost_its_name(
+    own_store: PostgresStore, own_place: PostgresPlace
+) -> None:
+    with own_store.database.hold("unit U1") as hold:
         assert hold.is_held
         own_place.server.restart()
-        with store.database.hold("unit U1") as successor:
+        with own_store.database.hold("unit U1") as successor:
             assert not hold.is_held
             assert successor.is_held
         assert not hold.is_held

@@ -1,6 +1,7 @@
 """Statements and migrations, written for PostgreSQL."""
 
 import sqlite3
+from collections.abc import Iterator
 from contextlib import closing
 
 import pytest
@@ -29,18 +30,24 @@ def test_a_trigger_of_an_unknown_shape_is_no_silent_loss() -> None:
         for_postgres("CREATE TRIGGER t INSTEAD OF DELETE ON v BEGIN SELECT 1; END;")
 
 
-def test_both_databases_have_the_same_tables_columns_and_keys(
-    postgres_place: PostgresPlace,
-) -> None:
-    with closing(sqlite3.connect(":memory:")) as file:
+@pytest.fixture
+def file() -> Iterator[sqlite3.Connection]:
+    """A SQLite database with the newest schema."""
+    with closing(sqlite3.connect(":memory:")) as opened:
         for migration in schema.MIGRATIONS:
-            file.executescript(migration)
-        named = "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
-        in_file = {
-            (table, row[1], bool(row[5]))
-            for (table,) in file.execute(named)
-            for row in file.execute(f"PRAGMA table_info({table})")
-        }
+            opened.executescript(migration)
+        yield opened
+
+
+def test_both_databases_have_the_same_tables_columns_and_keys(
+    postgres_place: PostgresPlace, file: sqlite3.Connection
+) -> None:
+    named = "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
+    in_file = {
+        (table, row[1], bool(row[5]))
+        for (table,) in file.execute(named)
+        for row in file.execute(f"PRAGMA table_info({table})")
+    }
     on_server = {
         tuple(row)
         for row in postgres_place.execute(
@@ -56,18 +63,11 @@ def test_both_databases_have_the_same_tables_columns_and_keys(
     assert on_server == in_file
 
 
-def test_every_trigger_is_there_in_both(postgres_place: PostgresPlace) -> None:
-    with closing(sqlite3.connect(":memory:")) as file:
-        for migration in schema.MIGRATIONS:
-            file.executescript(migration)
-        in_file = {
-            name
-            for (name,) in file.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'")
-        }
-    on_server = {
-        name
-        for (name,) in postgres_place.execute(
-            "SELECT tgname FROM pg_trigger WHERE NOT tgisinternal AND tgname NOT LIKE '%_all'"
-        )
-    }
-    assert on_server == in_file
+def test_every_trigger_is_there_in_both(
+    postgres_place: PostgresPlace, file: sqlite3.Connection
+) -> None:
+    in_file = file.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall()
+    on_server = postgres_place.execute(
+        "SELECT tgname FROM pg_trigger WHERE NOT tgisinternal AND tgname NOT LIKE '%_all'"
+    )
+    assert set(on_server) == set(in_file)

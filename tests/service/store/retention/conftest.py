@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from rigs.old_results import Build, life
-from rigs.rolled_trends import gather_all
+from rigs.rolled_trends import plain_and_gathered
 
 from service.store.sqlite import SqliteStore
 
@@ -17,19 +17,10 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "old.sqlite3"
 
 
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory, assessment: Build) -> dict[str, bytes]:
+@pytest.fixture(scope="session")
+def files(assessment: Build) -> dict[str, bytes]:
     """Databases with a life in them, one of them gathered."""
-    path = tmp_path_factory.mktemp("files") / "life.sqlite3"
-    found = {}
-    for name in ("plain", "gathered"):
-        with closing(SqliteStore(path)) as store:
-            if name == "plain":
-                store.append(life(assessment), [])
-            else:
-                gather_all(store)
-        found[name] = path.read_bytes()
-    return found
+    return plain_and_gathered(life(assessment))
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """What is old goes in small pieces, and nothing goes that is not kept wider."""
 
 import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,8 @@ from rigs.old_results import (
     series_of,
 )
 from rigs.rolled_trends import gather_all, n_rows
+from rigs.store_fixtures import Execute
+from rigs.tiers import covering
 
 from service.store.retention import deleting
 from service.store.retention.limits import RetentionLimits
@@ -45,22 +46,25 @@ def test_what_is_not_rolled_up_is_not_deleted(plain: SqliteStore, tmp_path: Path
     assert n_rows(tmp_path / "plain.sqlite3", "assessment") == n_before
 
 
-@pytest.mark.parametrize("width_s", [60, 600, 3600])
-@pytest.mark.parametrize(
-    "damage",
-    [
-        "DELETE FROM rollup_numbers WHERE {where}",
-        "DELETE FROM rollup_cell WHERE {where}",
-        "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE {where}",
-    ],
-)
+DAMAGES = [
+    "DELETE FROM rollup_numbers WHERE {where}",
+    "DELETE FROM rollup_cell WHERE {where}",
+    "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE {where}",
+]
+
+
+@pytest.mark.parametrize(("width_s", "damage"), covering([60, 600, 3600], DAMAGES))
 def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
-    old: SqliteStore, plain: SqliteStore, path: Path, width_s: int, damage: str
+    old: SqliteStore,
+    plain: SqliteStore,
+    path: Path,
+    execute: Execute,
+    width_s: int,
+    damage: str,
 ) -> None:
     hour_ns = T0 + 2 * HOUR_NS
     where = f"width_s = {width_s} AND start_ns >= {hour_ns} AND start_ns < {hour_ns + HOUR_NS}"
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute(damage.format(where=where))
+    execute(damage.format(where=where))
 
     delete_all(old)
     assert n_rows(path, "assessment", f"time_ns < {hour_ns}") == 0
@@ -74,16 +78,15 @@ def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
 
 
 def test_a_roll_up_that_is_damaged_when_nothing_finer_is_left_is_told(
-    old: SqliteStore, path: Path
+    old: SqliteStore, path: Path, execute: Execute
 ) -> None:
     delete_all(old, TIERS[0][0])
     assert old.retention.trouble is None
     n_before = n_rows(path, "rollup_cell", "width_s = 60")
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute(
-            "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE width_s = 60"
-            " AND start_ns = (SELECT min(start_ns) FROM rollup_cell WHERE width_s = 60)"
-        )
+    execute(
+        "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE width_s = 60"
+        " AND start_ns = (SELECT min(start_ns) FROM rollup_cell WHERE width_s = 60)"
+    )
     delete_all(old, TIERS[1][0])
 
     assert n_rows(path, "rollup_cell", "width_s = 60") == n_before
@@ -113,18 +116,25 @@ def test_each_piece_of_work_is_small(
     assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
 
 
+LETTER = (
+    "INSERT INTO outbox (receiver, event_id, alarm, number, body, queued_ns, is_urgent,"
+    " is_active, state, done_ns) VALUES ('shift', ?, ?, ?, '{}', 0, 0, 1, ?, ?)"
+)
+EVENT = (
+    "INSERT INTO alarm_event (alarm, number, unit, subject, kind, change, state_before,"
+    " state_after, time_ns, occurrence, actor, reason) VALUES"
+    " ('probe', ?, 'U1', '', 'channel_not_ok', 'raised', 'a', 'b', ?, 1, '', '')"
+)
+
+
 def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
-    path: Path, old: SqliteStore
+    path: Path, old: SqliteStore, execute: Execute
 ) -> None:
     rows = [("raised", 1, "delivered"), ("raised", 2, "delivered"), ("raised", 3, "waiting")]
     rows += [("other", 1, "refused")]
-    with closing(sqlite3.connect(path)) as connection, connection:
-        for alarm, number, state in rows:
-            connection.execute(
-                "INSERT INTO outbox (receiver, event_id, alarm, number, body, queued_ns, is_urgent,"
-                " is_active, state, done_ns) VALUES ('shift', ?, ?, ?, '{}', 0, 0, 1, ?, ?)",
-                (f"{alarm}{number}", alarm, number, state, None if state == "waiting" else T0),
-            )
+    for alarm, number, state in rows:
+        done_ns = None if state == "waiting" else T0
+        execute(LETTER, (f"{alarm}{number}", alarm, number, state, done_ns))
     limits = RetentionLimits(letters_ns=HOUR_NS)
 
     old.retention.prune(limits, T0 + HOUR_NS)
@@ -133,27 +143,16 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
 
     assert n_rows(path, "outbox", "alarm = 'raised' AND number = 1") == 0
     assert n_rows(path, "outbox") == 3
-    with closing(sqlite3.connect(path)) as connection, pytest.raises(sqlite3.IntegrityError):
-        connection.execute("DELETE FROM outbox WHERE state = 'waiting'")
+    with pytest.raises(sqlite3.IntegrityError):
+        execute("DELETE FROM outbox WHERE state = 'waiting'")
 
 
 def test_a_message_of_what_happened_lately_stays_whatever_the_clock_said_then(
-    path: Path, old: SqliteStore
+    path: Path, old: SqliteStore, execute: Execute
 ) -> None:
-    with closing(sqlite3.connect(path)) as connection, connection:
-        for number, event_ns in ((1, T0 - 2 * HOUR_NS), (2, T0), (3, T0)):
-            connection.execute(
-                "INSERT INTO alarm_event (alarm, number, unit, subject, kind, change, state_before,"
-                " state_after, time_ns, occurrence, actor, reason) VALUES"
-                " ('probe', ?, 'U1', '', 'channel_not_ok', 'raised', 'a', 'b', ?, 1, '', '')",
-                (number, event_ns),
-            )
-            connection.execute(
-                "INSERT INTO outbox (receiver, event_id, alarm, number, body, queued_ns, is_urgent,"
-                " is_active, state, done_ns)"
-                " VALUES ('shift', ?, 'probe', ?, '{}', 0, 0, 1, 'delivered', 0)",
-                (f"probe{number}", number),
-            )
+    for number, event_ns in ((1, T0 - 2 * HOUR_NS), (2, T0), (3, T0)):
+        execute(EVENT, (number, event_ns))
+        execute(LETTER, (f"probe{number}", "probe", number, "delivered", 0))
 
     old.retention.prune(RetentionLimits(letters_ns=HOUR_NS), T0 + 1)
 

@@ -1,7 +1,7 @@
 """Whatever comes late, and in whatever order things are done, hours say what was read."""
 
 import sqlite3
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rigs.memory_folder import memory_folder
 from rigs.old_results import (
     HOUR_NS,
     HOURS,
@@ -24,6 +25,7 @@ from rigs.old_results import (
     require_same_hours,
 )
 from rigs.rolled_trends import gather_all, n_rows
+from rigs.tiers import fast_and_long
 
 from service.store.retention import deleting
 from service.store.retention.limits import RetentionLimits
@@ -68,31 +70,40 @@ STEPS = st.lists(
 )
 
 
-@settings(max_examples=8, deadline=None)
-@given(STEPS, st.integers(0, 2**31))
+@pytest.mark.parametrize("n_examples", fast_and_long(6, 60))
 def test_whatever_happens_in_whatever_order_hours_say_what_was_read(
-    tmp_path_factory: pytest.TempPathFactory,
-    assessment: Build,
-    steps: list[tuple[str, int]],
-    seed: int,
+    assessment: Build, n_examples: int
 ) -> None:
-    folder, random = tmp_path_factory.mktemp("order"), np.random.default_rng(seed)
-    kept, whole = SqliteStore(folder / "kept"), SqliteStore(folder / "whole")
-    with closing(kept), closing(whole):
-        for store in (kept, whole):
-            store.append(life(assessment, 80, seed), [])
-        taken: set[int] = set()
-        for what, number in steps:
-            if what == "late" and number not in taken:
-                taken.add(number)
-                late = reading(assessment, random, T0 + number * SECOND_NS + 11)
-                for store in (kept, whole):
-                    store.append([late], [])
-            elif what == "gather":
-                gather_all(kept)
-            elif what != "late":
-                _delete_until(kept, what, number)
-            require_same_hours(kept.trend(asked(60)), whole.trend(asked(60)))
+    @settings(max_examples=n_examples, deadline=None)
+    @given(STEPS, st.integers(0, 2**31))
+    def check(steps: list[tuple[str, int]], seed: int) -> None:
+        with ExitStack() as stack:
+            folder = stack.enter_context(memory_folder())
+            kept = stack.enter_context(closing(SqliteStore(folder / "kept")))
+            whole = stack.enter_context(closing(SqliteStore(folder / "whole")))
+            require_same_through(steps, kept, whole, assessment, seed)
+
+    check()
+
+
+def require_same_through(
+    steps: list[tuple[str, int]], kept: SqliteStore, whole: SqliteStore, build: Build, seed: int
+) -> None:
+    """Do these steps with one store; the other one keeps everything."""
+    random, taken = np.random.default_rng(seed), set[int]()
+    for store in (kept, whole):
+        store.append(life(build, 80, seed), [])
+    for what, number in steps:
+        if what == "late" and number not in taken:
+            taken.add(number)
+            late = reading(build, random, T0 + number * SECOND_NS + 11)
+            for store in (kept, whole):
+                store.append([late], [])
+        elif what == "gather":
+            gather_all(kept)
+        elif what != "late":
+            _delete_until(kept, what, number)
+        require_same_hours(kept.trend(asked(60)), whole.trend(asked(60)))
 
 
 def _delete_until(store: SqliteStore, what: str, hour: int) -> None:
@@ -110,6 +121,7 @@ def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
     rolling._gather_hour(writer, series, (hour_ns, hour_ns + HOUR_NS))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("module", "name", "bug"),
     [

@@ -28,13 +28,7 @@ from service.store.value_range import ValueRange
 
 
 @pytest.mark.parametrize(("limits", "widths"), TIERS)
-@pytest.mark.parametrize(
-    "condition",
-    [
-        {},
-        {"states": (OperatingState.FULL_LOAD,)},
-    ],
-)
+@pytest.mark.parametrize("condition", [{}, {"states": (OperatingState.FULL_LOAD,)}])
 def test_trends_say_the_same_before_and_after(
     old: SqliteStore,
     plain: SqliteStore,

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +18,9 @@ from rigs.varied_results import (
     Build,
     N,
     dump,
-    life,
 )
 
+from core.assessment import Assessment
 from service.store import schema
 from service.store.port import StoreError
 from service.store.rollups import rolling
@@ -28,39 +29,40 @@ from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.migrating import migrate
 
+LONG = pytest.mark.long
+
 
 def test_what_comes_piece_by_piece_is_gathered_like_what_comes_at_once(
-    plain: SqliteStore, assessment: Build, path_of: Callable[[str], Path]
-) -> None:
-    for name, piece in (("at-once", N), ("pieces", 37)):
-        store = SqliteStore(path_of(name))
-        results = life(assessment)
-        for first in range(0, N, piece):
-            store.append(results[first : first + piece], [])
-            gather_all(store)
-        require_same(store.trend(WHOLE), plain.trend(WHOLE))
-        store.close()
-
-    assert dump(path_of("at-once")) == dump(path_of("pieces"))
-
-
-def test_a_bounded_number_of_readings_is_gathered_at_a_time(
-    assessment: Build,
+    plain: SqliteStore,
+    rolled: SqliteStore,
+    results: list[Assessment],
     path_of: Callable[[str], Path],
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    dumps = []
-    for at_once in (2, 50, 10_000):
-        monkeypatch.setattr(rolling, "MAX_READINGS", at_once)
-        store = SqliteStore(path_of(f"slow-{at_once}"))
-        store.append(life(assessment), [])
-        gather_all(store)
-        store.close()
-        dumps.append(dump(path_of(f"slow-{at_once}")))
-    assert dumps[0] == dumps[1] == dumps[2]
+    with closing(SqliteStore(path_of("pieces"))) as store:
+        for first in range(0, N, 37):
+            store.append(results[first : first + 37], [])
+            gather_all(store)
+        for found in (store, rolled):
+            require_same(found.trend(WHOLE), plain.trend(WHOLE))
+
+    assert dump(path_of("rolled")) == dump(path_of("pieces"))
 
 
-@pytest.mark.parametrize("late_min", [3, 70, 200, 254])
+@pytest.mark.parametrize("at_once", [2, 50])
+def test_a_bounded_number_of_readings_is_gathered_at_a_time(
+    at_once: int,
+    plain: SqliteStore,
+    rolled: SqliteStore,
+    path_of: Callable[[str], Path],
+    monkeypatch: Any,
+) -> None:
+    monkeypatch.setattr(rolling, "MAX_READINGS", at_once)
+    gather_all(plain)
+
+    assert dump(path_of("plain")) == dump(path_of("rolled"))
+
+
+@pytest.mark.parametrize("late_min", [3, 200, *(pytest.param(n, marks=LONG) for n in (70, 254))])
 def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     rolled: SqliteStore,
     plain: SqliteStore,
