@@ -45,11 +45,22 @@ def measure(unit: Unit) -> Measure:
     return read
 
 
-def with_bearings(unit: Unit, measurand: Measurand, **other: Any) -> Unit:
-    shafts = unit.channels[:2]
-    return replace(
-        unit, channels=(*shafts, *(Channel(id_, measurand, **other) for id_ in ("bx", "by")))
-    )
+STILL = np.full(N, 2000.0)
+
+
+@pytest.fixture
+def velocity(unit: Unit, measure: Measure) -> Callable[..., float | None]:
+    """Measures the bearing's velocity with a transducer."""
+
+    def read(
+        signal: FloatArray, measurand: Measurand, response: HighPass | None = None, **other: Any
+    ) -> float | None:
+        bearings = (Channel(id_, measurand, response=response) for id_ in ("bx", "by"))
+        there = replace(unit, channels=(*unit.channels[:2], *bearings))
+        found = measure(STILL, STILL, signal, signal, there=there, **other)
+        return found["overall_bearing_x_mm_s_rms"].value
+
+    return read
 
 
 def test_a_shaft_is_measured_from_peak_to_peak_whatever_its_frequencies(measure: Measure) -> None:
@@ -76,44 +87,28 @@ def test_the_farthest_excursion_is_that_of_the_orbit_not_of_an_axis(measure: Mea
     ],
 )
 def test_a_bearing_has_the_same_velocity_whatever_measures_it(
-    measure: Measure, unit: Unit, measurand: Measurand, per_velocity: float
+    velocity: Callable[..., float], measurand: Measurand, per_velocity: float
 ) -> None:
-    there = with_bearings(unit, measurand)
-    signal = tone(3.0 * per_velocity, 20.0)
-    found = measure(2e3 + 0 * TIME_S, 2e3 + 0 * TIME_S, signal, signal, there=there)
-
-    expected = pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
-    assert found["overall_bearing_x_mm_s_rms"].value == expected
+    found = velocity(tone(3.0 * per_velocity, 20.0), measurand)
+    assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
 
 
-def test_the_power_of_noise_is_neither_gained_nor_lost(measure: Measure, unit: Unit) -> None:
+def test_the_power_of_noise_is_neither_gained_nor_lost(velocity: Callable[..., float]) -> None:
     noise = np.random.default_rng(4).normal(size=N)  # mm/s, white up to 300 Hz
-    there = with_bearings(unit, Measurand.VELOCITY_MM_S)
-    found = measure(2e3 + 0 * TIME_S, 2e3 + 0 * TIME_S, noise, noise, there=there)
-
-    assert found["overall_bearing_y_mm_s_rms"].value == pytest.approx(1.0, rel=0.03)
+    assert velocity(noise, Measurand.VELOCITY_MM_S) == pytest.approx(1.0, rel=0.03)
 
 
-def test_what_a_transducer_takes_away_is_given_back(measure: Measure, unit: Unit) -> None:
+def test_what_a_transducer_takes_away_is_given_back(velocity: Callable[..., float]) -> None:
     corner = HighPass(0.5)
     passed = abs(complex(corner.at(np.array([TURN_HZ]))[0]))
-    there = with_bearings(unit, Measurand.VELOCITY_MM_S, response=corner)
-    signal = tone(3.0 * passed, TURN_HZ)
-    found = measure(2e3 + 0 * TIME_S, 2e3 + 0 * TIME_S, signal, signal, there=there)
-
-    expected = pytest.approx(3.0 / math.sqrt(2.0), rel=5e-3)
-    assert found["overall_bearing_x_mm_s_rms"].value == expected
+    found = velocity(tone(3.0 * passed, TURN_HZ), Measurand.VELOCITY_MM_S, corner)
+    assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=5e-3)
 
 
-def test_what_lies_outside_the_band_is_not_counted(measure: Measure, unit: Unit) -> None:
-    there = with_bearings(unit, Measurand.VELOCITY_MM_S)
+def test_what_lies_outside_the_band_is_not_counted(velocity: Callable[..., float]) -> None:
     signal = tone(3.0, 20.0) + tone(9.0, 200.0)
-    found = measure(
-        2e3 + 0 * TIME_S, 2e3 + 0 * TIME_S, signal, signal, there=there, velocity_high_hz=100.0
-    )
-
-    expected = pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
-    assert found["overall_bearing_x_mm_s_rms"].value == expected
+    found = velocity(signal, Measurand.VELOCITY_MM_S, velocity_high_hz=100.0)
+    assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
 
 
 def test_a_shaft_that_no_displacement_is_measured_of_has_none(measure: Measure, unit: Unit) -> None:

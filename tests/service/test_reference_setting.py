@@ -38,15 +38,9 @@ def newest(age_min: float = 1.0, **readings: Reading) -> StoredReadings:
     return StoredReadings(NOW - round(age_min * MINUTE), everything | readings)
 
 
-def test_two_probes_need_two_gaps() -> None:
+def test_as_many_gaps_are_needed_as_there_are_probes() -> None:
     assert given_gaps(bearing(), (1.0, 2.0), NONE) == ((1.0, 2.0), None)
-
-
-def test_four_probes_need_four_gaps() -> None:
     assert given_gaps(FOUR, (1.0, 2.0), (3.0, 4.0)) == ((1.0, 2.0), (3.0, 4.0))
-
-
-def test_three_probes_need_three_gaps() -> None:
     assert given_gaps(THREE, (1.0, 2.0), (3.0, None)) == ((1.0, 2.0), (3.0, 1901.0))
 
 
@@ -95,9 +89,6 @@ def test_opposite_gaps_are_measured_where_there_are_probes() -> None:
 def test_gaps_that_are_old_or_unusable_are_refused(found: StoredReadings | None, said: str) -> None:
     with pytest.raises(ReferenceRefusedError, match=said):
         measured_gaps(bearing(), found, NOW)
-
-
-def test_an_opposite_gap_that_is_lost_is_refused() -> None:
     with pytest.raises(ReferenceRefusedError, match=r"opposite_gap_y_um .* not_measured"):
         measured_gaps(FOUR, newest(opposite_gap_x_um=Reading(7.0)), NOW)
 

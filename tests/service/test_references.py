@@ -163,20 +163,13 @@ async def test_while_the_store_cannot_be_read_the_references_stay(
     assert [line["log_level"] for line in logged] == ["info", "error", "info", "info"]
 
 
-def test_a_reference_without_opposite_gaps_leaves_those_of_the_plant_file() -> None:
+def test_opposite_gaps_are_taken_over_where_there_are_such_gaps_and_such_probes() -> None:
+    both = GapReference("U1", "UJB", 7, "A. Name", (1e3, 2e3), (3e3, 4e3), ReferenceSource.MEASURED)
     four = bearing_named(
         "UJB", opposite_x="fx", opposite_y="fy", opposite_reference_um=(1.9e3, 2e3)
     )
 
     assert with_reference(four, reference()).opposite_reference_um == (1.9e3, 2e3)
     assert with_reference(four, reference()).gap_reference_um == (1998.5, 2003.1)
-
-
-def test_opposite_gaps_are_taken_over_by_a_bearing_with_opposite_probes_alone() -> None:
-    both = GapReference("U1", "UJB", 7, "A. Name", (1e3, 2e3), (3e3, 4e3), ReferenceSource.MEASURED)
-    four = bearing_named(
-        "UJB", opposite_x="fx", opposite_y="fy", opposite_reference_um=(1.9e3, 2e3)
-    )
-
     assert with_reference(four, both).opposite_reference_um == (3e3, 4e3)
     assert with_reference(bearing_named("UJB"), both).opposite_reference_um is None

@@ -57,6 +57,10 @@ def test_what_was_judged_once_is_judged_the_same_again(
         ({"alert": 150.0, "deadband": 150.0}, "deadband 150 must be"),
         ({"alert": 150.0, "deadband": -1.0}, "deadband -1"),
         ({"alert": 150.0, "deadband": math.nan}, "deadband nan"),
+        ({"alert_below": 0.0}, "limit 0 must be"),
+        ({"alert_below": 400.0, "danger_below": 400.0}, "danger_below 400 must be below"),
+        ({"alert_below": 500.0, "alert": 500.0}, "lower limit 500 must be below upper limit 500"),
+        ({"alert_below": 400.0, "alert": 500.0, "deadband": 50.0}, "deadband 50 must be"),
     ],
 )
 def test_limits_that_make_no_sense_are_refused(limits: dict[str, float], words: str) -> None:

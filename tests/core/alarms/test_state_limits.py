@@ -40,22 +40,6 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_again() -> None:
     assert judge(Reading(411.0), GAP, DANGER).level is ALERT
 
 
-@pytest.mark.parametrize(
-    ("limits", "words"),
-    [
-        ({"alert_below": 0.0}, "limit 0 must be"),
-        ({"alert_below": 400.0, "danger_below": 400.0}, "danger_below 400 must be below"),
-        ({"alert_below": 500.0, "alert": 500.0}, "lower limit 500 must be below upper limit 500"),
-        ({"alert_below": 400.0, "alert": 500.0, "deadband": 50.0}, "deadband 50 must be"),
-    ],
-)
-def test_limits_that_contradict_each_other_are_refused(
-    limits: dict[str, float], words: str
-) -> None:
-    with pytest.raises(ValueError, match=words):
-        Limits(**limits)
-
-
 def test_the_limits_of_the_present_state_count() -> None:
     found = StateLimits(((frozenset({FULL}), Limits(100.0)), (frozenset({PART}), Limits(150.0))))
 
