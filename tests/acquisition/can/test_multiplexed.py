@@ -85,15 +85,16 @@ def test_a_lost_part_drops_the_instant(dbc, counts_calibration):
     assert blocks[1].rejected == (Rejection("incomplete_frames", 1),)
 
 
-def test_one_channel_cannot_have_samples_of_two_parts(dbc, counts_calibration):
-    wrong = settings(dbc, channels=(CanChannel("a", "um", ("M.a", "M.c")),))
-    with pytest.raises(ConfigError, match="must all be in one message"):
-        compile_plan(wrong, counts_calibration(1, n_slow=0))
-
-
-def test_a_common_signal_cannot_be_a_channel(dbc, counts_calibration):
-    wrong = settings(dbc, channels=(CanChannel("a", "um", ("M.count",)),))
-    with pytest.raises(ConfigError, match="in every frame of a multiplexed message"):
+@pytest.mark.parametrize(
+    ("signals", "words"),
+    [
+        (("M.a", "M.c"), "must all be in one message"),
+        (("M.count",), "in every frame of a multiplexed message"),
+    ],
+)
+def test_a_channel_has_samples_of_one_part(signals, words, dbc, counts_calibration):
+    wrong = settings(dbc, channels=(CanChannel("a", "um", signals),))
+    with pytest.raises(ConfigError, match=words):
         compile_plan(wrong, counts_calibration(1, n_slow=0))
 
 

@@ -67,24 +67,21 @@ async def test_a_controller_that_leaves_the_bus_is_a_lost_link(
 
 
 @pytest.mark.parametrize(
-    "frame", [error_frame(0x04, 0, 0x04), error_frame(0x88), error_frame(0x100), error_frame(0x20)]
+    ("frame", "overflow"),
+    [
+        *((error_frame(bits), {}) for bits in (0x88, 0x100, 0x20)),
+        (error_frame(0x04, 0, 0x04), {}),
+        (error_frame(0x04, 0, 0x01), {"queue_overflow": 1}),
+    ],
 )
 async def test_lesser_errors_and_a_restarted_controller_are_only_counted(
-    frame, fake_bus_source, fake_bus, device
+    frame, overflow, fake_bus_source, fake_bus, device
 ):
     async with fake_bus_source.connect() as stream:
         fake_bus.messages.put(frame)
         send_block(device, fake_bus)
         await anext(stream)
-    assert fake_bus_source.refused_frames == {"error_frame": 1}
-
-
-async def test_an_overflow_in_the_controller_is_counted_as_such(fake_bus_source, fake_bus, device):
-    async with fake_bus_source.connect() as stream:
-        fake_bus.messages.put(error_frame(0x04, 0, 0x01))
-        send_block(device, fake_bus)
-        await anext(stream)
-    assert fake_bus_source.refused_frames == {"error_frame": 1, "queue_overflow": 1}
+    assert fake_bus_source.refused_frames == {"error_frame": 1} | overflow
 
 
 async def test_an_interface_that_says_it_is_in_error_is_a_lost_link(fake_bus_source, fake_bus):

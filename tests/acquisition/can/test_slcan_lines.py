@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import serial
 
-from acquisition.can.slcan import SlcanBus, open_slcan
+from acquisition.can.slcan import open_slcan
 from acquisition.daq.can_frames import FD_LENGTHS, WireFrame
 from acquisition.daq.can_slcan import slcan_line
 
@@ -166,25 +166,6 @@ def test_a_malformed_line_never_becomes_a_frame_and_the_next_one_does(kind, wire
     assert wire.bus.take_n_malformed() == N_KINDS
 
 
-@pytest.mark.parametrize(
-    ("line", "what"),
-    [(b"t1008AABB\r", "accepted"), (b"t100400112233AABBCC\r", "accepted"), (b"t10Z0\r", "trips")],
-)
-def test_python_can_alone_accepts_it_or_trips_over_it(line, what):
-    """Why there is a reader of our own; if python-can becomes strict, it may go."""
-    master, slave = os.openpty()
-    bus = can.Bus(os.ttyname(slave), interface="slcan", sleep_after_open=0.0, ignore_config=True)
-    os.write(master, line)
-    if what == "accepted":
-        assert bus.recv(0.1) is not None
-    else:
-        with pytest.raises(ValueError, match="invalid literal"):
-            bus.recv(0.1)
-    bus.shutdown()
-    os.close(master)
-    os.close(slave)
-
-
 def test_answers_of_an_adapter_are_no_frames_and_no_errors(wire):
     wire.say(b"\r\a\rz\rZ\rV1013\rvABCD\rNA123\rF00\r")
     assert wire.heard() == []
@@ -250,7 +231,3 @@ def test_a_port_whose_commands_fail_is_not_left_open(monkeypatch):
     assert not opened[0].is_open
     os.close(master)
     os.close(slave)
-
-
-def test_the_bus_is_python_cans_own():
-    assert issubclass(SlcanBus, can.interfaces.slcan.slcanBus)

@@ -108,7 +108,7 @@ def test_frames_are_counted(assembler):
     assert_true_samples(blocks)
 
 
-@pytest.mark.parametrize("n_lost", [1, 7, 600, 5000])
+@pytest.mark.parametrize("n_lost", [1, 7, 600, 36_000])
 def test_a_loss_is_found_by_the_clock_flagged_and_counted(n_lost, assembler):
     blocks = run(assembler, 0, 1200)
     blocks += run(assembler, 1200 + n_lost, 3600 + n_lost)
@@ -262,29 +262,3 @@ def test_a_told_restart_begins_a_new_epoch_at_zero(assembler):
     second = [b for b in blocks if b.epoch == 2]
     assert (second[0].first_index, second[-1].stop_index) == (0, 600)
     assert second[0].slow == (45.0,)
-
-
-def test_a_reconnection_is_a_loss_of_the_time_it_took(assembler):
-    blocks = run(assembler, 0, 600)
-    blocks += run(assembler, 600 + 36_000, 600 + 36_000 + 1800)
-    assert_never_joined_over_a_loss(blocks)
-    assert blocks[-1].stop_index == 600 + 36_000 + 1800
-
-
-def test_an_epoch_without_counter_beside_counters_is_refused(
-    settings, counts_calibration, tmp_path
-):
-    dbc = tmp_path / "mixed.dbc"
-    text = DBC.replace('"V" N\nBO_ 545', '"V" N\n SG_ c : 0|8@1+ (1,0) [0|0] "" N\nBO_ 545')
-    dbc.write_text(text.replace("SG_ s0 : 0|16", "SG_ s0 : 8|8"))
-    assert "SG_ c" in dbc.read_text()
-    changed = CanSettings(
-        **{
-            **vars(settings),
-            "dbc": dbc,
-            "channels": (CanChannel("c0", "um", ("M1.s1",)),),
-            "counters": ("M1.s2",),
-        }
-    )
-    with pytest.raises(ConfigError, match=r"unsigned integer|no counter"):
-        compile_plan(changed, counts_calibration(n_channels=1, n_slow=1))

@@ -53,12 +53,12 @@ def numbered_block(first_index: int, n_samples: int, epoch: int = 1, **changes: 
     return RawBlock(**(values | changes))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def unit() -> RecordedUnit:
     return recorded_unit()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def numbered() -> Callable[..., RawBlock]:
     """Builds blocks; keywords replace fields."""
     return numbered_block

@@ -58,22 +58,6 @@ async def test_a_paced_source_delivers_samples_when_they_have_happened(
     assert clock.elapsed_s == pytest.approx(2.0)
 
 
-async def test_what_passed_while_nobody_was_connected_shows_as_a_jump_of_the_index(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
-) -> None:
-    in_halves = replace(calibration, block_samples=300)
-    source = SimulatedSource(build_unit(full_load), in_halves, clock)
-    before = await take(source, 2)
-    clock.elapsed_s += 300.0
-
-    after = await take(source, 1)
-
-    assert before[-1].stop_index == 600
-    assert after[0].first_index == 600 + 300 * 600
-    assert after[0].start_ns - before[0].start_ns == 301 * 1_000_000_000
-    assert clock.elapsed_s == pytest.approx(1.0 + 300.0 + 0.5)
-
-
 async def test_a_slow_reader_of_a_paced_source_loses_nothing(
     build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
 ) -> None:
