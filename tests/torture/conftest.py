@@ -7,6 +7,8 @@ import pytest
 from harness import summary
 from harness.ledger_daq import LedgerDaq, ledger_daq
 from harness.ledger_plant import LedgerPlant
+from harness.watch import PERIOD_S
+from rigs.memory_folder import memory_folder
 
 N_SHORT = 25
 """By how much the short torture of every test run is less than the whole one."""
@@ -67,10 +69,26 @@ def is_whole(pytestconfig: pytest.Config) -> bool:
 
 
 @pytest.fixture
+def tmp_path(tmp_path: Path, is_whole: bool) -> Iterator[Path]:
+    """Folder of a test: in memory where the whole torture is not asked for, which syncs quickly."""
+    if is_whole:
+        yield tmp_path
+        return
+    with memory_folder() as folder:
+        yield folder
+
+
+@pytest.fixture
 def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
     """A DAQ of the test's plant; it goes on offering samples whatever happens to the service."""
     with ledger_daq(plant, tmp_path) as running:
         yield running
+
+
+@pytest.fixture
+def period_s(is_whole: bool) -> float:
+    """Time between two questions of a client, which cost most of the short torture."""
+    return PERIOD_S if is_whole else 3.0 * PERIOD_S
 
 
 @pytest.fixture

@@ -46,12 +46,13 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
     tmp_path: Path,
     is_whole: bool,
     torture_seed: int,
+    period_s: float,
     figure: Callable[[str], None],
 ) -> None:
     rng = np.random.default_rng(torture_seed)
     states = STATES if is_whole else FEW
     seen = {state: Seen() for state in states}
-    with bench_of(plant, tmp_path, torture_seed, LINK_ALARM) as bench:
+    with bench_of(plant, tmp_path, torture_seed, LINK_ALARM, period_s=period_s) as bench:
         for _ in range(N_ROUNDS if is_whole else 1):
             for state in states:
                 bench.links.become(state)

@@ -5,19 +5,18 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from harness.corruption import CHANGES, corrupted
 from harness.deeds import Build
 from harness.everything import Rows, fill, served
+from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
-from acquisition.raw import RawBlock
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
 from acquisition.recording.reader import open_recording
 from acquisition.recording.writer import RecordingWriter
-from core.machine import Measurand
 from service.store.port import StoreError
 from service.store.seals.table import SealedTable
 from service.store.sqlite import SqliteStore
@@ -127,30 +126,13 @@ def test_a_store_without_seals_is_found_out(
     pytest.fail("nobody noticed that there are no seals")
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
+@pytest.fixture
+def recording(tmp_path: Path, counting_feed: Any, counts_calibration: Any) -> tuple[Path, bytes]:
     """A recording, and all its samples."""
-    folder = tmp_path_factory.mktemp("recording") / "run"
-    channels = tuple(
-        RecordedChannel(
-            id=f"c{n}",
-            measurand=Measurand.VELOCITY_MM_S,
-            full_scale_v=10.0,
-            unit_per_v=1.0,
-            ok_min_v=-9.0,
-            ok_max_v=9.0,
-        )
-        for n in range(3)
-    )
-    writer = RecordingWriter(
-        folder, RecordedUnit(unit="U1", rate_hz=600.0, channels=channels, slow_channels=()), "test"
-    )
-    rng = np.random.default_rng(5)
-    for n in range(40):
-        counts = rng.integers(-30000, 30000, (3, 50)).astype(np.int16)
-        start_ns = 1_767_225_600_000_000_000 + round(n * 50 / 600 * 1e9)
-        writer.write(RawBlock(3, 50 * n, start_ns, 600.0, counts, (True,) * 3, ()))
-    writer.finish()
+    folder, feed = tmp_path / "whole", counting_feed(3)
+    with RecordingWriter(folder, recorded(counts_calibration(3)), "test") as writer:
+        for _ in range(40):
+            writer.write(feed.advance(50))
     return folder, read(folder)
 
 

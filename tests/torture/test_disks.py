@@ -38,12 +38,13 @@ def test_a_full_disk_costs_nothing_that_was_promised(
     daq: LedgerDaq,
     tmp_path: Path,
     is_whole: bool,
+    period_s: float,
     figure: Callable[[str], None],
 ) -> None:
     plant_file = tmp_path / "plant.toml"
     with small_disk(tmp_path / "small", DISK_MIB) as disk, ServiceRig(plant_file) as rig:
         plant.write(plant_file, disk.folder / "data", daq.ports, STORE_ALARM)
-        bench = Bench(plant, daq, rig, plant_file)
+        bench = Bench(plant, daq, rig, plant_file, period_s)
         bench.begin()
         bench.watch.wait_for_result()
         n_cycles = N_CYCLES if is_whole else N_FEW

@@ -57,6 +57,14 @@ def empty(tmp_path: Path) -> Path:
     return folder
 
 
+def run_on_copy(calls: FailingCalls, base: Path, *inject: str) -> Outcome:
+    """Let a process work in a copy of a folder, which lies beside it."""
+    folder = base.with_name("case")
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(base, folder)
+    return calls.run(folder, *inject)
+
+
 def all_cases(tape: Path) -> list[Case]:
     """Every call of a run that may fail, in every way."""
     return [
@@ -89,17 +97,14 @@ def require_all_or_nothing(
 ) -> str:
     """Let chosen calls fail, n of them or all, each on a copy of a folder; says what was done."""
     folder = base.with_name("case")
-    shutil.copytree(base, folder)
-    undisturbed = calls.run(folder)
+    undisturbed = run_on_copy(calls, base)
     assert (undisturbed.exit_code, undisturbed.errors) == (0, ())
     cases = all_cases(folder / "tape")
     rng = np.random.default_rng(seed)
     chosen = range(len(cases)) if n is None else rng.choice(len(cases), n, replace=False).tolist()
     n_failed = 0
     for case in (cases[i] for i in sorted(chosen)):
-        shutil.rmtree(folder)
-        shutil.copytree(base, folder)
-        outcome = calls.run(folder, str(case))
+        outcome = run_on_copy(calls, base, str(case))
         assert outcome.exit_code in ((0, GAVE_UP) if case.is_for_ever else (0,)), (case, outcome)
         assert wrong(folder, outcome, seed, build) is None, (case, outcome)
         n_failed += bool(outcome.errors)
@@ -139,13 +144,9 @@ def test_whatever_call_fails_a_new_database_is_made_all_the_same(
 
 def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") -> Outcome:
     """Let no call of a kind succeed any more, half way."""
-    folder = base.with_name("case")
-    shutil.copytree(base, folder)
-    calls.run(folder)
-    n = n_calls(folder / "tape", call)
-    shutil.rmtree(folder)
-    shutil.copytree(base, folder)
-    return calls.run(folder, str(Case(call, "EIO", n // 2, True)))
+    run_on_copy(calls, base)
+    n = n_calls(base.with_name("case") / "tape", call)
+    return run_on_copy(calls, base, str(Case(call, "EIO", n // 2, True)))
 
 
 def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
@@ -181,12 +182,9 @@ def test_planted_bugs_are_found(
 
 def stopped_between(calls: FailingCalls, base: Path) -> Outcome:
     """Let syncs fail for ever from the second transaction of a deed on."""
-    folder = base.with_name("case")
     for number in range(2, 40):
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(base, folder)
-        outcome = calls.run(folder, str(Case("fdatasync", "EIO", number, True)))
-        with closing(SqliteStore(folder / "data" / DATABASE)) as store:
+        outcome = run_on_copy(calls, base, str(Case("fdatasync", "EIO", number, True)))
+        with closing(SqliteStore(base.with_name("case") / "data" / DATABASE)) as store:
             n_gaps = len(store.gaps("U1", 0, 2**62))
             if n_gaps > len(store.alarms()):
                 return outcome

@@ -33,12 +33,13 @@ def test_a_killed_service_has_kept_what_it_has_shown(
     tmp_path: Path,
     torture_seed: int,
     is_whole: bool,
+    period_s: float,
     figure: Callable[[str], None],
 ) -> None:
     plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
     rng = np.random.default_rng(torture_seed)
     with ServiceRig(plant_file) as rig:
-        bench = Bench(plant, daq, rig, plant_file)
+        bench = Bench(plant, daq, rig, plant_file, period_s)
         if is_whole:
             done = kill_cycles(bench, N_CYCLES, rng, trouble=partial(also, daq))
         else:

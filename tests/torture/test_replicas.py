@@ -11,8 +11,9 @@ from harness.ledger_plant import LedgerPlant
 from harness.nats_cluster import nats_cluster
 from harness.nats_server import nats_server_command
 from harness.postgres_server import PostgresServer, why_not
-from harness.replicas import Replicas, chain, chance, replicas, until_answered
-from harness.watch import silent_healthy, silent_healthy_s
+from harness.replicas import Replicas, chain, chance, replicas
+from harness.service_rig import until
+from harness.watch import silent_healthy_s
 
 N_ROUNDS, N_KILLS = 5, 10
 """Fifty of each kind, looked at after every ten: what is wrong is found where it happened."""
@@ -41,7 +42,7 @@ def plant(seed: int) -> LedgerPlant:
 def whole(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Replicas]:
     """The whole chain: it takes six programs and three servers of a stream."""
     if nats_server_command() is None:
-        pytest.skip("no nats-server is installed")
+        pytest.skip("needs nats-server")
     with (
         PostgresServer() as postgres,
         nats_cluster(tmp_path / "nats") as cluster,
@@ -104,7 +105,9 @@ def kill_in_turn(
         chance(rng, LIFE_S, LONGEST_S)
         does[kind](number)
         print(f"{number + 1} of {len(order)}: {kind}", flush=True)
-    assert all(until_answered(rig, "/readyz") for rig in running.serving)
+    for rig in running.serving:
+        with rig.api() as api:
+            until(lambda api=api: api.get("/readyz"))
     running.wait_for_result()
     running.act(len(order))
     running.stop()
@@ -112,9 +115,6 @@ def kill_in_turn(
     watch, offered = running.whole_watch(), running.daq.offered()
     found = check(running.plant, running.plant_file, offered, running.lives, watch)
     silent_s = sum(silent_healthy_s(running.plant, offered, w.looks) for w in running.watches)
-    for watch_of_one in running.watches:
-        for line in silent_healthy(running.plant, offered, watch_of_one.looks):
-            print(line)
     rows = "".join(f"\n  {name:<32}{value}" for name, value in found.counts.items())
     figure(
         f"killed or restarted, {N_KILLS} times each: {', '.join(does)}{rows}"

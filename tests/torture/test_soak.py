@@ -26,7 +26,7 @@ averaging windows and the bundles of evidence still fill, and a slope says nothi
 
 MAX_MIB, MAX_FILES, MAX_THREADS = 450.0, 100, 40
 """What the service ever takes, however short the soak. It takes about 370 MiB, 45 files and 13
-threads after 20 minutes and after 80. In five minutes a leak of one block in ten exceeds this, and
+threads after 20 minutes and after 80. In five minutes a leak of one block in five exceeds this, and
 so does one file for each of 300 alarms."""
 
 FEW_BUNDLES = "[evidence]\nmax_per_alarm = 3\n"

@@ -28,7 +28,7 @@ def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_p
     figure: Callable[[str], None],
 ) -> None:
     if nats_server_command() is None:
-        pytest.skip("no nats-server is installed")
+        pytest.skip("needs nats-server")
     rng = np.random.default_rng(torture_seed)
     with nats_server(tmp_path / "nats") as server, ledger_daq(PLANT, tmp_path) as daq:
         stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 2.0\n'

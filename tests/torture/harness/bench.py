@@ -167,6 +167,7 @@ class BadLinkBench(Bench):
         extra: str = "",
         wrong_s: float = 0.0,
         time_zone: str = "UTC",
+        period_s: float = PERIOD_S,
     ) -> None:
         self.links = links
         self._wall_clock = folder / "wall-clock"
@@ -174,7 +175,7 @@ class BadLinkBench(Bench):
         plant_file = plant.write(folder / "plant.toml", folder / "data", links.ports, extra)
         environment = {"WALL_CLOCK": str(self._wall_clock), "TZ": time_zone}
         rig = ServiceRig(plant_file, "harness.stepped_service", environment=environment)
-        super().__init__(plant, daq, rig, plant_file)
+        super().__init__(plant, daq, rig, plant_file, period_s)
 
     def step(self, wrong_s: float) -> None:
         """Let the service's wall clock be wrong by so much from now on."""
@@ -190,6 +191,7 @@ def bench_of(
     extra: str = "",
     wrong_s: float = 0.0,
     time_zone: str = "UTC",
+    period_s: float = PERIOD_S,
 ) -> Iterator[BadLinkBench]:
     """Build a bench with bad links, and let it run.
 
@@ -201,7 +203,7 @@ def bench_of(
         Error of the service's wall clock.
     """
     with ledger_daq(plant, folder) as daq, bad_links(daq.ports, seed) as links:
-        bench = BadLinkBench(plant, daq, links, folder, extra, wrong_s, time_zone)
+        bench = BadLinkBench(plant, daq, links, folder, extra, wrong_s, time_zone, period_s)
         with bench.rig:
             try:
                 bench.begin()

@@ -1,7 +1,8 @@
 """A plant whose results lie in PostgreSQL: processes that bring results, and two that serve."""
 
 import time
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.nats_cluster import NatsCluster
 from harness.postgres_server import PostgresServer
-from harness.service_rig import PATIENCE_S, UNREACHABLE, RefusedError, ServiceRig
+from harness.service_rig import PATIENCE_S, ServiceRig
 from harness.watch import Watch
 
 STREAM = """
@@ -62,10 +63,7 @@ class Replicas:
     def start(self) -> None:
         """Start all, those that serve last."""
         self._note_life()
-        for rig in (*self.acquiring, *self.analysis):
-            rig.start()
-        for rig in (*self.acquiring, *self.analysis):
-            rig.wait_ready()
+        _start([*self.acquiring, *self.analysis])
         for rig, watch in zip(self.serving, self.watches, strict=True):
             rig.start()
             rig.wait_ready()
@@ -77,15 +75,13 @@ class Replicas:
         rig.kill()
         if self.begins_anew:
             self._note_life()
-        rig.start()
-        rig.wait_ready()
+        _start([rig])
 
     def kill_acquiring(self, number: int) -> None:
         """Kill one that acquires; it is started again."""
         rig = self.acquiring[number % len(self.acquiring)]
         rig.kill()
-        rig.start()
-        rig.wait_ready()
+        _start([rig])
 
     def kill_node(self, number: int) -> None:
         """Kill one of three servers of the stream; it is started again."""
@@ -117,15 +113,14 @@ class Replicas:
             if rig.process is not None and rig.process.poll() is not None:
                 self.n_restarts += 1
                 rig.kill()
-                rig.start()
-                rig.wait_ready()
+                _start([rig])
 
     def wait_for_result(self) -> None:
         """Wait until a result is shown that nobody has seen yet."""
         end_s = time.monotonic() + PATIENCE_S
         for watch in self.watches:
-            n_before = _n_shown(watch)
-            while _n_shown(watch) == n_before:
+            n_before = watch.n_shown
+            while watch.n_shown == n_before:
                 self.supervise()
                 if time.monotonic() > end_s:
                     raise AssertionError(f"no result: {self.analysis[0].newest_log()}")
@@ -155,27 +150,22 @@ class Replicas:
             self.lives.setdefault(unit, []).append(n)
 
 
+def _start(rigs: Sequence[ServiceRig]) -> None:
+    """Start some processes, and wait until all are ready."""
+    for rig in rigs:
+        rig.start()
+    for rig in rigs:
+        rig.wait_ready()
+
+
 @contextmanager
 def replicas(
     plant: LedgerPlant, folder: Path, daq: LedgerDaq, postgres: PostgresServer
 ) -> Iterator[Replicas]:
     """One `padwatch run` over PostgreSQL, and two `padwatch serve`."""
-    extra = STORE.format(conninfo=postgres.create("plant"))
-    plant_file = plant.write(folder / "plant.toml", folder / "data", daq.ports, extra)
-    with ExitStack() as running:
-        analysis = running.enter_context(ServiceRig(plant_file))
-        serving = []
-        for number in (1, 2):
-            # a folder of its own each, as on a host of its own
-            own = plant.write(
-                folder / f"serve{number}.toml", folder / f"serve{number}", daq.ports, extra
-            )
-            rig = ServiceRig(own, role=("serve",), log=f"serve{number}.log")
-            serving.append(running.enter_context(rig))
-        watches = [Watch(plant, daq.offered) for _ in serving]
-        yield Replicas(plant, plant_file, daq, postgres, [analysis], serving, watches, {})
-        for watch in watches:
-            watch.end()
+    roles = {"run": ("run",), "serve1": ("serve",), "serve2": ("serve",)}
+    with _processes(plant, folder, daq, postgres, roles) as found:
+        yield found
 
 
 @contextmanager
@@ -188,7 +178,6 @@ def chain(
 ) -> Iterator[Replicas]:
     """`padwatch acquire`, two `padwatch analyse` and two `padwatch serve`, over three nodes."""
     servers = ", ".join(f'"{url}"' for url in cluster.urls)
-    extra = STREAM.format(servers=servers) + STORE.format(conninfo=postgres.create("plant"))
     roles = {
         "acquire": ("acquire",),
         "analyse1": ("analyse", "--partition", "1/2"),
@@ -196,41 +185,39 @@ def chain(
         "serve1": ("serve",),
         "serve2": ("serve",),
     }
+    stream = STREAM.format(servers=servers)
+    with _processes(plant, folder, daq, postgres, roles, stream) as found:
+        found.begins_anew, found.cluster = False, cluster
+        yield found
+
+
+@contextmanager
+def _processes(
+    plant: LedgerPlant,
+    folder: Path,
+    daq: LedgerDaq,
+    postgres: PostgresServer,
+    roles: Mapping[str, tuple[str, ...]],
+    stream: str = "",
+) -> Iterator[Replicas]:
+    """Processes by name, each with a folder of its own, as on a host of its own."""
+    extra = stream + STORE.format(conninfo=postgres.create("plant"))
+    rigs: dict[str, list[ServiceRig]] = defaultdict(list)
     with ExitStack() as running:
-        rigs = {}
         for name, role in roles.items():
             own = plant.write(folder / f"{name}.toml", folder / name, daq.ports, extra)
             rig = ServiceRig(own, role=role, log=f"{name}.log")
-            rigs[name] = running.enter_context(rig)
-        serving = [rigs["serve1"], rigs["serve2"]]
-        analysis = [rigs["analyse1"], rigs["analyse2"]]
+            rigs[role[0]].append(running.enter_context(rig))
+        serving, analysis = rigs["serve"], [*rigs["run"], *rigs["analyse"]]
         watches = [Watch(plant, daq.offered) for _ in serving]
-        one = folder / "serve1.toml"
-        found = Replicas(plant, one, daq, postgres, analysis, serving, watches, {})
-        found.begins_anew, found.acquiring, found.cluster = False, [rigs["acquire"]], cluster
-        yield found
         for watch in watches:
-            watch.end()
-
-
-def _n_shown(watch: Watch) -> int:
-    return sum(len(values) for values in list(watch.shown.values()))
+            running.callback(watch.end)
+        one = folder / ("run.toml" if rigs["run"] else "serve1.toml")
+        found = Replicas(plant, one, daq, postgres, analysis, serving, watches, {})
+        found.acquiring = rigs["acquire"]
+        yield found
 
 
 def chance(rng: np.random.Generator, mean_s: float, most_s: float) -> None:
     """Let a random time pass."""
     time.sleep(min(rng.exponential(mean_s), most_s))
-
-
-def until_answered(rig: ServiceRig, path: str) -> bool:
-    """Whether a path is answered in good time."""
-    end_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end_s:
-        try:
-            with rig.api() as api:
-                api.get(path)
-        except (*UNREACHABLE, RefusedError):
-            time.sleep(0.1)
-        else:
-            return True
-    return False

@@ -73,12 +73,13 @@ class Watch:
 
     def wait_for_result(self, within_s: float = PATIENCE_S) -> None:
         """Wait until a result has been shown as stored that had not been shown before."""
-        n_before, end_s = self._n_shown, time.monotonic() + within_s
-        while self._n_shown == n_before and time.monotonic() < end_s:
+        n_before, end_s = self.n_shown, time.monotonic() + within_s
+        while self.n_shown == n_before and time.monotonic() < end_s:
             time.sleep(0.02)
 
     @property
-    def _n_shown(self) -> int:
+    def n_shown(self) -> int:
+        """Number of results that were shown as stored."""
         return sum(len(values) for values in list(self.shown.values()))
 
     def end(self) -> None:
@@ -147,22 +148,9 @@ def silent_healthy_s(plant: LedgerPlant, offered: Offered, looks: list[Look]) ->
         last_ns[key] = look.at_ns
         if _is_wrong(plant, offered, look):
             total_s += min(max(since_ns / NS_PER_S, PERIOD_S), 1.0)
+            age_ns = look.at_ns - offered.offered_ns(look.unit, _stop(plant, offered, look))
+            print(f"{look}: {age_ns / NS_PER_S:.2f} s old, at most {detect_s(plant):.2f}")
     return total_s
-
-
-def silent_healthy(plant: LedgerPlant, offered: Offered, looks: list[Look]) -> list[str]:
-    """What was shown as current and good and was not: a line each, for who looks for causes."""
-    lines = []
-    for look in sorted(looks, key=lambda one: one.at_ns):
-        if _is_wrong(plant, offered, look):
-            age_s = (
-                look.at_ns - offered.offered_ns(look.unit, _stop(plant, offered, look))
-            ) / NS_PER_S
-            lines.append(
-                f"{look.at_ns} {look.unit} {look.bearing} good={look.is_good}:"
-                f" samples {age_s:.2f} s old, at most {detect_s(plant):.2f}"
-            )
-    return lines
 
 
 def _stop(plant: LedgerPlant, offered: Offered, look: Look) -> int:
