@@ -1,13 +1,17 @@
 """The API over a real store and a real monitor, fed by the simulated plant, asked in process."""
 
 import asyncio
+import shutil
 from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
+from fastapi import FastAPI
 from rigs.probes import Probes
 
 from acquisition.calibration import calibrate
@@ -87,14 +91,28 @@ class Service:
     store: SqliteStore
     clock: SetClock
     references: ReferencesInForce
-    client: httpx2.AsyncClient
-    document: dict[str, Any]
     alarms: AlarmEngine
     recorder: Recorder
     evidence: EvidenceKeeper
     films: FilmKeeper
     loops: dict[str, str | None]
     context: Context
+
+    @cached_property
+    def app(self) -> FastAPI:
+        """The application, built for the first test that sends a request to it."""
+        return create_app(self.context)
+
+    @cached_property
+    def client(self) -> httpx2.AsyncClient:
+        """A browser on the same computer."""
+        transport = httpx2.ASGITransport(self.app)
+        return httpx2.AsyncClient(transport=transport, base_url="http://padwatch")
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The published description of the API."""
+        return self.app.openapi()
 
     async def get(self, path: str, **parameters: object) -> httpx2.Response:
         return await self.client.get(path, params=parameters)
@@ -109,6 +127,9 @@ class Service:
         response = await self.get(path, **parameters)
         assert response.status_code == status, response.text
         return problem_of(response)
+
+
+Serve = Callable[[PlantFile, Path], Service]
 
 
 def problem_of(response: httpx2.Response) -> dict[str, Any]:
@@ -134,24 +155,8 @@ def with_folder(plant: PlantFile, folder: Path) -> PlantFile:
     return plant.model_copy(update={"service": service})
 
 
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(tmp_path / "padwatch.sqlite3")
-    yield opened
-    opened.close()
-
-
-@pytest.fixture(scope="session")
-def documents() -> list[dict[str, Any]]:
-    """The description of the API, once it was made: it is the same for every test, and costly."""
-    return []
-
-
-@pytest.fixture
-async def service(
-    plant: PlantFile, store: SqliteStore, tmp_path: Path, documents: list[dict[str, Any]]
-) -> AsyncIterator[Service]:
-    """A service that has just started: nothing is connected, nothing stored."""
+async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
+    """Build a service that has just started: nothing is connected, nothing recorded yet."""
     clock = SetClock()
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
     analysis = analysis_of(plant.analysis)
@@ -163,10 +168,9 @@ async def service(
     captures = captures_of(plant, Origin.REPLAY, clock)
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
-    own = with_folder(plant, tmp_path)
+    own = with_folder(plant, folder)
     evidence = evidence_of(own, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)
-    recording = asyncio.create_task(recorder.run())
     loops: dict[str, str | None] = {}
     context = Context(
         plant_name=plant.plant.name,
@@ -185,26 +189,70 @@ async def service(
         evidence=evidence_desk(own, store, evidence, clock),
         loops=lambda: loops,
     )
-    app = create_app(context)
-    transport = httpx2.ASGITransport(app)
-    async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
-        app.openapi_schema = documents[0] if documents else None
-        document = app.openapi()
-        documents[:] = [document]
-        yield Service(
-            live,
-            store,
-            clock,
-            references,
-            client,
-            document,
-            alarms,
-            recorder,
-            evidence,
-            films,
-            loops,
-            context,
-        )
+    return Service(
+        live, store, clock, references, alarms, recorder, evidence, films, loops, context
+    )
+
+
+def show(service: Service, assessments: list[Assessment]) -> Service:
+    """Connect U1 and give it results; U2 was never connected."""
+    service.live.set_link("U1", LinkState.CONNECTED)
+    service.live.set_link("U2", LinkState.NOT_CONNECTED, "127.0.0.1:502: Connection refused")
+    for assessment in assessments:
+        service.live.set_assessment(assessment)
+    service.store.append(assessments, [])
+    return service
+
+
+def opened_copy(database_file: Path, folder: Path) -> SqliteStore:
+    """Open a copy of a database and of the marks that lie beside it."""
+    shutil.copytree(database_file.parent, folder, dirs_exist_ok=True)
+    return SqliteStore(folder / database_file.name)
+
+
+@pytest.fixture(scope="session")
+def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty database; a copy of it opens sooner than a new one is made."""
+    path = tmp_path_factory.mktemp("database") / "padwatch.sqlite3"
+    SqliteStore(path).close()
+    return path
+
+
+@pytest.fixture(scope="session")
+def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
+    """Builds services on copies of a database that several tests share, because these only read."""
+    with ExitStack() as stack:
+
+        def begin(plant: PlantFile, database_file: Path) -> Service:
+            folder = tmp_path_factory.mktemp("shared")
+            store = opened_copy(database_file, folder)
+            stack.callback(store.close)
+            return asyncio.run(build(plant, store, folder))
+
+        yield begin
+
+
+@pytest.fixture(scope="session")
+def read_only(
+    serve: Serve, plant: PlantFile, database_file: Path, assessments: list[Assessment]
+) -> Service:
+    """The service of `running`, for all tests that change nothing of it."""
+    return show(serve(plant, database_file), assessments)
+
+
+@pytest.fixture
+def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
+    opened = opened_copy(database_file, tmp_path)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> AsyncIterator[Service]:
+    """A service of the test's own that has just started."""
+    built = await build(plant, store, tmp_path)
+    recording = asyncio.create_task(built.recorder.run())
+    yield built
     recording.cancel()
     await asyncio.wait([recording])
 
@@ -212,12 +260,7 @@ async def service(
 @pytest.fixture
 def running(service: Service, assessments: list[Assessment]) -> Service:
     """U1 connected, its results shown and stored; U2 never connected."""
-    service.live.set_link("U1", LinkState.CONNECTED)
-    service.live.set_link("U2", LinkState.NOT_CONNECTED, "127.0.0.1:502: Connection refused")
-    for assessment in assessments:
-        service.live.set_assessment(assessment)
-    service.store.append(assessments, [])
-    return service
+    return show(service, assessments)
 
 
 @pytest.fixture

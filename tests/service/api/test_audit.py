@@ -3,8 +3,6 @@
 import asyncio
 from typing import Any
 
-import pytest
-
 from service.audit.refusals import N_AT_ONCE, SECONDS_EACH
 
 AUDIT = "/api/v1/audit"
@@ -115,9 +113,8 @@ async def test_entries_are_chosen_by_actor_action_object_and_time(service: Any) 
         assert await entries(service, **other) == [], other
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
+async def test_wrong_parameters_are_refused(read_only: Any) -> None:
+    for wrong in (
         {"limit": 1001},
         {"before": 0},
         {"before": 2**63},
@@ -125,7 +122,5 @@ async def test_entries_are_chosen_by_actor_action_object_and_time(service: Any) 
         {"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"},
         {"actor": "x" * 301},
         {"aktor": "x"},
-    ],
-)
-async def test_wrong_parameters_are_refused(service: Any, wrong: dict[str, object]) -> None:
-    await service.problem(AUDIT, 422, **wrong)
+    ):
+        await read_only.problem(AUDIT, 422, **wrong)

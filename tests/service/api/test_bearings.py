@@ -1,5 +1,6 @@
 """What the API says of a bearing is what the monitor found, to the last bit."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,9 @@ def found(assessments: list[Assessment]) -> list[Assessment]:
 
 
 async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
-    running: Any, found: list[Assessment]
+    read_only: Any, found: list[Assessment]
 ) -> None:
-    body = await running.json(f"{UJB}/latest")
+    body = await read_only.json(f"{UJB}/latest")
 
     newest = found[-1]
     assert set(body["readings"]) == {quantity.name for quantity in CATALOGUE}
@@ -90,9 +91,9 @@ async def test_before_the_first_segment_a_bearing_waits_for_data(service: Any) -
     assert body["runout"] == {"shaft_x": None, "shaft_y": None}
 
 
-async def test_a_bearing_is_described_as_configured(running: Any) -> None:
-    one = await running.json(UJB)
-    all_of_them = await running.json("/api/v1/units/U1/bearings")
+async def test_a_bearing_is_described_as_configured(read_only: Any) -> None:
+    one = await read_only.json(UJB)
+    all_of_them = await read_only.json("/api/v1/units/U1/bearings")
 
     assert one == {
         "unit": "U1",
@@ -114,9 +115,9 @@ async def test_a_bearing_is_described_as_configured(running: Any) -> None:
 
 
 async def test_trends_are_the_stored_readings_to_the_last_bit(
-    running: Any, found: list[Assessment]
+    read_only: Any, found: list[Assessment]
 ) -> None:
-    body = await running.json(
+    body = await read_only.json(
         f"{UJB}/trends",
         start="2026-01-01T00:00:00Z",
         end="2026-01-02T01:00:00+01:00",
@@ -136,9 +137,9 @@ async def test_trends_are_the_stored_readings_to_the_last_bit(
 
 
 async def test_many_readings_are_gathered_into_buckets(
-    running: Any, found: list[Assessment]
+    read_only: Any, found: list[Assessment]
 ) -> None:
-    body = await running.json(
+    body = await read_only.json(
         f"{UJB}/trends",
         start="2026-01-01T00:00:00Z",
         end="2026-01-01T00:02:00Z",
@@ -154,18 +155,18 @@ async def test_many_readings_are_gathered_into_buckets(
     assert max(body["series"][K]["max"]) == max(v for v in values if v)
 
 
-async def test_trends_are_filtered_by_condition(running: Any, found: list[Assessment]) -> None:
+async def test_trends_are_filtered_by_condition(read_only: Any, found: list[Assessment]) -> None:
     eccentricity = sorted(a.readings["eccentricity_ratio"].value or 0.0 for a in found)
     whole = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z", "quantity": K}
 
-    above = await running.json(f"{UJB}/trends", **whole, eccentricity_min=repr(eccentricity[2]))
-    between = await running.json(
+    above = await read_only.json(f"{UJB}/trends", **whole, eccentricity_min=repr(eccentricity[2]))
+    between = await read_only.json(
         f"{UJB}/trends",
         **whole,
         eccentricity_min=repr(eccentricity[1]),
         eccentricity_max=repr(eccentricity[3]),
     )
-    hot = await running.json(f"{UJB}/trends", **whole, oil_temperature_min=90)
+    hot = await read_only.json(f"{UJB}/trends", **whole, oil_temperature_min=90)
 
     def n(body: Any) -> int:
         return sum(body["series"][K]["count"])
@@ -176,8 +177,6 @@ async def test_trends_are_filtered_by_condition(running: Any, found: list[Assess
 async def test_a_hole_in_the_trend_is_a_point_without_a_value(
     running: Any, found: list[Assessment]
 ) -> None:
-    from dataclasses import replace
-
     late = replace(found[-1], time_ns=found[-1].time_ns + 600_000_000_000)
     running.store.append([late], [])
 
@@ -191,9 +190,9 @@ async def test_a_hole_in_the_trend_is_a_point_without_a_value(
 
 
 async def test_the_spectrum_shows_the_lines_where_the_readings_say(
-    running: Any, found: list[Assessment]
+    read_only: Any, found: list[Assessment]
 ) -> None:
-    body = await running.json(f"{UJB}/spectrum")
+    body = await read_only.json(f"{UJB}/spectrum")
 
     newest = found[-1]
     frequency = np.array(body["frequency_hz"])
@@ -208,8 +207,6 @@ async def test_the_spectrum_shows_the_lines_where_the_readings_say(
 
 
 async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[Assessment]) -> None:
-    from dataclasses import replace
-
     n_segments = found[-1].spectrum.n_segments.copy()
     n_segments[2, :] = n_segments[:, 2] = 0
     spectrum = replace(found[-1].spectrum, n_segments=n_segments)
@@ -221,8 +218,8 @@ async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[A
     assert len(channels["bearing_y"]["amplitude"]) > 100
 
 
-async def test_the_orbit_is_the_newest_three_turns(running: Any, found: list[Assessment]) -> None:
-    body = await running.json(f"{UJB}/orbit")
+async def test_the_orbit_is_the_newest_three_turns(read_only: Any, found: list[Assessment]) -> None:
+    body = await read_only.json(f"{UJB}/orbit")
 
     orbit = found[-1].orbit
     assert orbit is not None
@@ -232,8 +229,7 @@ async def test_the_orbit_is_the_newest_three_turns(running: Any, found: list[Ass
     assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)
 
 
-@pytest.mark.parametrize("what", ["spectrum", "orbit"])
-async def test_without_a_result_there_is_no_spectrum_and_no_orbit(service: Any, what: str) -> None:
-    problem = await service.problem(f"{UJB}/{what}", 409)
-
-    assert "no result yet" in problem["detail"]
+async def test_without_a_result_there_is_no_spectrum_and_no_orbit(read_only: Any) -> None:
+    for what in ("spectrum", "orbit"):
+        problem = await read_only.problem(f"/api/v1/units/U2/bearings/UJB/{what}", 409)
+        assert "no result yet" in problem["detail"]

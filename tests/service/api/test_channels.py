@@ -54,9 +54,9 @@ def with_bad(block: SampleBlock, row: int) -> SampleBlock:
 
 
 async def test_every_channel_is_listed_with_its_settings_in_wire_order(
-    running: Any, plant: PlantFile
+    read_only: Any, plant: PlantFile
 ) -> None:
-    body = await running.json(CHANNELS)
+    body = await read_only.json(CHANNELS)
 
     unit = plant.unit[0]
     assert [each["id"] for each in body["waveform"]] == [channel.id for channel in unit.channel]

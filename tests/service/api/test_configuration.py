@@ -8,9 +8,9 @@ from service.settings.schema import plant_file_schema
 
 
 async def test_the_configuration_is_the_plant_file_under_the_version_of_its_evidence(
-    service: Any,
+    read_only: Any,
 ) -> None:
-    body = await service.json("/api/v1/configuration")
+    body = await read_only.json("/api/v1/configuration")
 
     settings = body["settings"]
     assert settings["plant"] == {"name": "Demo plant"}
@@ -26,10 +26,10 @@ async def test_the_configuration_is_the_plant_file_under_the_version_of_its_evid
     assert body["version"] == Configuration(text.encode()).version
 
 
-async def test_the_configuration_leads_to_the_meaning_of_its_keys(service: Any) -> None:
-    link = (await service.json("/api/v1/configuration"))["json_schema"]
+async def test_the_configuration_leads_to_the_meaning_of_its_keys(read_only: Any) -> None:
+    link = (await read_only.json("/api/v1/configuration"))["json_schema"]
 
-    response = await service.get(link)
+    response = await read_only.get(link)
 
     assert response.headers["content-type"] == "application/schema+json"
     assert response.json() == plant_file_schema()

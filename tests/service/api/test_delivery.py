@@ -16,8 +16,8 @@ def news(subject: str) -> AlarmNews:
     return AlarmNews(*advance(Alarm(identity), ALERT, 5, AlarmRule()))
 
 
-async def test_without_receivers_there_is_nothing_to_tell(service: Any) -> None:
-    found = await service.json("/api/v1/delivery")
+async def test_without_receivers_there_is_nothing_to_tell(read_only: Any) -> None:
+    found = await read_only.json("/api/v1/delivery")
 
     assert (found["n_waiting"], found["n_failing"], found["receivers"]) == (0, 0, [])
 

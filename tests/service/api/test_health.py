@@ -5,9 +5,9 @@ from typing import Any
 from service.live import LinkState
 
 
-async def test_a_service_that_works_is_alive_and_ready(running: Any) -> None:
-    assert (await running.json("/livez"))["status"] == "ok"
-    ready = await running.json("/readyz")
+async def test_a_service_that_works_is_alive_and_ready(read_only: Any) -> None:
+    assert (await read_only.json("/livez"))["status"] == "ok"
+    ready = await read_only.json("/readyz")
 
     assert ready == {
         "status": "ok",

@@ -185,8 +185,8 @@ async def test_without_a_speed_there_is_no_motion_at_running_speed(
     assert None not in body["shaft_x_um"]
 
 
-async def test_before_the_first_sample_there_is_no_motion(running: Any) -> None:
-    problem = await running.problem(MOTION, 409)
+async def test_before_the_first_sample_there_is_no_motion(read_only: Any) -> None:
+    problem = await read_only.problem(MOTION, 409)
 
     assert "no sample of unit 'U1' has arrived yet" in problem["detail"]
 

@@ -37,19 +37,19 @@ def questions(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], s
                 yield path.format(**PLACES), others, parameter["name"]
 
 
-async def test_a_parameter_that_is_no_number_is_named(running: Any) -> None:
-    asked = list(questions(running.document))
+async def test_a_parameter_that_is_no_number_is_named(read_only: Any) -> None:
+    asked = list(questions(read_only.document))
     assert len(asked) > 20
     for path, others, name in asked:
         for written in NONE:
-            problem = await running.problem(path, 422, **{**others, name: written})
+            problem = await read_only.problem(path, 422, **{**others, name: written})
             assert name in {mistake["parameter"].split(".")[0] for mistake in problem["errors"]}
 
 
-async def test_a_body_with_a_number_that_is_none_is_refused(running: Any) -> None:
+async def test_a_body_with_a_number_that_is_none_is_refused(read_only: Any) -> None:
     path = "/api/v1/alarms/U1:ujb_shaft_x:channel_not_ok/shelve"
     for written in ("NaN", "Infinity", "-Infinity", "1e999", '"nan"'):
         body = f'{{"actor": "A. Name", "reason": "test", "duration_s": {written}}}'
         headers = {"content-type": "application/json"}
-        answer = await running.client.post(path, content=body, headers=headers)
+        answer = await read_only.client.post(path, content=body, headers=headers)
         assert answer.status_code == 422, written

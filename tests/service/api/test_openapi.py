@@ -11,16 +11,16 @@ from pydantic import BaseModel
 
 
 @pytest.fixture
-def operations(service: Any) -> list[tuple[str, dict[str, Any]]]:
+def operations(read_only: Any) -> list[tuple[str, dict[str, Any]]]:
     return [
         (f"{method.upper()} {path}", operation)
-        for path, methods in service.document["paths"].items()
+        for path, methods in read_only.document["paths"].items()
         for method, operation in methods.items()
     ]
 
 
-async def test_the_description_is_served(service: Any) -> None:
-    assert await service.json("/api/v1/openapi.json") == service.document
+async def test_the_description_is_served(read_only: Any) -> None:
+    assert await read_only.json("/api/v1/openapi.json") == read_only.document
 
 
 def test_every_operation_is_explained(operations: list[tuple[str, dict[str, Any]]]) -> None:
@@ -33,10 +33,10 @@ def test_every_operation_is_explained(operations: list[tuple[str, dict[str, Any]
 
 
 def test_every_operation_has_an_example(
-    service: Any, operations: list[tuple[str, dict[str, Any]]]
+    read_only: Any, operations: list[tuple[str, dict[str, Any]]]
 ) -> None:
     for name, operation in operations:
-        nodes = list(_reachable(operation, service.document))
+        nodes = list(_reachable(operation, read_only.document))
         assert any("example" in node or node.get("examples") for node in nodes), name
         for parameter in operation.get("parameters", ()):
             assert {"example", "examples", "default"} & {*parameter, *parameter["schema"]}, name
@@ -88,7 +88,7 @@ def test_every_error_is_documented_as_a_problem(
 
 
 def test_every_answer_and_every_question_has_an_example_that_fits_its_schema(
-    service: Any, operations: list[tuple[str, dict[str, Any]]]
+    read_only: Any, operations: list[tuple[str, dict[str, Any]]]
 ) -> None:
     n_checked = 0
     for name, operation in operations:
@@ -97,32 +97,35 @@ def test_every_answer_and_every_question_has_an_example_that_fits_its_schema(
             content = told.get("content", {}).get("application/json")
             if content is None:
                 continue
-            schema = {**content["schema"], "components": service.document["components"]}
+            schema = {**content["schema"], "components": read_only.document["components"]}
             for problem in Draft202012Validator(schema).iter_errors(content["example"]):
                 raise AssertionError(f"{name}: {problem}")
             n_checked += 1
     assert n_checked > 60
 
 
-async def test_a_problem_is_as_it_is_described(service: Any) -> None:
-    problem = await service.problem("/api/v1/units/U1/gaps", 422, start="x", end="2026-01-01Z")
+async def test_a_problem_is_as_it_is_described(read_only: Any) -> None:
+    problem = await read_only.problem("/api/v1/units/U1/gaps", 422, start="x", end="2026-01-01Z")
 
-    schema = {"$ref": "#/components/schemas/Problem", "components": service.document["components"]}
+    schema = {
+        "$ref": "#/components/schemas/Problem",
+        "components": read_only.document["components"],
+    }
     Draft202012Validator(schema).validate(problem)
     assert {mistake["parameter"] for mistake in problem["errors"]} >= {"start"}
 
 
-def test_no_example_holds_a_number_that_is_none(service: Any) -> None:
-    json.dumps(service.document, allow_nan=False)
+def test_no_example_holds_a_number_that_is_none(read_only: Any) -> None:
+    json.dumps(read_only.document, allow_nan=False)
 
 
 def test_every_model_refuses_what_it_does_not_know_and_numbers_that_are_none(
-    service: Any,
+    read_only: Any,
 ) -> None:
     models: dict[str, list[type[BaseModel]]] = {}
     for model in _models(BaseModel):
         models.setdefault(model.__name__, []).append(model)
-    for name, schema in service.document["components"]["schemas"].items():
+    for name, schema in read_only.document["components"]["schemas"].items():
         if schema.get("type") == "object":
             assert schema.get("additionalProperties") is False, name
             assert models[name]
@@ -158,13 +161,13 @@ def test_every_answer_that_can_be_asked_for_again_says_how(
                 assert "ETag" in operation["responses"][status]["headers"], name
 
 
-async def test_the_headers_that_are_described_are_there(running: Any) -> None:
+async def test_the_headers_that_are_described_are_there(read_only: Any) -> None:
     for path in ("overview", "sources", "alarms", "audit", "units/U1/bearings/UJB/spectrum"):
-        described = running.document["paths"][
+        described = read_only.document["paths"][
             f"/api/v1/{path.replace('U1', '{unit}').replace('UJB', '{bearing}')}"
         ]["get"]["responses"]
-        full = await running.get(f"/api/v1/{path}")
-        again = await running.client.get(
+        full = await read_only.get(f"/api/v1/{path}")
+        again = await read_only.client.get(
             f"/api/v1/{path}", headers={"If-None-Match": full.headers["etag"]}
         )
         for answer in (full, again):
@@ -172,20 +175,20 @@ async def test_the_headers_that_are_described_are_there(running: Any) -> None:
             assert {name.lower() for name in names} <= set(answer.headers), path
 
 
-def test_every_field_of_every_answer_is_explained(service: Any) -> None:
-    for name, schema in service.document["components"]["schemas"].items():
+def test_every_field_of_every_answer_is_explained(read_only: Any) -> None:
+    for name, schema in read_only.document["components"]["schemas"].items():
         assert schema.get("description"), name
         for key, field in schema.get("properties", {}).items():
             # one that says the same as the model it refers to is left to that
             assert field.get("description") or "$ref" in field, f"{name}.{key}"
 
 
-def test_every_reference_leads_somewhere(service: Any) -> None:
-    references = re.findall(r"'\$ref': '([^']+)'", str(service.document))
+def test_every_reference_leads_somewhere(read_only: Any) -> None:
+    references = re.findall(r"'\$ref': '([^']+)'", str(read_only.document))
 
     assert references
     for reference in references:
-        assert _resolved(reference, service.document)
+        assert _resolved(reference, read_only.document)
 
 
 def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:

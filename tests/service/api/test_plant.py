@@ -80,21 +80,21 @@ async def test_units_say_how_their_samples_arrive(running: Any) -> None:
     assert both[1]["source"]["data_age_s"] is None
 
 
-async def test_the_overview_shows_what_each_bearing_shows(running: Any) -> None:
-    overview = await running.json("/api/v1/overview")
+async def test_the_overview_shows_what_each_bearing_shows(read_only: Any) -> None:
+    overview = await read_only.json("/api/v1/overview")
 
     assert overview["plant"] == {"name": "Demo plant", "origin": "live"}
     assert overview["time"] == "2026-01-01T00:00:00.000Z"
     assert overview["refresh_s"] == 11.95
     assert overview["store"] == {"error": None, "n_unstored": 0}
     for unit in overview["units"]:
-        assert unit["source"] == (await running.json(f"/api/v1/units/{unit['id']}"))["source"]
+        assert unit["source"] == (await read_only.json(f"/api/v1/units/{unit['id']}"))["source"]
         for bearing in unit["bearings"]:
             path = f"/api/v1/units/{unit['id']}/bearings/{bearing['bearing']}/latest"
-            assert await running.json(path) == bearing
+            assert await read_only.json(path) == bearing
 
 
-async def test_the_catalogue_names_every_quantity(running: Any) -> None:
-    assert await running.json("/api/v1/quantities") == [
+async def test_the_catalogue_names_every_quantity(read_only: Any) -> None:
+    assert await read_only.json("/api/v1/quantities") == [
         {"name": q.name, "unit": q.unit, "label": q.label} for q in CATALOGUE
     ]

@@ -17,38 +17,19 @@ WHOLE = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
 GOOD = {**WHOLE, "quantity": "speed_rpm"}
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/api/v1/units/U9",
-        "/api/v1/units/U9/bearings",
-        "/api/v1/units/U9/bearings/UJB",
-        "/api/v1/units/U9/bearings/UJB/latest",
-        "/api/v1/units/U9/bearings/UJB/spectrum",
-        "/api/v1/units/U9/bearings/UJB/orbit",
-        "/api/v1/units/u1",
-        "/api/v1/units/%00",
-        "/api/v1/units/'; DROP TABLE assessment; --",
-    ],
-)
-async def test_an_unknown_unit_is_not_found(running: Any, path: str) -> None:
-    problem = await running.problem(path, 404)
-
-    assert problem["title"] == "Unknown unit"
-    assert "there is no unit" in problem["detail"]
-
-
-@pytest.mark.parametrize("what", ["", "/latest", "/spectrum", "/orbit"])
-async def test_an_unknown_bearing_is_not_found(running: Any, what: str) -> None:
-    problem = await running.problem(f"/api/v1/units/U1/bearings/XJB{what}", 404)
-
-    assert problem["detail"] == "unit 'U1' has no bearing 'XJB'"
-
-
-async def test_trends_and_gaps_of_nobody_are_not_found(running: Any) -> None:
-    await running.problem("/api/v1/units/U9/bearings/UJB/trends", 404, **GOOD)
-    await running.problem("/api/v1/units/U1/bearings/XJB/trends", 404, **GOOD)
-    await running.problem("/api/v1/units/U9/gaps", 404, **WHOLE)
+async def test_an_unknown_unit_or_bearing_is_not_found(read_only: Any) -> None:
+    bearing = "U9/bearings/UJB"
+    units = ("U9", "U9/bearings", bearing, "u1", "%00", "'; DROP TABLE assessment; --")
+    for path in (*units, *(f"{bearing}/{what}" for what in ("latest", "spectrum", "orbit"))):
+        problem = await read_only.problem(f"/api/v1/units/{path}", 404)
+        assert problem["title"] == "Unknown unit"
+        assert "there is no unit" in problem["detail"]
+    for what in ("", "/latest", "/spectrum", "/orbit"):
+        problem = await read_only.problem(f"/api/v1/units/U1/bearings/XJB{what}", 404)
+        assert problem["detail"] == "unit 'U1' has no bearing 'XJB'"
+    await read_only.problem("/api/v1/units/U9/bearings/UJB/trends", 404, **GOOD)
+    await read_only.problem("/api/v1/units/U1/bearings/XJB/trends", 404, **GOOD)
+    await read_only.problem("/api/v1/units/U9/gaps", 404, **WHOLE)
 
 
 @pytest.mark.parametrize(
@@ -90,9 +71,9 @@ async def test_trends_and_gaps_of_nobody_are_not_found(running: Any) -> None:
     ],
 )
 async def test_a_wrong_query_is_answered_with_the_parameter_and_what_is_allowed(
-    running: Any, parameter: str, value: object, said: str
+    read_only: Any, parameter: str, value: object, said: str
 ) -> None:
-    problem = await running.problem(TRENDS, 422, **{**GOOD, parameter: value})
+    problem = await read_only.problem(TRENDS, 422, **{**GOOD, parameter: value})
 
     wrong = "start" if "before end" in said else parameter
     assert [error["parameter"].split(".")[0] for error in problem["errors"]] == [wrong]
@@ -100,73 +81,61 @@ async def test_a_wrong_query_is_answered_with_the_parameter_and_what_is_allowed(
     assert said in problem["detail"]
 
 
-@pytest.mark.parametrize("quantity", ["eccentricity", "oil_temperature"])
-async def test_a_lowest_value_above_the_highest_is_refused(running: Any, quantity: str) -> None:
-    bounds = {f"{quantity}_min": 2.5, f"{quantity}_max": 1.5}
+async def test_a_lowest_value_above_the_highest_is_refused(read_only: Any) -> None:
+    for quantity in ("eccentricity", "oil_temperature"):
+        bounds = {f"{quantity}_min": 2.5, f"{quantity}_max": 1.5}
 
-    problem = await running.problem(TRENDS, 422, **GOOD, **bounds)
+        problem = await read_only.problem(TRENDS, 422, **GOOD, **bounds)
 
-    assert problem["errors"][0]["parameter"] == f"{quantity}_min"
-    assert problem["detail"] == f"{quantity}_min 2.5 must not be above its maximum 1.5"
-
-
-@pytest.mark.parametrize("parameter", ["start", "end", "quantity"])
-async def test_a_missing_parameter_is_named(running: Any, parameter: str) -> None:
-    query = {name: value for name, value in GOOD.items() if name != parameter}
-
-    problem = await running.problem(TRENDS, 422, **query)
-
-    assert [error["parameter"] for error in problem["errors"]] == [parameter]
-    assert "required" in problem["detail"].lower()
+        assert problem["errors"][0]["parameter"] == f"{quantity}_min"
+        assert problem["detail"] == f"{quantity}_min 2.5 must not be above its maximum 1.5"
 
 
-async def test_all_wrong_parameters_are_named_at_once(running: Any) -> None:
+async def test_a_missing_parameter_is_named(read_only: Any) -> None:
+    for parameter in GOOD:
+        query = {name: value for name, value in GOOD.items() if name != parameter}
+
+        problem = await read_only.problem(TRENDS, 422, **query)
+
+        assert [error["parameter"] for error in problem["errors"]] == [parameter]
+        assert "required" in problem["detail"].lower()
+
+
+async def test_all_wrong_parameters_are_named_at_once(read_only: Any) -> None:
     query = {"start": "soon", "end": "later", "quantity": "speed_rpm", "max_points": 0}
 
-    problem = await running.problem(TRENDS, 422, **query)
+    problem = await read_only.problem(TRENDS, 422, **query)
 
     assert {error["parameter"] for error in problem["errors"]} == {"start", "end", "max_points"}
 
 
-@pytest.mark.parametrize(
-    "path",
-    ["/livez", "/readyz", "/api/v1/overview", "/api/v1/units/U1", "/api/v1/quantities"],
-)
-async def test_a_parameter_that_nobody_knows_is_refused_everywhere(running: Any, path: str) -> None:
-    problem = await running.problem(path, 422, verbose=1)
+async def test_a_parameter_that_nobody_knows_is_refused_everywhere(read_only: Any) -> None:
+    for path in ("livez", "readyz", "api/v1/overview", "api/v1/units/U1", "api/v1/quantities"):
+        problem = await read_only.problem(f"/{path}", 422, verbose=1)
 
-    assert problem["errors"][0]["parameter"] == "verbose"
-    assert problem["detail"] == "there is no parameter 'verbose' here; known: none"
+        assert problem["errors"][0]["parameter"] == "verbose"
+        assert problem["detail"] == "there is no parameter 'verbose' here; known: none"
 
 
-async def test_gaps_check_their_range_too(running: Any) -> None:
-    problem = await running.problem(
+async def test_gaps_check_their_range_too(read_only: Any) -> None:
+    problem = await read_only.problem(
         "/api/v1/units/U1/gaps", 422, start="2026-01-02T00:00:00Z", end="2026-01-01T00:00:00Z"
     )
 
     assert problem["errors"][0]["parameter"] == "start"
 
 
-@pytest.mark.parametrize("path", ["/api/v1/nothing", "/api/v2/units", "/nowhere", "/static/no.js"])
-async def test_an_unknown_path_is_a_problem_too(running: Any, path: str) -> None:
-    await running.problem(path, 404)
-
-
-@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE"])
-async def test_nothing_can_be_written(running: Any, as_problem: AsProblem, method: str) -> None:
-    response = await running.client.request(method, "/api/v1/units")
-
-    assert response.status_code == 405
-    assert response.headers["allow"] == "GET"
-    as_problem(response)
+async def test_an_unknown_path_is_a_problem_too(read_only: Any) -> None:
+    for path in ("/api/v1/nothing", "/api/v2/units", "/nowhere", "/static/no.js"):
+        await read_only.problem(path, 404)
 
 
 async def test_a_range_that_could_take_all_memory_is_refused(
-    running: Any, monkeypatch: pytest.MonkeyPatch
+    read_only: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(trends, "MAX_ROWS", 3)
 
-    problem = await running.problem(TRENDS, 422, **GOOD)
+    problem = await read_only.problem(TRENDS, 422, **GOOD)
 
     assert {error["parameter"] for error in problem["errors"]} == {"start", "end"}
     assert problem["detail"].startswith("more than 3 single readings would have to be read")
@@ -185,38 +154,31 @@ async def test_a_store_that_cannot_be_read_is_503_without_its_innards(
         assert problem["detail"] == "the store cannot be read just now"
 
 
-@pytest.mark.parametrize(
-    ("start", "end"),
-    [
+async def test_far_years_are_no_error(read_only: Any) -> None:
+    for start, end in (
         ("0001-01-01T00:00:00Z", "9999-12-31T23:59:59.999999Z"),
         ("0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-14:00"),
         ("1969-12-31T23:59:59Z", "2300-01-01T00:00:00Z"),
-    ],
-)
-@pytest.mark.parametrize("max_points", [2, 5000])
-async def test_far_years_are_no_error(running: Any, start: str, end: str, max_points: int) -> None:
-    query = {"start": start, "end": end, "quantity": "speed_rpm", "max_points": max_points}
-
-    body = await running.json(TRENDS, **query)
-
-    assert sum(body["series"]["speed_rpm"]["count"]) == 6
-    assert len(body["time"]) <= max_points
-    assert await running.json("/api/v1/units/U1/gaps", start=start, end=end) == []
+    ):
+        times = {"start": start, "end": end}
+        for max_points in (2, 5000):
+            query = {**times, "quantity": "speed_rpm", "max_points": max_points}
+            body = await read_only.json(TRENDS, **query)
+            assert sum(body["series"]["speed_rpm"]["count"]) == 6
+            assert len(body["time"]) <= max_points
+        assert await read_only.json("/api/v1/units/U1/gaps", **times) == []
 
 
-@pytest.mark.parametrize(
-    ("method", "path", "allowed"),
-    [
+async def test_a_method_a_path_does_not_have_is_refused_with_those_it_has(
+    read_only: Any, as_problem: AsProblem
+) -> None:
+    for method, path, allowed in (
         ("GET", "/api/v1/units/U1/bearings/UJB/baselines/freeze", "POST"),
         ("DELETE", "/api/v1/units/U1/bearings/UJB/order1-references", "GET, POST"),
-        ("POST", "/api/v1/units", "GET"),
-    ],
-)
-async def test_a_method_a_path_does_not_have_is_refused_with_those_it_has(
-    running: Any, as_problem: AsProblem, method: str, path: str, allowed: str
-) -> None:
-    response = await running.client.request(method, path)
+        *((method, "/api/v1/units", "GET") for method in ("POST", "PUT", "PATCH", "DELETE")),
+    ):
+        response = await read_only.client.request(method, path)
 
-    assert response.status_code == 405
-    assert response.headers["allow"] == allowed
-    assert as_problem(response)["title"] == "Method not allowed"
+        assert response.status_code == 405
+        assert response.headers["allow"] == allowed
+        assert as_problem(response)["title"] == "Method not allowed"

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pytest
-
 from service.store.gap_reference import GapReference, ReferenceSource
 
 UJB = "/api/v1/units/U1/bearings/UJB"
@@ -15,8 +13,8 @@ def reference(n: int, **changes: Any) -> GapReference:
     return GapReference("U1", "UJB", T0 + n * 10**9, "A. Name", (1990.0 + n, 2003.1), **arguments)
 
 
-async def test_without_a_stored_reference_the_plant_files_is_in_force(running: Any) -> None:
-    body = await running.json(UJB)
+async def test_without_a_stored_reference_the_plant_files_is_in_force(read_only: Any) -> None:
+    body = await read_only.json(UJB)
 
     assert body["gap_reference_um"] == [2000.0, 2000.0]
     assert body["reference"] == {
@@ -25,7 +23,7 @@ async def test_without_a_stored_reference_the_plant_files_is_in_force(running: A
         "author": None,
         "note": None,
     }
-    assert await running.json(f"{UJB}/references") == []
+    assert await read_only.json(f"{UJB}/references") == []
 
 
 async def test_the_reference_in_force_is_said_with_time_author_and_note(running: Any) -> None:
@@ -71,11 +69,10 @@ async def test_the_history_is_whole_and_newest_first(running: Any) -> None:
     assert await running.json("/api/v1/units/U2/bearings/UJB/references") == []
 
 
-@pytest.mark.parametrize("path", ["U9/bearings/UJB", "U1/bearings/XJB"])
-async def test_the_history_of_what_is_not_there_is_a_problem(running: Any, path: str) -> None:
-    problem = await running.problem(f"/api/v1/units/{path}/references", 404)
-
-    assert path.partition("/")[0] in problem["detail"]
+async def test_the_history_of_what_is_not_there_is_a_problem(read_only: Any) -> None:
+    for path in ("U9/bearings/UJB", "U1/bearings/XJB"):
+        problem = await read_only.problem(f"/api/v1/units/{path}/references", 404)
+        assert path.partition("/")[0] in problem["detail"]
 
 
 async def test_a_history_that_cannot_be_read_is_a_problem(running: Any, tmp_path: Any) -> None:

@@ -56,12 +56,12 @@ async def test_the_audit_trail_is_the_same_as_csv(service: Any) -> None:
     assert row["time_utc"] == entry["time"]
 
 
-async def test_the_line_of_the_shaft_centre_is_the_same_in_parquet(running: Any) -> None:
+async def test_the_line_of_the_shaft_centre_is_the_same_in_parquet(read_only: Any) -> None:
     path = "/api/v1/units/U1/bearings/UJB/shaft-centre"
-    line = await running.json(path, **RANGE)
+    line = await read_only.json(path, **RANGE)
     assert line["time"]
 
-    response = await running.get(path, **RANGE, format="parquet")
+    response = await read_only.get(path, **RANGE, format="parquet")
 
     table = pq.read_table(io.BytesIO(response.content))
     times_ns = table["time_utc"].cast("int64").to_pylist()

@@ -1,7 +1,8 @@
 """Trends parted by operating state and by cells of eccentricity and oil temperature."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
+from service.settings.plant import PlantFile
 
 TRENDS = "/api/v1/units/U1/bearings/UJB/trends"
 START_NS = 1_767_225_600_000_000_000
@@ -25,9 +27,8 @@ SEEN = [
 """State, eccentricity ratio and oil temperature of one result a minute."""
 
 
-@pytest.fixture
-def seen(service: Any, assessment: Callable[..., Assessment]) -> Any:
-    """A service that has stored results under several conditions."""
+def store_seen(service: Any, assessment: Callable[..., Assessment]) -> Any:
+    """Store results under several conditions."""
     for minute, (state, eccentricity, oil_c) in enumerate(SEEN):
         known = {} if eccentricity is None else {"eccentricity_ratio": eccentricity}
         found = assessment(
@@ -39,6 +40,14 @@ def seen(service: Any, assessment: Callable[..., Assessment]) -> Any:
         condition = BearingCondition(state, True, None)
         service.store.append([replace(found, condition=condition)], [])
     return service
+
+
+@pytest.fixture(scope="module")
+def seen(
+    serve: Any, plant: PlantFile, database_file: Path, assessment: Callable[..., Assessment]
+) -> Any:
+    """A service with these results, for tests that only read."""
+    return store_seen(serve(plant, database_file), assessment)
 
 
 def minutes(series: Any) -> list[int]:
@@ -100,30 +109,36 @@ async def test_an_unknown_state_or_grouping_is_refused(seen: Any) -> None:
 
 
 async def test_more_groups_than_anybody_looks_at_are_refused(
-    seen: Any, assessment: Callable[..., Assessment]
+    service: Any, assessment: Callable[..., Assessment]
 ) -> None:
     start_ns = START_NS + 3_600_000_000_000
     wild = [assessment(start_ns + n, eccentricity_ratio=1.0 + 0.05 * n) for n in range(61)]
-    seen.store.append(wild, [])
+    service.store.append(wild, [])
 
-    found = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, group_by="eccentricity")
+    found = await service.problem(TRENDS, 422, **WHOLE, quantity=K, group_by="eccentricity")
 
     assert "60 groups" in found["detail"]
 
 
-@pytest.mark.parametrize("by", ["state", "eccentricity", "oil_temperature"])
+async def groups_by(service: Any, ways: Sequence[str]) -> list[Any]:
+    asked = {**WHOLE, "quantity": K, "max_points": 2}
+    answers = [await service.json(TRENDS, **asked, group_by=by) for by in ways]
+    return [group for answer in answers for group in answer["groups"]]
+
+
 async def test_groups_are_the_same_when_they_have_been_gathered_beforehand(
-    seen: Any, by: str
+    service: Any, assessment: Callable[..., Assessment]
 ) -> None:
-    asked = {**WHOLE, "quantity": K, "group_by": by, "max_points": 2}
-    single = (await seen.json(TRENDS, **asked))["groups"]
+    rollups = store_seen(service, assessment).store.rollups
+    ways = ("state", "eccentricity", "oil_temperature")
+    single = await groups_by(service, ways)
     later_ns = START_NS + 86_400_000_000_000
 
-    for series in seen.store.rollups.due(later_ns):
-        seen.store.rollups.gather(series, later_ns)
+    for series in rollups.due(later_ns):
+        rollups.gather(series, later_ns)
 
-    assert seen.store.rollups.due(later_ns) == []
-    gathered = (await seen.json(TRENDS, **asked))["groups"]
+    assert rollups.due(later_ns) == []
+    gathered = await groups_by(service, ways)
     assert [group["name"] for group in gathered] == [group["name"] for group in single]
     for ours, theirs in zip(gathered, single, strict=True):
         assert ours["time"] == theirs["time"]

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from core.estimators import Estimator
 from core.quality import Reading
 from core.stiffness_history import StiffnessHistory
 from service.api.tables import Column, csv_pieces, parquet_file
+from service.settings.plant import PlantFile
 from service.store.film_port import FilmHistory
 
 UJB = "/api/v1/units/U1/bearings/UJB"
@@ -24,9 +26,12 @@ K = "stiffness_xx_n_per_m"
 N = 25
 
 
-@pytest.fixture
-def stored(service: Any, assessment: Callable[..., Assessment]) -> Any:
-    """A service that has stored one result a second."""
+@pytest.fixture(scope="module")
+def stored(
+    serve: Any, plant: PlantFile, database_file: Path, assessment: Callable[..., Assessment]
+) -> Any:
+    """A service that has stored one result a second, for tests that only read."""
+    service = serve(plant, database_file)
     results = [
         assessment(
             START_NS + n * 1_000_000_000,

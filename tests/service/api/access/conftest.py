@@ -68,14 +68,8 @@ def cheap_hashing() -> Hashing:
     return Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
 
 
-@pytest.fixture(scope="session")
-def documents_with_metrics() -> dict[str, Any]:
-    """The description of the API, once it was made."""
-    return {}
-
-
 @pytest.fixture
-def access(service: Any, documents_with_metrics: dict[str, Any]) -> Access:
+def access(service: Any) -> Access:
     """A second application over the same store, which asks everybody."""
     context = service.context
     watched = Watched(
@@ -95,8 +89,6 @@ def access(service: Any, documents_with_metrics: dict[str, Any]) -> Access:
         service.store.access, service.clock, asks_everybody=True, hashing=cheap_hashing()
     )
     app = create_app(replace(context, access=desk, metrics=partial(scrape, watched)))
-    app.openapi_schema = documents_with_metrics.get("access")
-    documents_with_metrics["access"] = app.openapi()
     return Access(desk, app, service)
 
 

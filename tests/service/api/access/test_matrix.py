@@ -4,6 +4,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, NamedTuple
 
 import pytest
+from rigs.tiers import covering, fast_and_long
 
 from service.security.roles import Role
 from service.security.tokens import new_key, new_token
@@ -185,8 +186,7 @@ def test_there_is_nothing_open_beside_it(access: Any) -> None:
     }
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("state", ["wrong", "expired", "revoked"])
+@pytest.mark.parametrize(("state", "way"), covering(("wrong", "expired", "revoked"), WAYS))
 async def test_what_is_no_longer_or_never_was_good_opens_nothing(
     access: Any, show: Show, way: str, state: str
 ) -> None:
@@ -207,8 +207,7 @@ async def test_who_shows_nothing_sees_nothing(access: Any) -> None:
         assert (await client.get("/api/v1/no-such-thing")).status_code == 401
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize(("role", "way"), covering(ROLES, WAYS))
 async def test_each_role_may_what_is_declared_and_nothing_else(
     access: Any, show: Show, way: str, role: str
 ) -> None:
@@ -222,7 +221,7 @@ async def test_each_role_may_what_is_declared_and_nothing_else(
         assert expected or status == 403, f"{operation}: {status}"
 
 
-@pytest.mark.parametrize("role", ["viewer", "operator", "engineer"])
+@pytest.mark.parametrize("role", fast_and_long("engineer", "operator"))
 async def test_a_key_for_some_units_opens_those_and_what_belongs_to_none(
     access: Any, show: Show, role: str
 ) -> None:

@@ -28,8 +28,8 @@ def cookie(token: str) -> dict[str, str]:
     return {"Cookie": f"{COOKIE}={token}"}
 
 
-async def test_on_this_computer_nobody_has_to_log_in(service: Any) -> None:
-    said = await service.json(SESSION)
+async def test_on_this_computer_nobody_has_to_log_in(read_only: Any) -> None:
+    said = await read_only.json(SESSION)
 
     assert said["login_required"] is False
     assert said["set_up_needed"] is False
@@ -37,9 +37,9 @@ async def test_on_this_computer_nobody_has_to_log_in(service: Any) -> None:
     assert len(said["permissions"]) == 5
 
 
-async def test_what_a_proxy_passes_on_is_not_from_this_computer(service: Any) -> None:
+async def test_what_a_proxy_passes_on_is_not_from_this_computer(read_only: Any) -> None:
     for header in ("X-Forwarded-For", "Forwarded", "Via", "X-Real-IP"):
-        answer = await service.client.get(UNITS, headers={header: "127.0.0.1"})
+        answer = await read_only.client.get(UNITS, headers={header: "127.0.0.1"})
         assert answer.status_code == 401, header
 
 
@@ -57,16 +57,6 @@ async def test_who_has_not_logged_in_sees_nothing_but_that(access: Any) -> None:
     }
     assert refused.status_code == 401
     assert refused.headers["www-authenticate"].startswith("Bearer")
-
-
-async def test_a_login_opens_what_its_role_may(access: Any, anna: str) -> None:
-    async with access.client(**cookie(anna)) as client:
-        said = (await client.get(SESSION)).json()
-        seen = await client.get(UNITS)
-
-    assert (said["name"], said["role"], said["set_up_needed"]) == ("anna", "engineer", False)
-    assert said["permissions"] == ["read", "act_on_alarms", "change_measuring", "read_audit"]
-    assert seen.status_code == 200
 
 
 async def test_who_logs_out_is_out(access: Any, anna: str) -> None:
@@ -127,7 +117,14 @@ async def test_after_many_wrong_logins_one_has_to_wait_also_with_the_right_passw
     assert int(answer.headers["retry-after"]) >= 1
 
 
-async def test_two_cookies_are_neither(access: Any, anna: str) -> None:
+async def test_one_cookie_opens_what_its_role_may_and_two_are_neither(
+    access: Any, anna: str
+) -> None:
+    async with access.client(**cookie(anna)) as client:
+        found = (await client.get(SESSION)).json()
+        assert (await client.get(UNITS)).status_code == 200
+    assert (found["name"], found["role"], found["set_up_needed"]) == ("anna", "engineer", False)
+    assert found["permissions"] == ["read", "act_on_alarms", "change_measuring", "read_audit"]
     mallory = "B" * 43
     for values in (
         [f"{COOKIE}={anna}; {COOKIE}={mallory}"],
@@ -139,25 +136,27 @@ async def test_two_cookies_are_neither(access: Any, anna: str) -> None:
         assert answer.status_code == 401, values
 
 
-async def test_two_keys_are_neither(access: Any) -> None:
-    key = access.key(Role.VIEWER)
-    async with access.client() as client:
-        one = await client.get(UNITS, headers=[("Authorization", f"Bearer {key}")])
-        two = await client.get(UNITS, headers=[("Authorization", f"Bearer {key}")] * 2)
+async def test_a_key_acts_wherever_it_is_sent_from_has_no_password_and_two_are_neither(
+    access: Any,
+) -> None:
+    key = ("Authorization", f"Bearer {access.key(Role.ADMIN)}")
+    body = {"password": PASSWORD, "new_password": "the river is low in august"}
+    async with access.client(Origin="https://elsewhere.example") as client:
+        acts = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={}, headers=[key])
+        changes = await client.post(f"{SESSION}/password", json=body, headers=[key])
+        one = await client.get(UNITS, headers=[key])
+        two = await client.get(UNITS, headers=[key] * 2)
 
-    assert (one.status_code, two.status_code) == (200, 401)
+    assert [a.status_code for a in (acts, changes, one, two)] == [404, 409, 200, 401]
 
 
-async def test_a_wrong_key_is_refused_also_where_nobody_has_to_log_in(service: Any) -> None:
-    answer = await service.client.get(UNITS, headers={"Authorization": "Bearer pw_nonsense"})
+async def test_on_this_computer_a_wrong_key_is_refused_and_a_login_that_is_over_is_none(
+    read_only: Any,
+) -> None:
+    key = await read_only.client.get(UNITS, headers={"Authorization": "Bearer pw_nonsense"})
+    over = await read_only.client.get(UNITS, headers=cookie("C" * 43))
 
-    assert answer.status_code == 401
-
-
-async def test_a_login_that_is_over_is_no_worse_than_none_on_this_computer(service: Any) -> None:
-    answer = await service.client.get(UNITS, headers=cookie("C" * 43))
-
-    assert answer.status_code == 200
+    assert (key.status_code, over.status_code) == (401, 200)
 
 
 PAGES = (
@@ -175,27 +174,15 @@ PAGES = (
 """What a browser says of the page that asks, and what comes of it."""
 
 
-async def test_with_a_cookie_only_the_dashboard_itself_acts(access: Any, anna: str) -> None:
+async def test_with_a_cookie_only_the_dashboard_itself_acts_and_logs_in(
+    access: Any, anna: str
+) -> None:
     for headers, status in PAGES:
         async with access.client(**cookie(anna), **headers) as client:
             answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
         assert answer.status_code == status, headers
-
-
-async def test_a_key_acts_wherever_it_is_sent_from(access: Any) -> None:
-    headers = {"Authorization": f"Bearer {access.key(Role.OPERATOR)}"}
-    async with access.client(**headers, Origin="https://elsewhere.example") as client:
-        answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
-
-    assert answer.status_code == 404
-
-
-async def test_no_page_of_another_site_logs_anybody_in(access: Any, anna: str) -> None:
-    assert anna
     async with access.client(Origin="https://elsewhere.example") as client:
-        answer = await client.post(SESSION, json=ANNA)
-
-    assert answer.status_code == 403
+        assert (await client.post(SESSION, json=ANNA)).status_code == 403
 
 
 async def test_a_new_password_ends_all_other_logins(
@@ -214,15 +201,6 @@ async def test_a_new_password_ends_all_other_logins(
     assert (wrong.status_code, weak.status_code, changed.status_code) == (401, 422, 201)
     assert weak.json()["errors"][0]["parameter"] == "new_password"
     assert (old.status_code, seen.status_code) == (401, 200)
-
-
-async def test_a_key_has_no_password_to_change(access: Any) -> None:
-    headers = {"Authorization": f"Bearer {access.key(Role.ADMIN)}"}
-    body = {"password": PASSWORD, "new_password": "the river is low in august"}
-    async with access.client(**headers) as client:
-        answer = await client.post(f"{SESSION}/password", json=body)
-
-    assert answer.status_code == 409
 
 
 async def test_the_first_account_is_made_with_the_printed_token_and_once(access: Any) -> None:

@@ -2,8 +2,7 @@
 
 import asyncio
 import math
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -58,10 +57,10 @@ def lived(film_life: Callable[..., StiffnessHistory]) -> StiffnessHistory:
 
 
 @pytest.fixture(scope="session")
-def learned_file(
+def database_file(
     tmp_path_factory: pytest.TempPathFactory, plant: PlantFile, lived: StiffnessHistory
 ) -> Path:
-    """A database with these days and the baseline that was learned of them."""
+    """A database with these days and the baseline that was learned of them, for copies."""
     path = tmp_path_factory.mktemp("learned") / "padwatch.sqlite3"
     store = SqliteStore(path)
     limits = plant.films.operating.limits(92.3, 330.0)
@@ -79,12 +78,10 @@ def learned_file(
     return path
 
 
-@pytest.fixture
-def store(learned_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
-    """A copy of it for each test to change."""
-    opened = SqliteStore(Path(shutil.copy(learned_file, tmp_path)))
-    yield opened
-    opened.close()
+@pytest.fixture(scope="session")
+def learned(serve: Any, plant: PlantFile, database_file: Path) -> Any:
+    """A service over these days, for tests that change nothing of it."""
+    return serve(plant, database_file)
 
 
 def stored_reading(

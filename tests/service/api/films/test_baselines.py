@@ -25,9 +25,9 @@ async def post(service: Any, path: str, body: Any, **headers: str) -> httpx2.Res
 
 
 async def test_versions_say_where_they_come_from_and_which_is_in_force(
-    service: Any, lived: StiffnessHistory
+    learned: Any, lived: StiffnessHistory
 ) -> None:
-    found = await service.json(BASELINES)
+    found = await learned.json(BASELINES)
 
     [version] = found["versions"]
     assert (found["in_force"], found["is_frozen"], found["estimator"]) == (1, False, "dynamic")
@@ -57,11 +57,11 @@ async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
     assert found["learning"]["is_over"] is False
 
 
-async def test_cells_are_the_learned_ones_in_plant_units(service: Any) -> None:
-    found = await service.json(f"{BASELINES}/1")
+async def test_cells_are_the_learned_ones_in_plant_units(learned: Any) -> None:
+    found = await learned.json(f"{BASELINES}/1")
 
-    learned = service.store.films.baseline("U1", "UJB", 1).of(Watched.STIFFNESS, "x")
-    cells, stored = found["x"]["cells"], learned.table.cells
+    baseline = learned.store.films.baseline("U1", "UJB", 1).of(Watched.STIFFNESS, "x")
+    cells, stored = found["x"]["cells"], baseline.table.cells
     assert {len(column) for column in cells.values() if column} == {len(stored)}
     assert cells["stiffness_n_per_m"] == pytest.approx([np.exp(c.location) for c in stored])
     assert cells["n_days"] == [cell.n_days for cell in stored]
@@ -79,14 +79,14 @@ async def test_cells_are_the_learned_ones_in_plant_units(service: Any) -> None:
     assert found["about"]["status"] == "in_force"
 
 
-async def test_an_exported_baseline_reads_back_as_it_was_learned(service: Any) -> None:
-    response = await service.get(f"{BASELINES}/1/export")
+async def test_an_exported_baseline_reads_back_as_it_was_learned(learned: Any) -> None:
+    response = await learned.get(f"{BASELINES}/1/export")
 
     assert (
         response.headers["content-disposition"] == 'attachment; filename="U1-UJB-baseline-1.json"'
     )
     assert response.headers["content-type"] == "application/json"
-    assert from_json(response.text) == service.store.films.baseline("U1", "UJB", 1)
+    assert from_json(response.text) == learned.store.films.baseline("U1", "UJB", 1)
 
 
 async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_again(
@@ -137,29 +137,25 @@ async def test_after_an_overhaul_nothing_is_in_force_until_it_has_been_learned(
     assert (found["learning"]["since"], found["learning"]["n_days"]) == (event, 1)
 
 
-@pytest.mark.parametrize(
-    ("path", "body", "words"),
-    [
+async def test_what_does_not_fit_is_refused_and_changes_nothing(
+    learned: Any, as_problem: AsProblem
+) -> None:
+    before = await learned.json(BASELINES)
+
+    for path, body, words in (
         ("1/accept", ANNA, "in force already"),
         ("thaw", ANNA, "not frozen"),
         ("renew", {**ANNA, "event_time": "2999-01-01T00:00:00Z"}, "future"),
-    ],
-)
-async def test_what_does_not_fit_is_refused_and_changes_nothing(
-    service: Any, as_problem: AsProblem, path: str, body: Any, words: str
-) -> None:
-    before = await service.json(BASELINES)
+    ):
+        answer = await post(learned, f"{BASELINES}/{path}", body)
 
-    answer = await post(service, f"{BASELINES}/{path}", body)
-
-    assert answer.status_code == 409
-    assert words in as_problem(answer)["detail"]
-    assert await service.json(BASELINES) == before
+        assert answer.status_code == 409
+        assert words in as_problem(answer)["detail"]
+        assert await learned.json(BASELINES) == before
 
 
-@pytest.mark.parametrize(
-    ("path", "body", "parameter"),
-    [
+async def test_a_wrong_request_is_refused_by_name(learned: Any, as_problem: AsProblem) -> None:
+    for path, body, parameter in (
         ("freeze", {"actor": "A. Name"}, "reason"),
         ("freeze", {"actor": "A. Name", "reason": " "}, "reason"),
         ("freeze", {"actor": "A. Name", "reason": "x" * 501}, "reason"),
@@ -170,27 +166,23 @@ async def test_what_does_not_fit_is_refused_and_changes_nothing(
         ("renew", {**ANNA, "event_time": 1704067200}, "event_time"),
         ("renew", {**ANNA, "event_time": "1969-01-01T00:00:00Z"}, "event_time"),
         ("0/accept", ANNA, "version"),
-    ],
-)
-async def test_a_wrong_request_is_refused_by_name(
-    service: Any, as_problem: AsProblem, path: str, body: Any, parameter: str
-) -> None:
-    answer = await post(service, f"{BASELINES}/{path}", body)
+    ):
+        answer = await post(learned, f"{BASELINES}/{path}", body)
 
-    assert answer.status_code == 422
-    assert as_problem(answer)["errors"][0]["parameter"] == parameter
+        assert answer.status_code == 422, body
+        assert as_problem(answer)["errors"][0]["parameter"] == parameter
 
 
 async def test_nobody_acts_from_another_site_or_on_what_is_not_there(
-    service: Any, as_problem: AsProblem
+    learned: Any, as_problem: AsProblem
 ) -> None:
-    foreign = await post(service, f"{BASELINES}/freeze", ANNA, origin="https://elsewhere.example")
-    unknown = await post(service, f"{BASELINES}/9/accept", ANNA)
-    unwatched = await post(service, "/api/v1/units/U2/bearings/UJB/baselines/freeze", ANNA)
+    foreign = await post(learned, f"{BASELINES}/freeze", ANNA, origin="https://elsewhere.example")
+    unknown = await post(learned, f"{BASELINES}/9/accept", ANNA)
+    unwatched = await post(learned, "/api/v1/units/U2/bearings/UJB/baselines/freeze", ANNA)
 
     assert foreign.status_code == 403
     assert as_problem(unknown)["detail"] == "unit 'U1' bearing 'UJB' has no baseline 9"
     assert unknown.status_code == 404
     assert unwatched.status_code == 409
     assert "rated_power_mw" in as_problem(unwatched)["detail"]
-    assert (await service.json(BASELINES))["is_frozen"] is False
+    assert (await learned.json(BASELINES))["is_frozen"] is False

@@ -32,8 +32,8 @@ async def keeping(service: Any) -> AsyncIterator[None]:
     await service.evidence.close()
 
 
-async def alarmed(service: Any, machine: Any) -> AlarmNews:
-    """A film that has lost a third, and its alarm."""
+def raised(service: Any, machine: Any) -> AlarmNews:
+    """A film that has lost a third raises its alarm."""
     machine.run(30, ln_change=-0.4)
     rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
     condition = alarm_condition(told.findings[0], rules.change)
@@ -42,6 +42,12 @@ async def alarmed(service: Any, machine: Any) -> AlarmNews:
     news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
     service.evidence.see([news])
     service.store.append([], [], [news])
+    return news
+
+
+async def alarmed(service: Any, machine: Any) -> AlarmNews:
+    """The same, and its evidence has been written."""
+    news = raised(service, machine)
     async with keeping(service), asyncio.timeout(60):
         while service.evidence.n_written < 1:
             await asyncio.sleep(0.001)
@@ -66,11 +72,17 @@ class Tags(HTMLParser):
         self.words += data
 
 
-async def test_the_document_says_with_what_the_film_was_compared(
-    service: Any, machine: Any
-) -> None:
-    await alarmed(service, machine)
+async def test_the_evidence_of_a_changed_film(service: Any, machine: Any) -> None:
+    """Its document, its page and its bundle; one service, because the film takes long to change."""
+    news = await alarmed(service, machine)
 
+    await require_a_document_of_what_the_film_was_compared_with(service)
+    await require_a_report_of_everything_without_a_script(service)
+    await require_a_bundle_of_everything(service)
+    await require_that_what_people_write_stays_writing(service, news, machine.time_ns)
+
+
+async def require_a_document_of_what_the_film_was_compared_with(service: Any) -> None:
     [listed] = (await service.json(PATH))["occurrences"]
     assert (listed["state"], listed["samples"], listed["change"]) == ("complete", "none", "raised")
     found = await service.json(listed["evidence"])
@@ -95,9 +107,7 @@ async def test_the_document_says_with_what_the_film_was_compared(
     assert found["limits"]["films"]["change"]["alert_change"] == 0.04
 
 
-async def test_the_report_tells_everything_without_a_script(service: Any, machine: Any) -> None:
-    await alarmed(service, machine)
-
+async def require_a_report_of_everything_without_a_script(service: Any) -> None:
     answer = await service.get(f"{PATH}/1/report")
 
     assert answer.status_code == 200
@@ -117,10 +127,11 @@ async def test_the_report_tells_everything_without_a_script(service: Any, machin
     assert answer.text.count("<svg") >= 3
 
 
-async def test_what_people_write_stays_writing(service: Any, machine: Any) -> None:
-    news = await alarmed(service, machine)
+async def require_that_what_people_write_stays_writing(
+    service: Any, news: AlarmNews, time_ns: int
+) -> None:
     action = Acknowledge(actor=HOSTILE, comment=HOSTILE, occurrence=1)
-    told = AlarmNews(*operate(news.alarm, action, machine.time_ns + 1))
+    told = AlarmNews(*operate(news.alarm, action, time_ns + 1))
     service.store.append([], [], [told])
 
     page = Tags((await service.get(f"{PATH}/1/report")).text)
@@ -130,9 +141,7 @@ async def test_what_people_write_stays_writing(service: Any, machine: Any) -> No
     assert "<script>" in page.words
 
 
-async def test_a_bundle_holds_everything(service: Any, machine: Any) -> None:
-    await alarmed(service, machine)
-
+async def require_a_bundle_of_everything(service: Any) -> None:
     answer = await service.get(f"{PATH}/1/bundle.zip")
 
     assert answer.headers["content-type"] == "application/zip"
@@ -151,36 +160,25 @@ async def test_a_bundle_holds_everything(service: Any, machine: Any) -> None:
     assert trend["level_x"].to_pylist()[-1] > 0
 
 
-@pytest.mark.parametrize(
-    ("path", "status"),
-    [
+async def test_what_is_not_there_is_a_problem(learned: Any, as_problem: Callable[..., Any]) -> None:
+    for path, status in (
         (f"{PATH}/1", 404),
         ("/api/v1/alarms/U1:UJB:nonsense/evidence", 404),
         ("/api/v1/alarms/..:..:stiffness_x/evidence", 404),
         ("/api/v1/alarms/..%2f..:x:stiffness_x/evidence/1", 404),
         (f"{PATH}/0", 422),
         (f"{PATH}?limit=0", 422),
-    ],
-)
-async def test_what_is_not_there_is_a_problem(
-    service: Any, path: str, status: int, as_problem: Callable[..., Any]
-) -> None:
-    answer = await service.client.get(path)
+    ):
+        answer = await learned.client.get(path)
 
-    assert answer.status_code == status, answer.text
-    as_problem(answer)
+        assert answer.status_code == status, answer.text
+        as_problem(answer)
 
 
 async def test_evidence_that_waits_for_the_disk_is_not_called_lost(
     service: Any, machine: Any
 ) -> None:
-    machine.run(30, ln_change=-0.4)
-    rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
-    condition = alarm_condition(told.findings[0], rules.change)
-    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.STIFFNESS_X))
-    news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
-    service.evidence.see([news])
-    service.store.append([], [], [news])
+    raised(service, machine)
 
     [listed] = (await service.json(PATH))["occurrences"]
     assert (listed["state"], listed["evidence"]) == ("waiting", None)

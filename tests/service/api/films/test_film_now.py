@@ -29,6 +29,8 @@ async def test_a_softer_film_is_told_with_interval_time_scale_and_cause(
 ) -> None:
     machine.run(40, ln_change=-0.3)
 
+    alarms = (await service.json("/api/v1/alarms"))["unjudged"]
+    units = (await service.json("/api/v1/overview"))["units"]
     softer = (await service.json(FILM))["x"]
 
     assert (softer["verdict"], softer["level"], softer["reason"]) == ("danger", "danger", "ok")
@@ -41,20 +43,39 @@ async def test_a_softer_film_is_told_with_interval_time_scale_and_cause(
     assert softer["deviation"]["percent"] == pytest.approx(-25.9, abs=0.1)
     assert softer["cause"]["cause"] == "unknown"  # nobody has learned how the shaft answers
     assert "response" in softer["cause"]["reason"]
+    require_a_word_for_every_film(*units)
+    require_the_condition_of_each_film({a["id"]: a["film"] for a in alarms if a["unit"] == "U1"})
 
 
-async def test_the_condition_is_told_with_the_bounds_of_its_cell(
+def require_a_word_for_every_film(first: Any, second: Any) -> None:
+    assert [film["bearing"] for film in first["films"]] == ["UJB", "LJB", "TJB"]
+    assert first["films"][0]["x"]["verdict"] == "danger"
+    assert first["films"][0]["x"]["change_percent"] < -10.0
+    assert first["films"][1]["x"]["verdict"] == "no_baseline"
+    assert {film["x"] for film in second["films"]} == {None}
+
+
+def require_the_condition_of_each_film(found: dict[str, Any]) -> None:
+    assert found["U1:UJB:stiffness_x"]["operating_state"] == "full_load"
+    assert found["U1:UJB:stiffness_x"]["cell"]["eccentricity_low"] is not None
+    assert {found[id_] for id_ in found if "stiffness" not in id_} == {None}
+
+
+async def test_the_condition_is_told_with_its_cell_and_the_time_of_the_next_reading(
     service: Any, machine: Any
 ) -> None:
     machine.run(2, eccentricity_ratio=0.37, oil_temperature_c=46.1)
 
-    condition = (await service.json(FILM))["condition"]
+    found = await service.json(FILM)
 
+    condition = found["condition"]
     assert (condition["operating_state"], condition["is_settled"]) == ("full_load", True)
     cell = condition["cell"]
     assert (cell["eccentricity_low"], cell["eccentricity_high"]) == (0.35, 0.4)
     assert (cell["oil_temperature_low_c"], cell["oil_temperature_high_c"]) == (45.0, 47.5)
     assert cell["attitude_low_deg"] is None
+    assert found["next_reading"] > found["time"]
+    assert found["next_reading"].endswith("0:00.000Z")  # the next full period
 
 
 async def test_what_is_not_judged_is_never_called_normal_and_says_why(
@@ -86,15 +107,6 @@ async def test_what_is_not_judged_is_never_called_normal_and_says_why(
     assert (await service.json(LJB))["x"]["reason"] == "none_in_force"
 
 
-async def test_the_next_reading_is_due_at_the_next_full_period(service: Any, machine: Any) -> None:
-    machine.run(1)
-
-    found = await service.json(FILM)
-
-    assert found["next_reading"] > found["time"]
-    assert found["next_reading"].endswith("0:00.000Z")
-
-
 async def test_nothing_old_passes_for_a_verdict_of_now(service: Any, machine: Any) -> None:
     machine.run(40, ln_change=-0.3)
     service.live.set_link("U1", LinkState.NOT_CONNECTED, "no route to host")
@@ -107,32 +119,9 @@ async def test_nothing_old_passes_for_a_verdict_of_now(service: Any, machine: An
     assert lost["is_current"] is False
 
 
-async def test_a_film_that_is_not_watched_says_why(service: Any) -> None:
-    found = await service.json("/api/v1/units/U2/bearings/UJB/film")
+async def test_a_film_that_is_not_watched_says_why(learned: Any) -> None:
+    found = await learned.json("/api/v1/units/U2/bearings/UJB/film")
 
     assert found["is_watched"] is False
     assert "rated_power_mw" in found["why_not"]
     assert (found["x"], found["y"], found["estimator"]) == (None, None, None)
-
-
-async def test_the_overview_has_a_word_for_every_film(service: Any, machine: Any) -> None:
-    machine.run(40, ln_change=-0.3)
-
-    first, second = (await service.json("/api/v1/overview"))["units"]
-
-    assert [film["bearing"] for film in first["films"]] == ["UJB", "LJB", "TJB"]
-    assert first["films"][0]["x"]["verdict"] == "danger"
-    assert first["films"][0]["x"]["change_percent"] < -10.0
-    assert first["films"][1]["x"]["verdict"] == "no_baseline"
-    assert {film["x"] for film in second["films"]} == {None}
-
-
-async def test_an_alarm_of_a_film_carries_its_condition(service: Any, machine: Any) -> None:
-    machine.run(1)
-
-    alarms = (await service.json("/api/v1/alarms"))["unjudged"]
-
-    found = {alarm["id"]: alarm["film"] for alarm in alarms if alarm["unit"] == "U1"}
-    assert found["U1:UJB:stiffness_x"]["operating_state"] == "full_load"
-    assert found["U1:UJB:stiffness_x"]["cell"]["eccentricity_low"] is not None
-    assert {found[id_] for id_ in found if "stiffness" not in id_} == {None}

@@ -17,10 +17,10 @@ ALL = {"start": "2023-01-01T00:00:00Z", "end": "2024-06-01T00:00:00Z"}
 
 
 async def test_readings_are_the_stored_ones_with_their_conditions(
-    service: Any, lived: StiffnessHistory
+    learned: Any, lived: StiffnessHistory
 ) -> None:
     end = rfc3339(int(lived.time_ns[0]) + DAY_NS)
-    found = await service.json(READINGS, start=ALL["start"], end=end)
+    found = await learned.json(READINGS, start=ALL["start"], end=end)
 
     n = found["n_found"]
     assert n == int(np.sum(lived.time_ns < lived.time_ns[0] + DAY_NS)) == len(found["time"])
@@ -42,9 +42,9 @@ async def test_readings_are_the_stored_ones_with_their_conditions(
 
 
 async def test_more_readings_than_wanted_are_thinned_evenly_up_to_the_newest(
-    service: Any, lived: StiffnessHistory
+    learned: Any, lived: StiffnessHistory
 ) -> None:
-    found = await service.json(READINGS, **ALL, max_points=50)
+    found = await learned.json(READINGS, **ALL, max_points=50)
 
     assert found["n_found"] == len(lived)
     assert len(found["time"]) == 50
@@ -56,12 +56,12 @@ async def test_more_readings_than_wanted_are_thinned_evenly_up_to_the_newest(
 
 
 async def test_all_readings_come_page_by_page_without_a_gap_or_a_double(
-    service: Any, lived: StiffnessHistory
+    learned: Any, lived: StiffnessHistory
 ) -> None:
     times: list[float] = []
     end = ALL["end"]
     while end:
-        page = await service.json(READINGS, start=ALL["start"], end=end, thin=False, max_points=999)
+        page = await learned.json(READINGS, start=ALL["start"], end=end, thin=False, max_points=999)
         times = page["time"] + times
         end = page["next_end"]
 
@@ -69,9 +69,9 @@ async def test_all_readings_come_page_by_page_without_a_gap_or_a_double(
 
 
 async def test_readings_are_filtered_by_state_eccentricity_and_oil(
-    service: Any, lived: StiffnessHistory
+    learned: Any, lived: StiffnessHistory
 ) -> None:
-    found = await service.json(
+    found = await learned.json(
         READINGS,
         **ALL,
         state="full_load",
@@ -100,23 +100,23 @@ async def test_what_is_measured_is_told_from_what_was_simulated(service: Any, ma
 
 
 async def test_readings_of_a_film_that_is_not_watched_are_refused_with_the_reason(
-    service: Any,
+    learned: Any,
 ) -> None:
-    found = await service.problem("/api/v1/units/U2/bearings/UJB/film/readings", 409, **ALL)
-    unknown = await service.problem("/api/v1/units/U1/bearings/XJB/film/readings", 404, **ALL)
+    found = await learned.problem("/api/v1/units/U2/bearings/UJB/film/readings", 409, **ALL)
+    unknown = await learned.problem("/api/v1/units/U1/bearings/XJB/film/readings", 404, **ALL)
 
     assert "rated_power_mw" in found["detail"]
     assert "XJB" in unknown["detail"]
 
 
 async def test_readings_of_a_film_are_the_same_numbers_as_a_file(
-    service: Any, lived: StiffnessHistory
+    learned: Any, lived: StiffnessHistory
 ) -> None:
     asked = {**ALL, "end": rfc3339(int(lived.time_ns[0]) + DAY_NS)}
-    found = await service.json(READINGS, **asked)
+    found = await learned.json(READINGS, **asked)
 
-    text = (await service.get(READINGS, **asked, format="csv")).text
-    file = (await service.get(READINGS, **asked, format="parquet")).content
+    text = (await learned.get(READINGS, **asked, format="csv")).text
+    file = (await learned.get(READINGS, **asked, format="parquet")).content
 
     rows, table = list(csv.DictReader(io.StringIO(text))), pq.read_table(io.BytesIO(file))
     assert len(rows) == table.num_rows == found["n_found"]

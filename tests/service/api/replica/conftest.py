@@ -61,14 +61,11 @@ def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, Car
 
 
 @pytest.fixture
-async def pair(
-    running: Any, plant: PlantFile, documents: list[dict[str, Any]]
-) -> AsyncIterator[Pair]:
+async def pair(running: Any, plant: PlantFile) -> AsyncIterator[Pair]:
     """Both, and the replica has seen two reports: it knows that somebody is alive."""
     reporter, carrying_out = process_of(running, plant, "one")
     replica = await replica_on(plant, running.store, running.clock)
     app = create_app(replica_context(replica, None, None, Heartbeats(running.clock)))
-    app.openapi_schema = documents[0]
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         both = Pair(running, replica, client, reporter, carrying_out)
