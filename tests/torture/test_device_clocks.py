@@ -3,10 +3,9 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from harness.bench import Bench, bench_of
+from harness.bench import bench_of
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import until
 
@@ -26,7 +25,7 @@ def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
     plant = LedgerPlant(seed=torture_seed, load=1.0, n_units=1, drift_ppm=DRIFT_PPM)
     with bench_of(plant, tmp_path, torture_seed) as bench:
         until(lambda: bench.active("clock_drift"), DRIFTS_WITHIN_S)
-        clock = clock_of(bench)
+        clock = bench.clock()
         drift_ppm, u_ppm = clock["drift_ppm"], clock["drift_uncertainty_ppm"]
         assert abs(drift_ppm - DRIFT_PPM) <= 4.0 * u_ppm, clock
         assert bench.wrong() == {}
@@ -44,14 +43,8 @@ def test_stamps_of_2106_are_told_and_no_result_has_their_time(
             bench.daq.tell(f"U1 wrong_time {n_slots}")
             n_expected += n_slots
             time.sleep(n_slots * plant.slot_samples / plant.rate_hz)
-            until(lambda wanted=n_expected: clock_of(bench)["n_stamp_faults"] >= wanted)
-        assert clock_of(bench)["n_stamp_faults"] == n_expected
+            until(lambda wanted=n_expected: bench.clock()["n_stamp_faults"] >= wanted)
+        assert bench.clock()["n_stamp_faults"] == n_expected
         time.sleep(2.0 * plant.refresh_s)
         assert bench.wrong() == {}
     figure(f"{n_expected} slots stamped 2106: all told, no result has that time")
-
-
-def clock_of(bench: Bench) -> Any:
-    """The clock of the first unit's device, as the service sees it."""
-    with bench.rig.api() as api:
-        return api.get("/api/v1/units/U1")["source"]["clock"]

@@ -98,6 +98,12 @@ class Bench:
             events = api.get("/api/v1/alarms/events?limit=1000")["events"]
         return Counter(event["kind"] for event in events if event["change"] == "raised")
 
+    def clock(self) -> dict[str, Any]:
+        """Return the clock of the first unit's device, as the service sees it."""
+        with self.rig.api() as api:
+            found: dict[str, Any] = api.get("/api/v1/units/U1")["source"]["clock"]
+        return found
+
     def gaps(self) -> list[dict[str, Any]]:
         """Return the recorded gaps of the first unit."""
         ever = "start=2020-01-01T00:00:00Z&end=2100-01-01T00:00:00Z"
