@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 import structlog
 
+from acquisition.clock import Clock
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.monitor import UnitMonitor
 from core.settings import AnalysisSettings
@@ -15,28 +16,6 @@ from service.references import LOOK_EVERY_S, ReferencesInForce, with_reference
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
-
-
-class SteppedClock:
-    """Time passes when the test says so."""
-
-    def __init__(self) -> None:
-        self.slept_s: list[float] = []
-        self._step = asyncio.Event()
-
-    def now_ns(self) -> int:
-        return 0
-
-    def monotonic_s(self) -> float:
-        return sum(self.slept_s)
-
-    async def sleep(self, duration_s: float) -> None:
-        self.slept_s.append(duration_s)
-        await self._step.wait()
-        self._step.clear()
-
-    def step(self) -> None:
-        self._step.set()
 
 
 def bearing_named(name: str, **more: Any) -> Bearing:
@@ -62,13 +41,8 @@ def store(tmp_path: Path) -> Iterator[SqliteStore]:
 
 
 @pytest.fixture
-def clock() -> SteppedClock:
-    return SteppedClock()
-
-
-@pytest.fixture
-def in_force(monitor: UnitMonitor, store: SqliteStore, clock: SteppedClock) -> ReferencesInForce:
-    return ReferencesInForce({"U1": monitor}, store, clock)
+def in_force(monitor: UnitMonitor, store: SqliteStore, stepped_clock: Clock) -> ReferencesInForce:
+    return ReferencesInForce({"U1": monitor}, store, stepped_clock)
 
 
 @pytest.fixture
@@ -105,23 +79,19 @@ async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_
     in_force: ReferencesInForce,
     monitor: UnitMonitor,
     store: SqliteStore,
-    clock: SteppedClock,
+    stepped_clock: Clock,
     logged: list[Any],
 ) -> None:
     running = asyncio.create_task(in_force.run())
-    for n, x_um in enumerate((1990.0, 1991.0, 1992.0)):
-        await until(lambda n=n: len(clock.slept_s) == n + 1)
+    for x_um in (1990.0, 1991.0, 1992.0):
         store.add_reference(reference(x_um=x_um))
-        clock.step()
         await until(lambda x_um=x_um: watched(monitor)["UJB"][0] == x_um)
-    for n in (4, 5):  # nothing new
-        await until(lambda n=n: len(clock.slept_s) == n)
-        clock.step()
-    await until(lambda: len(clock.slept_s) == 6)
+    taken_s = stepped_clock.monotonic_s()
+    await until(lambda: stepped_clock.monotonic_s() >= taken_s + 3 * LOOK_EVERY_S)  # nothing new
     running.cancel()
     await asyncio.wait([running])
 
-    assert set(clock.slept_s) == {LOOK_EVERY_S}
+    assert stepped_clock.monotonic_s() % LOOK_EVERY_S == 0.0
     assert LOOK_EVERY_S <= 5.0
     assert [line["event"] for line in logged] == ["reference taken over"] * 3
     assert logged[0]["gap_reference_um"] == (1990.0, 2003.1)
@@ -142,9 +112,12 @@ async def test_a_reference_of_a_bearing_that_is_gone_is_ignored_and_said_once(
 
 
 async def test_while_the_store_cannot_be_read_the_references_stay(
-    monitor: UnitMonitor, store: SqliteStore, tmp_path: Path, logged: list[Any]
+    in_force: ReferencesInForce,
+    monitor: UnitMonitor,
+    store: SqliteStore,
+    tmp_path: Path,
+    logged: list[Any],
 ) -> None:
-    in_force = ReferencesInForce({"U1": monitor}, store, SteppedClock())
     store.add_reference(reference())
     await in_force.look()
     path, away = tmp_path / "padwatch.sqlite3", tmp_path / "away"

@@ -1,14 +1,54 @@
-"""An alarm with its rule, to be led through its life."""
+"""An alarm to be led through its life, and a unit with blocks to watch."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
+import numpy as np
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, Condition
 from core.alarms.event import AlarmEvent
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Action, operate
+from core.blocks import SampleBlock
+from core.machine import Bearing, Channel, Measurand, Unit
+from core.quality import GOOD, Reading
+from core.units import NS_PER_S
+
+IDS = ("sx", "sy", "bx", "by", "spare")
+
+
+@pytest.fixture(scope="session")
+def unit() -> Unit:
+    """One bearing with gaps and oil, and a channel that belongs to none."""
+    channels = tuple(Channel(id_, Measurand.GAP_UM) for id_ in IDS)
+    bearing = Bearing("UJB", 1e9, *IDS[:4], 200.0, (2000.0, 2000.0), oil_temperature="oil")
+    return Unit("U1", 60.0, 100.0, channels, (bearing,))
+
+
+BlockOf = Callable[..., SampleBlock]
+
+
+@pytest.fixture(scope="session")
+def block() -> BlockOf:
+    """Builds the block of a second, good unless changed."""
+
+    def build(second: int, oil: Reading | float = 45.0, **changes: Any) -> SampleBlock:
+        qualities = changes.pop("qualities", (GOOD,) * len(IDS))
+        return SampleBlock(
+            unit="U1",
+            epoch=1,
+            first_index=second * 100,
+            start_ns=second * NS_PER_S,
+            rate_hz=100.0,
+            samples=np.zeros((len(qualities), 100), dtype=np.float32),
+            channel_quality=tuple(qualities),
+            slow={"oil": oil if isinstance(oil, Reading) else Reading(oil)},
+            **changes,
+        )
+
+    return build
 
 
 @dataclass

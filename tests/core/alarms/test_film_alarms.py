@@ -7,24 +7,16 @@ import pytest
 from core.alarms.alarm import AlarmLevel, AlarmState, Condition, unknown
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.machine import Bearing, Channel, Measurand, Unit
+from core.machine import Unit
 
-IDS = ("sx", "sy", "bx", "by")
-
-UNIT = Unit(
-    "U1",
-    60.0,
-    100.0,
-    tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
-    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0)),),
-)
 FILM_X = "U1:UJB:stiffness_x"
 
 LOST = Condition(AlarmLevel.ALERT, value=-0.21, limit=0.1, reason="film")
 
 
-def alarms_of(*, latching: bool = False) -> UnitAlarms:
-    return UnitAlarms(UNIT, UnitRules(films=rule_of(0.0, 0.0, is_latching=latching)))
+@pytest.fixture
+def alarms(unit: Unit) -> UnitAlarms:
+    return UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0)))
 
 
 def changes(alarms: UnitAlarms, conditions: Mapping[str, Condition], now_ns: int) -> list[str]:
@@ -32,36 +24,32 @@ def changes(alarms: UnitAlarms, conditions: Mapping[str, Condition], now_ns: int
     return [event.change.value for told in news for event in told.events]
 
 
-def test_each_bearing_has_an_alarm_for_its_film_in_each_direction() -> None:
-    ids = [alarm.identity.id for alarm in alarms_of().alarms]
+def test_each_bearing_has_an_alarm_for_its_film_in_each_direction(alarms: UnitAlarms) -> None:
+    ids = [alarm.identity.id for alarm in alarms.alarms]
     assert [id_ for id_ in ids if "stiffness" in id_] == [FILM_X, "U1:UJB:stiffness_y"]
 
 
-def test_no_film_is_watched_unless_asked_for() -> None:
-    alarms = UnitAlarms(UNIT, UnitRules())
+def test_no_film_is_watched_unless_asked_for(unit: Unit) -> None:
+    alarms = UnitAlarms(unit, UnitRules())
     assert not [a for a in alarms.alarms if "stiffness" in a.identity.id]
     with pytest.raises(KeyError):
         alarms.films({FILM_X: LOST}, 0)
 
 
-def test_a_loss_of_stiffness_is_announced_at_once_with_its_size() -> None:
-    alarms = alarms_of()
+def test_a_loss_of_stiffness_is_announced_at_once_with_its_size(alarms: UnitAlarms) -> None:
     [news] = alarms.films({FILM_X: LOST}, 7)
 
     [event] = news.events
-    assert (event.change.value, event.value, event.limit, event.time_ns) == (
-        "raised",
-        -0.21,
-        0.1,
-        7,
-    )
+    found = (event.change.value, event.value, event.limit, event.time_ns)
+    assert found == ("raised", -0.21, 0.1, 7)
 
 
 @pytest.mark.parametrize(
     "verdict", ["no_baseline", "insufficient_excitation", "bad_quality", "transient"]
 )
-def test_a_film_that_cannot_be_judged_stays_in_alarm_and_says_why(verdict: str) -> None:
-    alarms = alarms_of()
+def test_a_film_that_cannot_be_judged_stays_in_alarm_and_says_why(
+    alarms: UnitAlarms, verdict: str
+) -> None:
     changes(alarms, {FILM_X: LOST}, 0)
 
     assert changes(alarms, {FILM_X: unknown(verdict)}, 1) == ["condition_unknown"]
@@ -69,15 +57,14 @@ def test_a_film_that_cannot_be_judged_stays_in_alarm_and_says_why(verdict: str) 
     assert (alarm.level, alarm.condition.reason) == (AlarmLevel.ALERT, verdict)
 
 
-def test_a_film_that_was_never_judged_raises_nothing() -> None:
-    alarms = alarms_of()
+def test_a_film_that_was_never_judged_raises_nothing(alarms: UnitAlarms) -> None:
     assert changes(alarms, {FILM_X: unknown("no_baseline")}, 1) == []
     alarm = alarms.alarm(FILM_X)
     assert (alarm.state, alarm.condition.is_known) == (AlarmState.NORMAL, False)
 
 
-def test_a_latched_loss_outlasts_the_healthy_verdict() -> None:
-    alarms = alarms_of(latching=True)
+def test_a_latched_loss_outlasts_the_healthy_verdict(unit: Unit) -> None:
+    alarms = UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0, is_latching=True)))
     changes(alarms, {FILM_X: LOST}, 0)
 
     assert changes(alarms, {FILM_X: Condition()}, 1) == ["latched"]

@@ -1,9 +1,8 @@
 """Alarms of a unit that go on elsewhere: by what was known of them, and by what is stored."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmLevel, AlarmState
@@ -13,18 +12,9 @@ from core.alarms.operation import Acknowledge, Action, Comment
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.quality import GOOD, Reading
+from core.machine import Unit
 
 SECOND = 1_000_000_000
-IDS = ("sx", "sy", "bx", "by")
-UNIT = Unit(
-    "U1",
-    60.0,
-    100.0,
-    tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
-    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0), oil_temperature="oil"),),
-)
 OIL = "U1:UJB:oil_temperature"
 LINK = "U1:link:link_lost"
 WATCHED = UnitRules(
@@ -38,24 +28,21 @@ NO_LIMIT = replace(WATCHED, bearings={})
 class Lives:
     """One process after the other, each with what the ones before have stored."""
 
-    def __init__(self) -> None:
+    def __init__(self, unit: Unit, block: Callable[..., SampleBlock]) -> None:
+        self.unit, self.block = unit, block
         self.stored: dict[str, Alarm] = {}
         self.events: list[tuple[str, str, str]] = []
-        self.alarms = UnitAlarms(UNIT, WATCHED)
+        self.alarms = UnitAlarms(unit, WATCHED)
         self.memory = self.alarms.memory
 
     def restart(self, rules: UnitRules = WATCHED) -> None:
         """Begin anew where the memory was stored last."""
-        self.alarms = UnitAlarms(UNIT, rules)
+        self.alarms = UnitAlarms(self.unit, rules)
         self.store(self.alarms.restore(self.stored.values(), 0, self.memory))
 
     def take(self, second: int, oil: float = 45.0) -> None:
         """Take a block in; how far that is is stored with what it brings."""
-        samples = np.zeros((4, 100), dtype=np.float32)
-        slow = {"oil": Reading(oil)}
-        start_ns = second * SECOND
-        block = SampleBlock("U1", 1, second * 100, start_ns, 100.0, samples, (GOOD,) * 4, slow)
-        self.store(self.alarms.take(block, [], start_ns))
+        self.store(self.alarms.take(self.block(second, oil), [], second * SECOND))
         self.memory = self.alarms.memory
 
     def hear(self, is_connected: bool, *seconds: int) -> None:
@@ -80,8 +67,8 @@ class Lives:
 
 
 @pytest.fixture
-def lives() -> Lives:
-    return Lives()
+def lives(unit: Unit, block: Callable[..., SampleBlock]) -> Lives:
+    return Lives(unit, block)
 
 
 @pytest.fixture

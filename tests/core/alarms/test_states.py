@@ -1,9 +1,9 @@
 """Alarms of one unit through its operating states."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from core.alarms.alarm import AlarmState
@@ -15,19 +15,11 @@ from core.alarms.vector_change import OrderVector, VectorReference
 from core.blocks import SampleBlock
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.quality import GOOD, Reading, Reason, missing
+from core.machine import Unit
+from core.quality import Reading, Reason, missing
 from core.quantities import CATALOGUE
 
 SECOND = 1_000_000_000
-IDS = ("sx", "sy", "bx", "by")
-UNIT = Unit(
-    "U1",
-    60.0,
-    100.0,
-    tuple(Channel(id_, Measurand.GAP_UM) for id_ in IDS),
-    (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0), oil_temperature="oil"),),
-)
 AT_ONCE = rule_of(0.0, 0.0)
 FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
 RUN_DOWN, STANDING = OperatingState.RUN_DOWN, OperatingState.STANDSTILL
@@ -54,10 +46,10 @@ RULES = UnitRules(
 class Machine:
     """A unit with its alarms, and everything within limits unless said otherwise."""
 
-    def __init__(self) -> None:
+    def __init__(self, unit: Unit, block: Callable[..., SampleBlock]) -> None:
         reference = VectorReference("U1", "UJB", FULL, {"shaft_x": OrderVector(50.0)})
-        self.alarms = UnitAlarms(UNIT, RULES, references=[reference])
-        self.n = 0
+        self.alarms = UnitAlarms(unit, RULES, references=[reference])
+        self.block, self.n = block, 0
 
     def runs(self, state: OperatingState | None, oil_c: float = 45.0, **found: Any) -> list[str]:
         self.n += 1
@@ -73,17 +65,7 @@ class Machine:
             readings=readings,
             condition=condition,
         )
-        block = SampleBlock(
-            "U1",
-            1,
-            self.n * 100,
-            self.n * SECOND,
-            100.0,
-            np.zeros((4, 100), dtype=np.float32),
-            (GOOD,) * 4,
-            {"oil": Reading(oil_c)},
-        )
-        news = self.alarms.take(block, [assessment], 0)
+        news = self.alarms.take(self.block(self.n, oil_c), [assessment], 0)
         return [f"{e.identity.kind} {e.change}" for told in news for e in told.events]
 
     def state(self, id_: str) -> AlarmState:
@@ -91,8 +73,8 @@ class Machine:
 
 
 @pytest.fixture
-def machine() -> Machine:
-    return Machine()
+def machine(unit: Unit, block: Callable[..., SampleBlock]) -> Machine:
+    return Machine(unit, block)
 
 
 @pytest.mark.parametrize(

@@ -5,28 +5,19 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from core.alarms.alarm import AlarmKind, AlarmLevel, AlarmState
 from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.blocks import SampleBlock
 from core.device_clock import StampFault
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.quality import GOOD, Quality, Reading, Reason, bad, missing
+from core.machine import Unit
+from core.quality import GOOD, Reading, Reason, bad, missing
 
 SECOND = 1_000_000_000
 IDS = ("sx", "sy", "bx", "by", "spare")
 
-UNIT = Unit(
-    "U1",
-    60.0,
-    100.0,
-    tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
-    (Bearing("UJB", 1e9, "sx", "sy", "bx", "by", 200.0, (2000.0, 2000.0), oil_temperature="oil"),),
-)
 RULES = UnitRules(
     channel=rule_of(0.0, 0.0),
     slow_channel=rule_of(0.0, 0.0),
@@ -37,25 +28,6 @@ RULES = UnitRules(
         )
     },
 )
-
-
-def block(
-    second: int,
-    qualities: Sequence[Quality] = (GOOD,) * 5,
-    oil: Reading | None = None,
-    **other: Any,
-) -> SampleBlock:
-    return SampleBlock(
-        unit="U1",
-        epoch=1,
-        first_index=second * 100,
-        start_ns=second * SECOND,
-        rate_hz=100.0,
-        samples=np.zeros((len(qualities), 100), dtype=np.float32),
-        channel_quality=tuple(qualities),
-        slow={"oil": oil or Reading(45.0)},
-        **other,
-    )
 
 
 def assessed(**readings: Reading) -> Any:
@@ -74,8 +46,8 @@ def told(news: Sequence[Any]) -> list[tuple[str, str]]:
 
 
 @pytest.fixture
-def alarms() -> UnitAlarms:
-    return UnitAlarms(UNIT, RULES)
+def alarms(unit: Unit) -> UnitAlarms:
+    return UnitAlarms(unit, RULES)
 
 
 def test_each_part_of_a_unit_has_its_alarm_by_a_name_that_stays(alarms: UnitAlarms) -> None:
@@ -91,8 +63,8 @@ def test_each_part_of_a_unit_has_its_alarm_by_a_name_that_stays(alarms: UnitAlar
     ]
 
 
-def test_a_replay_judges_neither_link_nor_clock() -> None:
-    alarms = UnitAlarms(UNIT, replace(RULES, clock=None, link=None))
+def test_a_replay_judges_neither_link_nor_clock(unit: Unit, block) -> None:
+    alarms = UnitAlarms(unit, replace(RULES, clock=None, link=None))
     alarms.link(False, "played out", 0)
     alarms.tick(10**15)
     alarms.take(block(0, stamp_fault=StampFault.JUMPED), [], 10**15)
@@ -106,15 +78,15 @@ def test_a_replay_judges_neither_link_nor_clock() -> None:
     assert all(a.state is AlarmState.NORMAL for a in alarms.alarms)
 
 
-def test_a_channel_without_a_bearing_is_watched_too(alarms: UnitAlarms) -> None:
-    news = alarms.take(block(0, (GOOD,) * 4 + (bad(Reason.CLIPPED),)), [], 0)
+def test_a_channel_without_a_bearing_is_watched_too(alarms: UnitAlarms, block) -> None:
+    news = alarms.take(block(0, qualities=(*(GOOD,) * 4, bad(Reason.CLIPPED))), [], 0)
 
     assert told(news) == [("U1:spare:channel_not_ok", "raised")]
     assert news[0].events[0].time_ns == SECOND  # the end of the block that shows it
 
 
 def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_otherwise(
-    alarms: UnitAlarms,
+    alarms: UnitAlarms, block
 ) -> None:
     stuck = assessed(shaft_x=missing(Reason.STUCK))
     alarms.take(block(0), [], 0)
@@ -128,7 +100,7 @@ def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_
 
 
 def test_an_amplitude_is_judged_when_its_segment_ends_not_when_the_block_does(
-    alarms: UnitAlarms,
+    alarms: UnitAlarms, block
 ) -> None:
     [news] = alarms.take(block(7), [assessed(shaft_y=Reading(61.0))], 0)
 
@@ -136,7 +108,9 @@ def test_an_amplitude_is_judged_when_its_segment_ends_not_when_the_block_does(
     assert news.events[0].time_ns == 5 * SECOND
 
 
-def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(alarms: UnitAlarms) -> None:
+def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(
+    alarms: UnitAlarms, block
+) -> None:
     warm, hot = Reading(66.0), Reading(76.0)
     found = [told(alarms.take(block(s, oil=warm), [], 0)) for s in range(4)]
     found += [told(alarms.take(block(s, oil=hot), [], 0)) for s in range(4, 8)]
@@ -145,7 +119,7 @@ def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(alarms: UnitA
     assert found == [[], [], [(id_, "raised")], [], [], [], [(id_, "escalated")], []]
 
 
-def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms: UnitAlarms) -> None:
+def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms: UnitAlarms, block) -> None:
     for second in range(4):
         alarms.take(block(second, oil=Reading(76.0)), [], 0)
 
@@ -160,27 +134,28 @@ def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms: UnitAlarms) 
     assert alarms.alarm("U1:UJB:oil_temperature").level is AlarmLevel.DANGER
 
 
-def test_a_block_that_comes_again_decides_nothing(alarms: UnitAlarms) -> None:
+def test_a_block_that_comes_again_decides_nothing(alarms: UnitAlarms, block) -> None:
     for second in range(3):
         alarms.take(block(second), [], 0)
 
-    assert alarms.take(block(1, (bad(Reason.CLIPPED),) * 5), [], 0) == []
-    assert told(alarms.take(block(3, (bad(Reason.CLIPPED),) * 5), [], 0)) != []
+    clipped = (bad(Reason.CLIPPED),) * 5
+    assert alarms.take(block(1, qualities=clipped), [], 0) == []
+    assert told(alarms.take(block(3, qualities=clipped), [], 0)) != []
 
 
-def test_a_channel_whose_rows_are_amplitude_and_phase_fails_with_either() -> None:
+def test_a_channel_whose_rows_are_amplitude_and_phase_fails_with_either(unit: Unit, block) -> None:
     rows = ["sx", "sx", "sy", "sy", "bx", "bx", "by", "by"]
-    alarms = UnitAlarms(UNIT, RULES, rows)
+    alarms = UnitAlarms(unit, RULES, rows)
     phase_lost = [GOOD, bad(Reason.NOT_FINITE), *(GOOD,) * 6]
 
-    news = alarms.take(block(0, phase_lost), [], 0)
+    news = alarms.take(block(0, qualities=phase_lost), [], 0)
 
     assert told(news) == [("U1:sx:channel_not_ok", "raised")]
     spare = alarms.alarm("U1:spare:channel_not_ok")  # no row is about it
     assert (spare.condition.is_known, spare.condition.reason) == (False, "not_measured")
 
 
-def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms: UnitAlarms) -> None:
+def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms: UnitAlarms, block) -> None:
     news = alarms.take(block(0, stamp_fault=StampFault.REGRESSED), [], 0)
     alarms.take(block(1), [], 0)
     later = alarms.take(block(2), [], 599 * SECOND)
@@ -191,7 +166,7 @@ def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms: UnitAlar
     assert (told(later), told(at_last)) == ([], [("U1:device:time_stamps", "returned")])
 
 
-def test_nothing_is_said_of_a_unit_in_good_health(alarms: UnitAlarms) -> None:
+def test_nothing_is_said_of_a_unit_in_good_health(alarms: UnitAlarms, block) -> None:
     alarms.link(True, None, 0)
     news = [alarms.take(block(s), [assessed()] if s % 9 == 8 else [], 0) for s in range(200)]
 

@@ -22,15 +22,12 @@ def readings(amplitude: Reading | float, phase: Reading | float) -> dict[str, Re
     return {n: r if isinstance(r, Reading) else Reading(r) for n, r in found.items()}
 
 
-def test_a_vector_that_turns_is_noticed_though_its_length_stays() -> None:
+def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays() -> None:
     found = vector_condition(readings(60.0, 70.0), "shaft_x", WELL, LIMITS, None)
 
     assert found.value == pytest.approx(60.0)  # 60° of an equilateral triangle
     assert found.level is ALERT
     assert found.reason == "above_limit"
-
-
-def test_a_turn_is_the_same_either_way_round() -> None:
     almost = vector_condition(readings(60.0, 350.0), "shaft_x", WELL, LIMITS, None)
 
     assert almost.value == pytest.approx(2 * 60.0 * math.sin(math.radians(10.0)))
