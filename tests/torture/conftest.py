@@ -79,6 +79,12 @@ def tmp_path(tmp_path: Path, is_whole: bool) -> Iterator[Path]:
 
 
 @pytest.fixture
+def plant(torture_seed: int) -> LedgerPlant:
+    """One unit with twelve channels at 600 Hz."""
+    return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
+
+
+@pytest.fixture
 def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
     """A DAQ of the test's plant; it goes on offering samples whatever happens to the service."""
     with ledger_daq(plant, tmp_path) as running:

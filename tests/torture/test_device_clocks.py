@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,10 +21,9 @@ pytestmark = pytest.mark.torture
 
 @pytest.mark.timeout(3600)
 def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
-    tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
+    plant: LedgerPlant, tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
 ) -> None:
-    plant = LedgerPlant(seed=torture_seed, load=1.0, n_units=1, drift_ppm=DRIFT_PPM)
-    with bench_of(plant, tmp_path, torture_seed) as bench:
+    with bench_of(replace(plant, drift_ppm=DRIFT_PPM), tmp_path, torture_seed) as bench:
         until(lambda: bench.active("clock_drift"), DRIFTS_WITHIN_S)
         clock = bench.clock()
         drift_ppm, u_ppm = clock["drift_ppm"], clock["drift_uncertainty_ppm"]
@@ -34,9 +34,8 @@ def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
 
 @pytest.mark.timeout(3600)
 def test_stamps_of_2106_are_told_and_no_result_has_their_time(
-    tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
+    plant: LedgerPlant, tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
 ) -> None:
-    plant = LedgerPlant(seed=torture_seed, load=1.0, n_units=1)
     n_expected = 0
     with bench_of(plant, tmp_path, torture_seed) as bench:
         for n_slots in SLOTS:

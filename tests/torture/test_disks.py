@@ -27,11 +27,6 @@ STRACE = (
 )
 
 
-@pytest.fixture
-def plant(torture_seed: int) -> LedgerPlant:
-    return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
-
-
 @pytest.mark.timeout(3600)
 def test_a_full_disk_costs_nothing_that_was_promised(
     plant: LedgerPlant,

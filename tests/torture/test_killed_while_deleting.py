@@ -1,6 +1,5 @@
 """Killed while old results become coarser: every hour is there as it was, finer or coarser."""
 
-import os
 import subprocess
 import time
 from collections.abc import Callable
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 from harness.deeds import HOP_NS, T0_NS, Build, value
 from harness.deleting import LATER_NS
-from harness.tape import python
+from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
 from service.store.port import Trend, TrendQuery
@@ -22,7 +21,6 @@ from service.store.sqlite import SqliteStore
 N_KILLS = 100
 N = 1500
 HOUR_NS = 3_600_000_000_000
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -68,12 +66,8 @@ def test_killed_while_deleting_every_hour_says_what_it_said(
 
 def is_cut_short(path: Path, after_s: float) -> bool:
     """Begin to delete, and kill it after a while; whether it had not come to its end."""
-    environment = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parent)])}
-    process = subprocess.Popen(
-        python("-m", "harness.deleting", path),
-        stdout=subprocess.PIPE,
-        env=os.environ | environment,
-    )
+    program = python("-m", "harness.deleting", path)
+    process = subprocess.Popen(program, stdout=subprocess.PIPE, env=environment())
     assert process.stdout is not None
     assert process.stdout.readline() == b"begun\n"
     time.sleep(after_s)

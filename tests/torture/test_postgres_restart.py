@@ -24,12 +24,6 @@ pytestmark = pytest.mark.skipif(why_not() is not None, reason=str(why_not()))
 
 
 @pytest.fixture
-def plant(torture_seed: int) -> LedgerPlant:
-    """One unit with twelve channels at 600 Hz."""
-    return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
-
-
-@pytest.fixture
 def server() -> Iterator[PostgresServer]:
     """A server that is stopped."""
     with PostgresServer() as running:

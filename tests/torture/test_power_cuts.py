@@ -1,6 +1,5 @@
 """The power fails at any moment: what was acknowledged is there, whole and unaltered."""
 
-import os
 import pickle
 import shutil
 import sqlite3
@@ -14,14 +13,13 @@ import pytest
 from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
 from harness.summary import planted
-from harness.tape import Acknowledged, Step, python, record
+from harness.tape import Acknowledged, Step, environment, python, record
 
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.trail import verify_trail
 
 N_DEEDS = 150
 N_CUTS, N_FEW = 5000, 50
-ROOT = Path(__file__).parents[2]
 DATABASE = "padwatch.sqlite3"
 
 
@@ -41,9 +39,8 @@ def recorded(
         data.mkdir()
         with (folder / "deeds").open("wb") as file:
             pickle.dump([deed(torture_seed, n, assessment) for n in range(N_DEEDS)], file)
-        environment = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parent)])}
         command = python("-m", "harness.writing", data / DATABASE, folder / "deeds", bug)
-        return record(command, data, folder / "tape", os.environ | environment)
+        return record(command, data, folder / "tape", environment())
 
     return run
 

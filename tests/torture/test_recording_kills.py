@@ -24,12 +24,6 @@ sync_s = {SYNC_S}
 """
 
 
-@pytest.fixture
-def plant(torture_seed: int) -> LedgerPlant:
-    """One unit with twelve channels at 600 Hz."""
-    return LedgerPlant(seed=torture_seed, n_units=1, load=1.0)
-
-
 def killed(
     plant: LedgerPlant, daq: LedgerDaq, rig: ServiceRig, root: Path, n: int, seed: int
 ) -> Recorded:

@@ -14,9 +14,8 @@ from typing import IO
 import pytest
 
 from harness.deeds import Deed
-from harness.tape import python
+from harness.tape import environment, python
 
-ROOT = Path(__file__).parents[3]
 PATIENCE_S = 120.0
 
 
@@ -108,13 +107,12 @@ def failing_calls(folder: Path, deeds: Sequence[Deed], *bugs: str) -> Iterator[F
     """Start what processes are begun from."""
     with (folder / "deeds").open("wb") as file:
         pickle.dump(list(deeds), file)
-    environment = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests" / "torture")])}
     server = subprocess.Popen(
         python("-m", "harness.enduring", folder / "deeds", *bugs),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        env=os.environ | environment,
+        env=environment(),
     )
     try:
         yield FailingCalls(server)

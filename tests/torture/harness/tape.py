@@ -1,11 +1,14 @@
 """Everything a program asks of its disk, in order, as strace sees it."""
 
+import os
 import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
 
 CALLS = (
     "openat,write,pwrite64,ftruncate,fsync,fdatasync,unlink,unlinkat,rename,renameat,renameat2,"
@@ -174,5 +177,10 @@ def _within(path: str, folder: Path) -> str | None:
 
 
 def python(*arguments: object) -> list[str]:
-    """The command line of a Python program."""
+    """Build the command line of a Python program."""
     return [sys.executable, *map(str, arguments)]
+
+
+def environment() -> dict[str, str]:
+    """Return the environment in which a Python program finds padwatch and this package."""
+    return os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests' / 'torture'}"}
