@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import pytest
@@ -155,6 +155,19 @@ def read() -> Callable[[Path, ImportJob], Found]:
             return Found(found.sample_type, list(found.blocks()))
 
     return read_all
+
+
+@pytest.fixture
+def read_text(
+    tmp_path: Path, job: ImportJob, read: Callable[[Path, ImportJob], Found]
+) -> Callable[..., Found]:
+    """Reads a text without slow values as CSV; keywords change the job."""
+
+    def read_it(text: str, **changes: Any) -> Found:
+        (tmp_path / "run.mf4").write_text(text)
+        return read(tmp_path / "run.mf4", replace(job, slow=(), **changes))
+
+    return read_it
 
 
 @pytest.fixture

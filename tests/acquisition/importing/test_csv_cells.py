@@ -3,33 +3,28 @@
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs.hostile_files import Read
 
 from acquisition.errors import ConfigError
 from acquisition.importing.job import CsvLayout, ImportJob, Place, TimeAxis
 
+ReadText = Callable[..., Any]
 START_NS = 1_767_225_600_000_000_000
 
 
-def test_thousands_are_not_taken_for_decimals(tmp_path: Path, read: Read, job: ImportJob) -> None:
-    (tmp_path / "run.mf4").write_text("time;shaft x;shaft y\n0;1.234;2\n")
-    german = replace(job, csv=CsvLayout(delimiter=";", decimal=","), slow=())
+def test_thousands_are_not_taken_for_decimals(read_text: ReadText) -> None:
+    german = CsvLayout(delimiter=";", decimal=",")
     with pytest.raises(ConfigError, match=r"line 2: .*'\.' in number '1\.234'"):
-        read(tmp_path / "run.mf4", german)
+        read_text("time;shaft x;shaft y\n0;1.234;2\n", csv=german)
 
 
 @pytest.mark.parametrize("year", ["9999", "2256", "1600", "0001"])
-def test_a_year_that_no_clock_can_have_had_is_refused(
-    tmp_path: Path, read: Read, job: ImportJob, year: str
-) -> None:
-    (tmp_path / "run.mf4").write_text(f"time,shaft x,shaft y\n{year}-12-31T00:00:00,1,2\n")
+def test_a_year_that_no_clock_can_have_had_is_refused(read_text: ReadText, year: str) -> None:
     axis = TimeAxis("column", 0, Place("time"), "iso8601")
     with pytest.raises(ConfigError, match=r"a time of .* s since 1970 is none"):
-        read(tmp_path / "run.mf4", replace(job, time=axis, slow=()))
+        read_text(f"time,shaft x,shaft y\n{year}-12-31T00:00:00,1,2\n", time=axis)
 
 
 @pytest.mark.parametrize(
@@ -45,26 +40,23 @@ def test_a_year_that_no_clock_can_have_had_is_refused(
 )
 @pytest.mark.parametrize("offset_h", [0, -3])
 def test_time_zones_are_those_of_the_text_or_else_of_the_mapping(
-    tmp_path: Path, read: Read, job: ImportJob, form: Any, of: Callable[[int], str], offset_h: int
+    read_text: ReadText, form: Any, of: Callable[[int], str], offset_h: int
 ) -> None:
     stamps = [START_NS // 1000 + n * 10**6 // 600 for n in range(60)]
     rows = "".join(f"{of(us)},1,2\n" for us in stamps)
-    (tmp_path / "run.mf4").write_text("time,shaft x,shaft y\n" + rows)
     axis = TimeAxis("column", offset_h * 3600, Place("time"), form)
-    found = read(tmp_path / "run.mf4", replace(job, time=axis, slow=()))
+    found = read_text("time,shaft x,shaft y\n" + rows, time=axis)
     has_zone = "+00:00" in rows
     expected_ns = START_NS - (0 if has_zone else offset_h * 3600 * 10**9)
     assert [b.start_ns for b in found.blocks] == [expected_ns, expected_ns + 83_333_000]
 
 
-def test_a_unit_in_a_heading_must_be_the_mapped_one(
-    tmp_path: Path, read: Read, job: ImportJob
-) -> None:
-    (tmp_path / "run").write_text("time,shaft x [mm],shaft y [South]\n0,1,2\n")
+def test_a_unit_in_a_heading_must_be_the_mapped_one(read_text: ReadText, job: ImportJob) -> None:
+    text = "time,shaft x [mm],shaft y [South]\n0,1,2\n"
     names = ("shaft x [mm]", "shaft y [South]")
     channels = tuple(replace(c, place=Place(n)) for c, n in zip(job.channels, names, strict=True))
     with pytest.raises(ConfigError, match=r"'shaft x \[mm\]' is in 'mm', the mapping says 'um'"):
-        read(tmp_path / "run", replace(job, channels=channels, slow=()))
+        read_text(text, channels=channels)
     channels = (replace(channels[0], unit="mm", factor=1000.0), channels[1])
-    found = read(tmp_path / "run", replace(job, channels=channels, slow=()))
+    found = read_text(text, channels=channels)
     assert found.samples.tolist() == [[1000.0], [2.0]]

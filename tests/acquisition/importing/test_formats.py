@@ -15,7 +15,7 @@ import pytest
 from asammdf.blocks.v4_blocks import ChannelConversion
 
 from acquisition.errors import ConfigError
-from acquisition.importing.job import CsvLayout, ImportJob, TimeAxis
+from acquisition.importing.job import CsvLayout, ImportJob, Place, TimeAxis
 
 START_NS = 1_767_225_600_000_000_000
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -23,6 +23,8 @@ PER_COUNT = 12.0 / 32768 * 250.0
 
 Read = Callable[[Path, ImportJob], Any]
 Placed = Callable[..., ImportJob]
+Imported = Callable[..., Any]
+Change = Callable[[ImportJob], ImportJob]
 
 
 def write_csv(path: Path, run: Any, samples: np.ndarray) -> None:
@@ -107,12 +109,27 @@ def job_for(job: ImportJob, placed: Placed) -> Callable[[str], ImportJob]:
     return fitting
 
 
+@pytest.fixture
+def imported(
+    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob]
+) -> Callable[..., Any]:
+    """Writes samples of the run into a file and reads it, by a job that some change."""
+
+    def through(kind: str, samples: np.ndarray, change: Change = lambda job: job) -> Any:
+        WRITERS[kind](tmp_path / "run.mf4", run, samples)
+        return read(tmp_path / "run.mf4", change(job_for(kind)))
+
+    return through
+
+
+def with_channels(**changes: Any) -> Change:
+    """Change all channels of a job alike."""
+    return lambda job: replace(job, channels=tuple(replace(c, **changes) for c in job.channels))
+
+
 @pytest.mark.parametrize("kind", WRITERS)
-def test_engineering_units_come_back_equal(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], kind: str
-) -> None:
-    WRITERS[kind](tmp_path / "run.mf4", run, run.units_um)
-    found = read(tmp_path / "run.mf4", job_for(kind))
+def test_engineering_units_come_back_equal(run: Any, imported: Imported, kind: str) -> None:
+    found = imported(kind, run.units_um)
     assert found.sample_type == "float32"
     assert found.samples.dtype == np.float32
     np.testing.assert_array_equal(found.samples, run.units_um)
@@ -121,13 +138,10 @@ def test_engineering_units_come_back_equal(
 
 @pytest.mark.parametrize("kind", WRITERS)
 def test_counts_of_the_calibrated_scale_stay_counts(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], kind: str
+    run: Any, imported: Imported, kind: str
 ) -> None:
-    WRITERS[kind](tmp_path / "run.mf4", run, run.counts)
-    job = job_for(kind)
-    if kind == "csv":
-        job = replace(job, channels=tuple(replace(c, per_count=PER_COUNT) for c in job.channels))
-    found = read(tmp_path / "run.mf4", job)
+    change = with_channels(**{"per_count": PER_COUNT} if kind == "csv" else {})
+    found = imported(kind, run.counts, change)
     assert found.sample_type == "int16"
     np.testing.assert_array_equal(found.samples, run.counts)
     assert_times_and_slow_values(found, run)
@@ -135,18 +149,10 @@ def test_counts_of_the_calibrated_scale_stay_counts(
 
 @pytest.mark.parametrize("kind", WRITERS)
 def test_counts_of_another_scale_become_engineering_units(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], kind: str
+    run: Any, imported: Imported, kind: str
 ) -> None:
-    WRITERS[kind](tmp_path / "run.mf4", run, run.counts)
-    job = job_for(kind)
-    job = replace(
-        job,
-        channels=tuple(
-            replace(c, calibrated_per_count=1.01 * PER_COUNT, per_count=PER_COUNT)
-            for c in job.channels
-        ),
-    )
-    found = read(tmp_path / "run.mf4", job)
+    change = with_channels(calibrated_per_count=1.01 * PER_COUNT, per_count=PER_COUNT)
+    found = imported(kind, run.counts, change)
     assert found.sample_type == "float32"
     np.testing.assert_array_equal(found.samples, (run.counts * PER_COUNT).astype(np.float32))
 
@@ -163,32 +169,23 @@ def assert_times_and_slow_values(found: Any, run: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["hdf5", "tdms", "mdf4"])
 def test_a_unit_that_is_not_the_mapped_one_is_refused_naming_both(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], kind: str
+    run: Any, imported: Imported, kind: str
 ) -> None:
-    WRITERS[kind](tmp_path / "run.mf4", run, run.units_um)
-    job = job_for(kind)
-    job = replace(job, channels=tuple(replace(c, unit="mm/s") for c in job.channels))
     with pytest.raises(ConfigError, match=r"'waveforms/shaft x' is in '(u|µ)m', the mapping says"):
-        read(tmp_path / "run.mf4", job)
+        imported(kind, run.units_um, with_channels(unit="mm/s"))
 
 
 @pytest.mark.parametrize("kind", WRITERS)
 def test_a_column_that_is_not_there_is_refused_naming_what_is(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], kind: str
+    run: Any, imported: Imported, kind: str
 ) -> None:
-    WRITERS[kind](tmp_path / "run.mf4", run, run.units_um)
-    job = job_for(kind)
-    place = replace(job.channels[0].place, name="shaft z")
+    group = "" if kind == "csv" else "waveforms"
     with pytest.raises(ConfigError, match="shaft z' is not there"):
-        read(tmp_path / "run.mf4", replace(job, channels=(replace(job.channels[0], place=place),)))
+        imported(kind, run.units_um, with_channels(place=Place("shaft z", group)))
 
 
-def test_the_factor_of_the_unit_is_taken(
-    tmp_path: Path, run: Any, read: Read, job: ImportJob
-) -> None:
-    write_csv(tmp_path / "run.mf4", run, run.units_um)
-    channels = tuple(replace(c, unit="mm", factor=1000.0) for c in job.channels)
-    found = read(tmp_path / "run.mf4", replace(job, channels=channels, slow=()))
+def test_the_factor_of_the_unit_is_taken(run: Any, imported: Imported) -> None:
+    found = imported("csv", run.units_um, with_channels(unit="mm", factor=1000.0))
     expected = (run.units_um.astype(np.float64) * 1000.0).astype(np.float32)
     np.testing.assert_allclose(found.samples, expected, rtol=1e-6)
 
@@ -245,19 +242,14 @@ def test_samples_that_an_mdf_file_calls_invalid_are_none(
     tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], of: str
 ) -> None:
     invalid = np.isin(run.index, (0, 7, 600))
-    conversion = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
-    values = getattr(run, of)
+    scale = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
+    values, conversion = getattr(run, of), scale if of == "counts" else None
     with asammdf.MDF() as mdf:
         signals = [
-            asammdf.Signal(
-                channel,
-                run.since_start_s,
-                name=f"shaft {axis}",
-                conversion=conversion if of == "counts" else None,
-                invalidation_bits=invalid if axis == "x" else None,
-            )
+            asammdf.Signal(channel, run.since_start_s, name=f"shaft {axis}", conversion=conversion)
             for axis, channel in zip("xy", values, strict=True)
         ]
+        signals[0].invalidation_bits = invalid
         mdf.append(signals, acq_name="waveforms", common_timebase=True)
         mdf.save(tmp_path / "run.mf4")
     found = read(tmp_path / "run.mf4", replace(job_for("mdf4"), slow=()))
@@ -284,9 +276,6 @@ def test_waveforms_of_different_lengths_or_times_are_refused(
         read(tmp_path / "two.mf4", replace(job, format="mdf4", time=own, slow=()))
 
 
-def test_another_rate_is_refused_with_both_values(
-    tmp_path: Path, run: Any, read: Read, job: ImportJob
-) -> None:
-    write_csv(tmp_path / "run.mf4", run, run.units_um)
+def test_another_rate_is_refused_with_both_values(run: Any, imported: Imported) -> None:
     with pytest.raises(ConfigError, match=r"at 1200 Hz are needed; there they come at 600"):
-        read(tmp_path / "run.mf4", replace(job, rate_hz=1200.0, slow=()))
+        imported("csv", run.units_um, lambda job: replace(job, rate_hz=1200.0))

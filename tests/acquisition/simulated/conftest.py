@@ -145,24 +145,3 @@ def build_unit(machine: Unit, calibration: UnitCalibration) -> Callable[..., Sim
         return SimulatedUnit(machine, calibration, scenario, seed, START_NS)
 
     return build
-
-
-class ManualClock:
-    """Time that passes only while somebody sleeps, or when a test says so."""
-
-    def __init__(self) -> None:
-        self.elapsed_s = 0.0
-
-    def now_ns(self) -> int:
-        return START_NS + round(self.elapsed_s * 1e9)
-
-    def monotonic_s(self) -> float:
-        return self.elapsed_s
-
-    async def sleep(self, duration_s: float) -> None:
-        self.elapsed_s += duration_s
-
-
-@pytest.fixture
-def clock() -> ManualClock:
-    return ManualClock()

@@ -1,12 +1,11 @@
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition.calibration import UnitCalibration, calibrate
-from acquisition.clock import Clock
 from acquisition.simulated.scenario import Scenario
 from acquisition.simulated.source import SimulatedSource
 from acquisition.simulated.unit import SimulatedUnit
@@ -14,10 +13,6 @@ from acquisition.source import SampleSource
 from core.blocks import SampleBlock
 
 BuildUnit = Callable[..., SimulatedUnit]
-
-
-class ManualClock(Clock, Protocol):
-    elapsed_s: float
 
 
 async def take(source: SampleSource, n_blocks: int) -> list[SampleBlock]:
@@ -31,43 +26,43 @@ async def take(source: SampleSource, n_blocks: int) -> list[SampleBlock]:
 
 
 async def test_an_unpaced_source_goes_on_where_it_was_left(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
+    build_unit: BuildUnit, calibration: UnitCalibration, stepped_clock: Any, full_load: Scenario
 ) -> None:
     feed = build_unit(full_load)
     in_500s = replace(calibration, block_samples=500)
-    source = SimulatedSource(feed, in_500s, clock, paced=False)
+    source = SimulatedSource(feed, in_500s, stepped_clock, paced=False)
 
     blocks = await take(source, 3)
-    clock.elapsed_s += 3600.0
+    stepped_clock.step(3600.0)
     blocks += await take(source, 2)
 
     assert [block.first_index for block in blocks] == [0, 500, 1000, 1500, 2000]
-    assert clock.elapsed_s == 3600.0
+    assert stepped_clock.monotonic_s() == 3600.0
     expected = calibrate(build_unit(full_load).advance(2500), calibration)
     assert np.array_equal(np.concatenate([b.samples for b in blocks], axis=1), expected.samples)
 
 
 async def test_a_paced_source_delivers_samples_when_they_have_happened(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
+    build_unit: BuildUnit, calibration: UnitCalibration, stepped_clock: Any, full_load: Scenario
 ) -> None:
     in_halves = replace(calibration, block_samples=300)
-    source = SimulatedSource(build_unit(full_load), in_halves, clock)
+    source = SimulatedSource(build_unit(full_load), in_halves, stepped_clock)
 
     await take(source, 4)
 
-    assert clock.elapsed_s == pytest.approx(2.0)
+    assert stepped_clock.monotonic_s() == pytest.approx(2.0)
 
 
 async def test_a_slow_reader_of_a_paced_source_loses_nothing(
-    build_unit: BuildUnit, calibration: UnitCalibration, clock: ManualClock, full_load: Scenario
+    build_unit: BuildUnit, calibration: UnitCalibration, stepped_clock: Any, full_load: Scenario
 ) -> None:
     in_halves = replace(calibration, block_samples=300)
-    source = SimulatedSource(build_unit(full_load), in_halves, clock)
+    source = SimulatedSource(build_unit(full_load), in_halves, stepped_clock)
     indices = []
     async with source.connect() as stream:
         async for block in stream:
             indices.append(block.first_index)
-            clock.elapsed_s += 2.0
+            stepped_clock.step(2.0)
             if len(indices) == 5:
                 break
 

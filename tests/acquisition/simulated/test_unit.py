@@ -8,31 +8,12 @@ import pytest
 
 from acquisition.calibration import UnitCalibration, calibrate
 from acquisition.errors import ConfigError
-from acquisition.raw import RawBlock
-from acquisition.simulated.plant import CHUNK_SAMPLES
 from acquisition.simulated.scenario import Scenario
 from acquisition.simulated.unit import SimulatedUnit
 from core.machine import Unit
 from core.quality import Level
 
 BuildUnit = Callable[..., SimulatedUnit]
-PIECES = (1, 7, 600, 1440, CHUNK_SAMPLES, 2 * CHUNK_SAMPLES + 1, 3000)
-
-
-def joined(blocks: list[RawBlock]) -> list[list[int]]:
-    counts: list[list[int]] = np.concatenate([b.counts for b in blocks], axis=1).tolist()
-    return counts
-
-
-def test_counts_do_not_depend_on_the_pieces_they_are_asked_for_in(
-    build_unit: BuildUnit, full_load: Scenario, part_load: Scenario
-) -> None:
-    for scenario in (full_load, part_load):
-        whole = build_unit(scenario).advance(sum(PIECES))
-        unit = build_unit(scenario)
-        blocks = [unit.advance(n) for n in PIECES]
-
-        assert joined(blocks) == whole.counts.tolist()
 
 
 def test_an_ordinary_day_is_the_same_in_every_version(
@@ -54,15 +35,6 @@ def test_slow_readings_depend_on_the_sample_and_not_on_the_pieces(
     other.advance(8500)
 
     assert one.advance(1).slow == pytest.approx(other.advance(100).slow, nan_ok=True, rel=0)
-
-
-def test_the_same_seed_gives_the_same_counts_and_another_gives_others(
-    build_unit: BuildUnit, full_load: Scenario
-) -> None:
-    first, second, other = (build_unit(full_load, seed).advance(3000) for seed in (1, 1, 2))
-
-    assert np.array_equal(first.counts, second.counts)
-    assert not np.array_equal(first.counts, other.counts)
 
 
 def test_blocks_follow_on_each_other_in_index_and_time(

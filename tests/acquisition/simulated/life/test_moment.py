@@ -40,6 +40,7 @@ def test_a_scenario_holds_what_was_so_at_that_moment(two_years: Life, day_ns: Da
     assert bearing.oil_temperature_c == truth.oil_temperature_c[row]
     assert scenario.active_power_mw == life.operation.power_mw[row]
     assert scenario.bearings["LJB"].bracket_stiffness_factor == pytest.approx(0.8)
+    assert np.max(np.abs(life.truth["LJB"].film_loss)) == 0.0
     chain = truth.chain
     strays = math.exp(chain.ln_k_error[1, row])
     assert scenario.channels["UJB_vy"].gain == pytest.approx(
