@@ -14,6 +14,7 @@ from service.origin import Origin
 from service.settings.loading import PlantFileError, load_plant_file
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
+from service.store.sqlite import SqliteStore
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 
@@ -96,6 +97,14 @@ def postgres_place(
     postgres_server.create(name, TEMPLATE)
     yield PostgresPlace(postgres_server, name, tmp_path / "data")
     postgres_server.drop(name)
+
+
+@pytest.fixture(scope="session")
+def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty SQLite database, for copies."""
+    path = tmp_path_factory.mktemp("database") / "padwatch.sqlite3"
+    SqliteStore(path).close()
+    return path
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """The API over a real store and a real monitor, fed by the simulated plant, asked in process."""
 
 import asyncio
-import shutil
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 import httpx2
 import pytest
 from fastapi import FastAPI
+from rigs.database_copy import copy_database
 from rigs.probes import Probes
 
 from acquisition.calibration import calibrate
@@ -204,20 +204,6 @@ def show(service: Service, assessments: list[Assessment]) -> Service:
     return service
 
 
-def opened_copy(database_file: Path, folder: Path) -> SqliteStore:
-    """Open a copy of a database and of the marks that lie beside it."""
-    shutil.copytree(database_file.parent, folder, dirs_exist_ok=True)
-    return SqliteStore(folder / database_file.name)
-
-
-@pytest.fixture(scope="session")
-def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An empty database; a copy of it opens sooner than a new one is made."""
-    path = tmp_path_factory.mktemp("database") / "padwatch.sqlite3"
-    SqliteStore(path).close()
-    return path
-
-
 @pytest.fixture(scope="session")
 def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
     """Builds services on copies of a database that several tests share, because these only read."""
@@ -225,7 +211,7 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
 
         def begin(plant: PlantFile, database_file: Path) -> Service:
             folder = tmp_path_factory.mktemp("shared")
-            store = opened_copy(database_file, folder)
+            store = SqliteStore(copy_database(database_file, folder))
             stack.callback(store.close)
             return asyncio.run(build(plant, store, folder))
 
@@ -242,7 +228,7 @@ def read_only(
 
 @pytest.fixture
 def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = opened_copy(database_file, tmp_path)
+    opened = SqliteStore(copy_database(database_file, tmp_path))
     yield opened
     opened.close()
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from rigs.database_copy import copy_database
 
 from service.audit.entry import Deed, Source
 from service.store.sqlite import SqliteStore
@@ -39,8 +40,8 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def store(path: Path) -> Iterator[SqliteStore]:
+def store(database_file: Path, path: Path) -> Iterator[SqliteStore]:
     """An open, empty store."""
-    opened = SqliteStore(path)
+    opened = SqliteStore(copy_database(database_file, path.parent))
     yield opened
     opened.close()

@@ -58,26 +58,23 @@ def test_entries_are_found_by_actor_action_object_and_time(store: SqliteStore, d
     assert numbers(actor="' OR 1=1 --") == []
 
 
-@pytest.mark.parametrize(
-    "statement",
-    [
+def test_the_database_refuses_to_change_entries(
+    store: SqliteStore, path: Path, deed: Build
+) -> None:
+    store.audit.record([deed(0), deed(1)])
+    for statement in (
         "UPDATE audit SET actor = 'nobody'",
         "DELETE FROM audit",
         "INSERT OR REPLACE INTO audit SELECT * FROM audit WHERE number = 1",
         "INSERT INTO audit SELECT number + 7, time_ns, actor, source, peer, action, object, before,"
         " after, reason, previous_hash, hash FROM audit WHERE number = 1",
-    ],
-)
-def test_the_database_refuses_to_change_entries(
-    store: SqliteStore, path: Path, deed: Build, statement: str
-) -> None:
-    store.audit.record([deed(0), deed(1)])
-    with closing(sqlite3.connect(path)) as other, pytest.raises(sqlite3.IntegrityError):
-        other.execute(statement)
+    ):
+        with closing(sqlite3.connect(path)) as other, pytest.raises(sqlite3.IntegrityError):
+            other.execute(statement)
     assert verify_trail(path).is_whole
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(actor=st.text(st.characters(), max_size=400), reason=st.text(st.characters()))
 def test_any_name_and_any_reason_can_be_written(
     store: SqliteStore, path: Path, deed: Build, actor: str, reason: str
@@ -90,17 +87,13 @@ def test_any_name_and_any_reason_can_be_written(
     assert verify_trail(path).is_whole
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "=HYPERLINK(1)", "\x00", "a\ud800b", "<script>", "'; DROP TABLE audit; --", "🦭" * 500,
-        "\r\n", "\u202e", "",
-    ],
-)  # fmt: skip
-def test_hostile_names_are_names(store: SqliteStore, path: Path, deed: Build, name: str) -> None:
-    store.audit.record([deed(actor=name, action=name, object=name, reason=name, peer=name)])
-    verdict = verify_trail(path)
-    assert (verdict.is_whole, verdict.n_entries) == (True, 1)
+def test_hostile_names_are_names(store: SqliteStore, path: Path, deed: Build) -> None:
+    signs = ("\x00", "a\ud800b", "\r\n", "\u202e", "")
+    names = ("=HYPERLINK(1)", "<script>", "'; DROP TABLE audit; --", "🦭" * 500, *signs)
+    for n, name in enumerate(names, 1):
+        store.audit.record([deed(actor=name, action=name, object=name, reason=name, peer=name)])
+        verdict = verify_trail(path)
+        assert (verdict.is_whole, verdict.n_entries) == (True, n)
 
 
 def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, deed: Build) -> None:
@@ -120,12 +113,12 @@ def test_a_deed_that_is_no_json_is_not_written_at_all(store: SqliteStore, deed: 
 def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Build) -> None:
     other = SqliteStore(path)
     with ThreadPoolExecutor(6) as pool:
-        list(pool.map(lambda n: (store, other)[n % 2].audit.record([deed(n)] * 3), range(60)))
+        list(pool.map(lambda n: (store, other)[n % 2].audit.record([deed(n)] * 3), range(24)))
     other.close()
 
     verdict = verify_trail(path)
-    assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 180, 0)
-    assert read_head(head_path(path)) == AuditHead(180, verdict.hash)
+    assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 72, 0)
+    assert read_head(head_path(path)) == AuditHead(72, verdict.hash)
 
 
 def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(

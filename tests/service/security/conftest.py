@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from argon2 import PasswordHasher
+from rigs.database_copy import copy_database
 
 from service.security.backoff import Backoff
 from service.security.doors import Doors
@@ -27,8 +28,8 @@ class CountingHasher(PasswordHasher):
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Path:
-    return tmp_path / "padwatch.sqlite3"
+def database(database_file: Path, tmp_path: Path) -> Path:
+    return copy_database(database_file, tmp_path)
 
 
 @pytest.fixture

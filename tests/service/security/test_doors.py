@@ -48,14 +48,10 @@ def test_the_right_password_opens_and_its_token_says_who_it_is(doors: Doors, ann
 
 
 @pytest.mark.usefixtures("anna")
-@pytest.mark.parametrize(
-    ("name", "password"),
-    [("anna", "rotor rope gaug"), ("anna", ""), ("ann", PASSWORD), ("", ""), ("\ud800", "\ud800")],
-)
-def test_a_wrong_name_and_a_wrong_password_are_told_alike(
-    doors: Doors, name: str, password: str
-) -> None:
-    assert doors.log_in(name, password, HERE, T0, 0) == NotLoggedIn()
+def test_a_wrong_name_and_a_wrong_password_are_refused_alike(doors: Doors) -> None:
+    wrong = (("anna", "rotor rope gaug"), ("anna", ""), ("ann", PASSWORD), ("", ""))
+    for name, password in (*wrong, ("\ud800", "\ud800")):
+        assert doors.log_in(name, password, HERE, T0, 0) == NotLoggedIn()
 
 
 def test_a_name_that_no_account_has_costs_as_many_hashes_as_one_that_has(
@@ -111,15 +107,9 @@ def test_a_login_ends_twelve_hours_after_it_began_whatever_is_done(doors: Doors)
 
 
 @pytest.mark.usefixtures("anna")
-def test_a_clock_that_was_years_ahead_leaves_no_login_behind(doors: Doors) -> None:
-    token = log_in(doors, T0 + 9000 * H)
-    assert doors.person(token, T0) is Refusal.EXPIRED
-
-
-@pytest.mark.usefixtures("anna")
-def test_a_clock_put_right_by_a_minute_ends_no_login(doors: Doors) -> None:
-    token = log_in(doors)
-    assert isinstance(doors.person(token, T0 - 60 * S), Identity)
+def test_a_clock_put_right_by_years_ends_a_login_and_by_a_minute_does_not(doors: Doors) -> None:
+    assert doors.person(log_in(doors, T0 + 9000 * H), T0) is Refusal.EXPIRED
+    assert isinstance(doors.person(log_in(doors), T0 - 60 * S), Identity)
 
 
 @pytest.mark.usefixtures("anna")
@@ -249,13 +239,11 @@ def test_passwords_tried_all_at_once_are_counted_one_by_one(doors: Doors, anna: 
 
 
 @pytest.mark.usefixtures("anna")
-@pytest.mark.parametrize(
-    "token", ["", "x", "x" * 43, "ä" * 43, "\ud800" * 43, "' OR 1=1 --", "a" * 9999]
-)
-def test_a_forged_token_opens_nothing(doors: Doors, token: str) -> None:
+def test_a_forged_token_opens_nothing(doors: Doors) -> None:
     log_in(doors)
-    assert doors.person(token, T0) is Refusal.UNKNOWN
-    assert doors.machine(token, T0) is Refusal.UNKNOWN
+    for token in ("", "x", "x" * 43, "ä" * 43, "\ud800" * 43, "' OR 1=1 --", "a" * 9999):
+        assert doors.person(token, T0) is Refusal.UNKNOWN
+        assert doors.machine(token, T0) is Refusal.UNKNOWN
 
 
 @pytest.mark.usefixtures("anna")
