@@ -5,13 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs.shaken_shaft import (
-    BRACKET,
-    FREQUENCY_HZ,
-    NOISE_FREE,
-    TURN_HZ,
-    averaged,
-)
+from rigs.shaken_shaft import BRACKET, FREQUENCY_HZ, NOISE_FREE, TURN_HZ, averaged
 
 from core.arrays import ComplexArray
 from core.cross_spectrum import average

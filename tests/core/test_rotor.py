@@ -2,13 +2,7 @@ import numpy as np
 import pytest
 
 from core.film import Film
-from core.rotor import (
-    bearing_response,
-    force_map,
-    forward_force,
-    receptance,
-    rotor_matrices,
-)
+from core.rotor import bearing_response, force_map, forward_force, receptance, rotor_matrices
 from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
 
 PARAMETERS = RotorParameters()

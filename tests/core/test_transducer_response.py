@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 from core.machine import Channel, Measurand
-from core.transducer_response import (
-    HighPass,
-    Resonance,
-    Response,
-    ResponseChain,
-    ResponseTable,
-)
+from core.transducer_response import HighPass, Resonance, Response, ResponseChain, ResponseTable
 from core.transducers import displacement_factor
 
 FREQUENCY_HZ = np.geomspace(0.05, 50.0, 200)

@@ -9,13 +9,7 @@ from core.bracket import BracketDynamics
 from core.cross_spectrum import BEARING_X, SHAFT_X, average
 from core.stiffness_budget import ratio_budget, transfer_budgets
 from core.transfer import line_transfer
-from core.uncertainty import (
-    BearingAccuracy,
-    Budget,
-    coverage_factor,
-    random_line,
-    systematic_line,
-)
+from core.uncertainty import BearingAccuracy, Budget, coverage_factor, random_line, systematic_line
 
 
 def test_a_half_width_counts_as_a_uniform_distribution() -> None:

@@ -18,12 +18,7 @@ from core.blocks import Rejection
 from core.monitor import UnitMonitor
 from core.settings import AnalysisSettings
 from service.conversion import calibration_of, machine_of
-from service.reanalysis import (
-    LastAverages,
-    assessment_model,
-    assessments,
-    calibration_differences,
-)
+from service.reanalysis import LastAverages, assessment_model, assessments, calibration_differences
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
 from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of

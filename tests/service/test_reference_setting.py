@@ -6,12 +6,7 @@ import pytest
 
 from core.machine import Bearing
 from core.quality import Reading, Reason, missing, uncertain
-from service.reference_setting import (
-    ReferenceRefusedError,
-    doubts,
-    given_gaps,
-    measured_gaps,
-)
+from service.reference_setting import ReferenceRefusedError, doubts, given_gaps, measured_gaps
 from service.store.port import StoredReadings
 
 NOW = 1_767_225_600_000_000_000

@@ -4,13 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs.racks import (
-    AMPLITUDES,
-    K_B,
-    PHASES,
-    blocks_of,
-    watch,
-)
+from rigs.racks import AMPLITUDES, K_B, PHASES, blocks_of, watch
 
 from core.assessment import Evidence
 from core.blocks import SampleBlock

@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from rigs.racks import (
-    K_B,
-    blocks_of,
-    polls,
-    watch,
-)
+from rigs.racks import K_B, blocks_of, polls, watch
 
 from core.quality import Reason
 from core.stiffness_budget import BEARING_GAIN, BRACKET, SHAFT_GAIN

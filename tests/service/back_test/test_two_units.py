@@ -5,9 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from core.baseline.baseline import BearingBaseline, Origin, Watched
+from acquisition.simulated.life.life_truth import UnitLife
+from core.baseline.baseline import Origin, Watched
 from core.baseline.exchange import from_json
 from core.baseline.learning import learn
 from core.baseline.response import learn_response, place_columns
@@ -30,6 +32,7 @@ from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
 
 START_NS = 19_723 * DAY_NS
+Histories = Mapping[Place, BearingRows]
 BRACKETS = {
     (unit, bearing): k
     for unit in ("U1", "U2")
@@ -38,7 +41,7 @@ BRACKETS = {
 
 
 @pytest.fixture(scope="module")
-def histories(two_units: Any) -> Mapping[Place, BearingRows]:
+def histories(two_units: Any) -> Histories:
     return read_histories(two_units.parquet)
 
 
@@ -48,13 +51,11 @@ def learning(two_units: Any) -> Learning:
 
 
 @pytest.fixture(scope="module")
-def found(histories: Mapping[Place, BearingRows], learning: Learning) -> Found:
+def found(histories: Histories, learning: Learning) -> Found:
     return run_back_test(histories, BackTestRules(learning, bracket_n_per_m=BRACKETS))
 
 
-def test_csv_and_parquet_are_the_same_histories(
-    two_units: Any, histories: Mapping[Place, BearingRows]
-) -> None:
+def test_csv_and_parquet_are_the_same_histories(two_units: Any, histories: Histories) -> None:
     from_csv = read_histories(two_units.csv)
     assert set(from_csv) == set(histories) == set(BRACKETS)
     for place, rows in histories.items():
@@ -64,19 +65,27 @@ def test_csv_and_parquet_are_the_same_histories(
         assert from_csv[place].n_rows == rows.n_rows == (len(rows.history),) * 2
 
 
+def settled(life: UnitLife) -> npt.NDArray[np.bool_]:
+    operation = life.operation
+    limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
+    return operation_history(
+        operation.time_ns, operation.speed_rpm, operation.power_mw, limits
+    ).is_settled
+
+
+def learned_rows(two_units: Any, life: UnitLife) -> int:
+    time_ns = life.operation.time_ns
+    return int(np.searchsorted(time_ns, time_ns[0] + two_units.learning_days * DAY_NS))
+
+
 def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> None:
     """Straight from the simulated life, without any file."""
     expected = []
     for unit, life in two_units.lives.items():
-        operation = life.operation
-        limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
-        is_settled = operation_history(
-            operation.time_ns, operation.speed_rpm, operation.power_mw, limits
-        ).is_settled
-        learned_ns = operation.time_ns[0] + two_units.learning_days * DAY_NS
-        n = int(np.searchsorted(operation.time_ns, learned_ns))
+        is_settled, n = settled(life), learned_rows(two_units, life)
         for bearing, history in life.readings.items():
-            baseline = _learned(unit, bearing, history.rows(0, n), is_settled[:n])
+            origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
+            baseline = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
             for direction in DIRECTIONS:
                 film = baseline.of(Watched.STIFFNESS, direction)
                 assert film is not None
@@ -92,15 +101,7 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
     assert [alarm[:4] for alarm in alarms] == [alarm[:4] for alarm in sorted(expected)]
     percent = [100.0 * (np.exp(alarm[4]) - 1.0) for alarm in sorted(expected)]
     assert [alarm[4] for alarm in alarms] == pytest.approx(percent, rel=1e-9)
-    assert {(a.unit, a.bearing, a.direction) for a in found.alarms} >= {
-        ("U2", "LJB", "x"),
-        ("U2", "LJB", "y"),
-    }
-
-
-def _learned(unit: str, bearing: str, history: Any, is_settled: Any) -> BearingBaseline:
-    origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
-    return learn(history, is_settled, origin, BaselineSettings())
+    assert {alarm[1:4] for alarm in alarms} >= {("U2", "LJB", "x"), ("U2", "LJB", "y")}
 
 
 def test_the_damage_is_told_with_its_evidence(two_units: Any, found: Found) -> None:
@@ -124,23 +125,16 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
 ) -> None:
     alarm = next(a for a in found.alarms if (a.unit, a.bearing, a.direction) == ("U2", "LJB", "x"))
     life, baselines = two_units.lives["U2"], [b for b in found.baselines if b.origin.unit == "U2"]
-    operation, histories = life.operation, life.readings
-    limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
-    is_settled = operation_history(
-        operation.time_ns, operation.speed_rpm, operation.power_mw, limits
-    ).is_settled
-    n = int(
-        np.searchsorted(operation.time_ns, operation.time_ns[0] + two_units.learning_days * DAY_NS)
-    )
-    places = [(b, d) for b in sorted(histories) for d in DIRECTIONS]
-    ordered = {b: histories[b] for b in sorted(histories)}
-    response = learn_response({b: h.rows(0, n) for b, h in ordered.items()}, is_settled[:n])
-    deviation = np.stack([_deviation(ordered[b], baselines, b, d) for b, d in places])
-    row = int(np.flatnonzero([rfc3339(int(t)) == alarm.begin for t in operation.time_ns])[0])
+    is_settled, n = settled(life), learned_rows(two_units, life)
+    histories = dict(sorted(life.readings.items()))
+    places = [(b, d) for b in histories for d in DIRECTIONS]
+    response = learn_response({b: h.rows(0, n) for b, h in histories.items()}, is_settled[:n])
+    deviation = np.stack([_deviation(histories[b], baselines, b, d) for b, d in places])
+    begins = [rfc3339(int(t)) == alarm.begin for t in life.operation.time_ns]
     known = np.isfinite(deviation[places.index(("LJB", "x"))]) & is_settled
-    newest = np.flatnonzero(known[: row + 1])[-24:]
-    columns = [column[:, newest] for column in (*place_columns(ordered), deviation)]
-    brackets = np.repeat([BRACKETS["U2", bearing] for bearing in sorted(histories)], 2)
+    newest = np.flatnonzero(known[: int(np.flatnonzero(begins)[0]) + 1])[-24:]
+    columns = [column[:, newest] for column in (*place_columns(histories), deviation)]
+    brackets = np.repeat([BRACKETS["U2", bearing] for bearing in histories], 2)
     expected = attribute(("LJB", "x"), response, *columns, brackets)
     assert (alarm.cause.cause, alarm.cause.reason) == (expected.cause, expected.reason)
     assert alarm.cause.film_share == pytest.approx(expected.film_share, rel=1e-6)
@@ -154,9 +148,7 @@ def _deviation(history: Any, baselines: Any, bearing: str, direction: str) -> An
     return film.compare(FilmConditions.of(history), value, u_random).deviation
 
 
-def test_every_reading_is_counted_once(
-    two_units: Any, histories: Mapping[Place, BearingRows], found: Found
-) -> None:
+def test_every_reading_is_counted_once(two_units: Any, histories: Histories, found: Found) -> None:
     assert len(found.films) == 12
     for film in found.films:
         n_readings = len(histories[film.unit, film.bearing].history)
@@ -181,7 +173,7 @@ def test_exported_baselines_read_back_as_they_were(found: Found, tmp_path: Any) 
 
 
 def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
-    two_units: Any, histories: Mapping[Place, BearingRows]
+    two_units: Any, histories: Histories
 ) -> None:
     """What has changed before it is healthy after it, and nothing is compared across it."""
     event = MachineEvent("U2", "LJB", two_units.damaged_ns, "new pads")
@@ -196,9 +188,7 @@ def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
     )
 
 
-def test_a_fault_that_was_learned_is_doubted(
-    two_units: Any, histories: Mapping[Place, BearingRows]
-) -> None:
+def test_a_fault_that_was_learned_is_doubted(two_units: Any, histories: Histories) -> None:
     place = ("U2", "LJB")
     until_ns = two_units.damaged_ns + 50 * DAY_NS
     learning = Learning(days=30, until_ns=until_ns)
@@ -209,7 +199,7 @@ def test_a_fault_that_was_learned_is_doubted(
 
 
 def test_an_event_of_a_bearing_without_readings_is_refused(
-    two_units: Any, histories: Mapping[Place, BearingRows], learning: Learning
+    two_units: Any, histories: Histories, learning: Learning
 ) -> None:
     event = MachineEvent("U3", None, two_units.damaged_ns, "overhaul")
     with pytest.raises(ReadingsError, match="event of U3: there are no readings of it"):
@@ -217,7 +207,7 @@ def test_an_event_of_a_bearing_without_readings_is_refused(
 
 
 def test_without_attitude_or_shaft_motion_less_is_known_and_said(
-    histories: Mapping[Place, BearingRows], learning: Learning
+    histories: Histories, learning: Learning
 ) -> None:
     rows = histories["U2", "LJB"]
     nothing = np.full(len(rows.history), np.nan)
@@ -236,7 +226,7 @@ def test_without_attitude_or_shaft_motion_less_is_known_and_said(
 
 
 def test_states_that_are_not_told_are_followed_or_asked_for(
-    two_units: Any, histories: Mapping[Place, BearingRows], learning: Learning, found: Found
+    two_units: Any, histories: Histories, learning: Learning, found: Found
 ) -> None:
     rows, life = histories["U2", "LJB"], two_units.lives["U2"]
     operation = life.operation
@@ -254,7 +244,7 @@ def test_states_that_are_not_told_are_followed_or_asked_for(
 
 
 def test_too_little_to_learn_from_leaves_everything_without_a_baseline(
-    histories: Mapping[Place, BearingRows],
+    histories: Histories,
 ) -> None:
     place = ("U1", "TJB")
     for learning in (Learning(days=10), Learning(365, until_ns=START_NS - 1)):
@@ -268,7 +258,7 @@ def test_too_little_to_learn_from_leaves_everything_without_a_baseline(
 
 
 def test_readings_that_are_further_apart_than_told_are_doubted(
-    histories: Mapping[Place, BearingRows], learning: Learning
+    histories: Histories, learning: Learning
 ) -> None:
     place = ("U1", "TJB")
     rules = BackTestRules(learning, baseline=BaselineSettings(reading_h=1.0))
