@@ -4,7 +4,8 @@ import asyncio
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,13 @@ import httpx2
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 90.0
+DEMO = ROOT / "deploy" / "demo.toml"
+PATIENCE_S = 240.0
 """Until a test gives up; no test waits that long when all is well."""
+
+WIRE = 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = {port}\n'
+ABSENT: Mapping[str, int] = {"U1": 1, "U2": 1}
+"""Ports of two units at which nobody listens."""
 
 
 class Program:
@@ -31,12 +37,12 @@ class Program:
         return self.process.pid
 
     async def wait_for_url(self) -> str:
-        """Read what it prints until the URL comes."""
+        """Read what it prints until the URL comes; of a unix socket it has no host."""
         assert self.process.stdout is not None
         async with asyncio.timeout(PATIENCE_S):
             while line := (await self.process.stdout.readline()).decode():
                 self.said.append(line)
-                if line.startswith("padwatch: http://"):
+                if line.startswith(("padwatch: http", "padwatch: unix:")):
                     self.url = line.removeprefix("padwatch: ").strip().rstrip("/")
                     return self.url
         raise AssertionError(f"ended without a URL: {self.said} {self.errors}")
@@ -54,29 +60,23 @@ class Program:
         assert response.status_code == 200, response.text
         return response.json()
 
-    async def until(
-        self,
-        path: str,
-        condition: Callable[[Any], bool],
-        within_s: float = PATIENCE_S,
-        **parameters: Any,
-    ) -> Any:
+    async def until(self, path: str, condition: Callable[[Any], bool], **parameters: Any) -> Any:
         """Ask the API until its answer is as wanted."""
         answer = None
         try:
-            async with asyncio.timeout(within_s):
+            async with asyncio.timeout(PATIENCE_S):
                 while not condition(answer := await self.get(path, **parameters)):
-                    await asyncio.sleep(0.1)
+                    await asyncio.sleep(0.2)
         except TimeoutError:
             raise AssertionError(f"{path} never came to be so; last: {answer}") from None
         return answer
 
-    async def end(self, number: int = signal.SIGTERM, within_s: float = PATIENCE_S) -> int:
+    async def end(self, number: int = signal.SIGTERM) -> int:
         """Send a signal and wait for the end; what outlasts that is killed and fails the test."""
         if self.process.returncode is None:
             self.process.send_signal(number)
         try:
-            async with asyncio.timeout(within_s):
+            async with asyncio.timeout(PATIENCE_S):
                 return await self.process.wait()
         except TimeoutError:
             raise AssertionError(f"did not end on signal {number}: {self.errors}") from None
@@ -101,32 +101,75 @@ class Program:
 Start = Callable[..., Awaitable[Program]]
 
 
-@pytest.fixture
-async def start(tmp_path: Path) -> AsyncIterator[Start]:
-    """Starts `padwatch` with arguments, in an empty folder; ends what a test leaves running."""
-    programs: list[Program] = []
+@asynccontextmanager
+async def programs(folder: Path) -> AsyncIterator[Start]:
+    """Starts `padwatch` with arguments, in a folder; ends what is left running."""
+    begun: list[Program] = []
 
-    async def started(*arguments: str) -> Program:
+    async def start(*arguments: str) -> Program:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
             *("-m", "service.cli.main", *arguments),
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
-            cwd=tmp_path,
+            cwd=folder,
             env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
         )
-        programs.append(Program(process))
-        return programs[-1]
+        begun.append(Program(process))
+        return begun[-1]
 
-    yield started
-    for program in programs:
+    yield start
+    for program in begun:
         await program.end(signal.SIGTERM if program.process.returncode is None else 0)
+
+
+@pytest.fixture
+async def start(tmp_path: Path) -> AsyncIterator[Start]:
+    """Starts `padwatch` with arguments, in an empty folder; ends what a test leaves running."""
+    async with programs(tmp_path) as begin:
+        yield begin
 
 
 @pytest.fixture
 def demo_file() -> Path:
     """The plant file that `padwatch demo` runs."""
-    return ROOT / "deploy" / "demo.toml"
+    return DEMO
+
+
+def write_demo(
+    folder: Path,
+    ports: Mapping[str, int] = ABSENT,
+    *,
+    source: str = WIRE,
+    service: str = "",
+    tables: str = "",
+) -> Path:
+    """Write a plant file: the demo's first unit once for each port, with its data beside it.
+
+    Parameters
+    ----------
+    source
+        Table of each unit's source, with a place for the port.
+    service, tables
+        More keys of the table [service], and more tables.
+    """
+    head, unit = DEMO.read_text(encoding="utf-8").split("[[unit]]\n")[:2]
+    wire = WIRE.format(port=0)
+    assert wire in unit
+    head = head.replace("var/demo", str(folder / "data"))
+    text = head.replace("[service]\n", f"[service]\n{service}") + tables + "\n"
+    for name, port in ports.items():
+        own = unit.replace('"U1"', f'"{name}"').replace(wire, source.format(port=port))
+        text += f"[[unit]]\n{own}"
+    path = folder / "plant.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="session")
+def write_plant() -> Callable[..., Path]:
+    """Writes plant files; see `write_demo`."""
+    return write_demo
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,8 +17,8 @@ from urllib.parse import quote
 import httpx2
 import psutil
 import pytest
+from rigs.command_line import padwatch
 
-DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
 PATIENCE_S = 90.0
 MIB = 1024 * 1024
 MOST_GROWTH = 64 * MIB
@@ -73,14 +73,15 @@ class Service:
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+def service(
+    tmp_path_factory: pytest.TempPathFactory, write_plant: Callable[..., Path]
+) -> Iterator[Service]:
     """One service for all; whatever came, it has said no traceback and ends as it should."""
     folder = tmp_path_factory.mktemp("service")
-    demo = DEMO.read_text(encoding="utf-8").replace("var/demo", str(folder))
-    (folder / "plant.toml").write_text(demo.replace("port = 0", "port = 1"), encoding="utf-8")
+    plant = write_plant(folder)
     log = folder / "service.log"
     with log.open("w", encoding="utf-8") as errors:
-        command = [sys.executable, "-m", "service.cli.main", "run", "plant.toml", "--port", "0"]
+        command = [sys.executable, "-m", "service.cli.main", "run", str(plant), "--port", "0"]
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=errors, text=True, cwd=folder
         )
@@ -297,3 +298,16 @@ def test_who_was_refused_a_change_stands_in_the_audit_trail(service: Service) ->
     refusals = [entry for entry in entries if entry["action"] == "request.refused"]
     assert {entry["after"]["status"] for entry in refusals} >= {422}
     assert all(entry["object"].startswith("POST /api/v1/alarms/") for entry in refusals)
+
+
+def test_a_second_service_on_the_same_data_is_refused_and_the_first_goes_on(
+    service: Service,
+) -> None:
+    found = padwatch("run", service.log.with_name("plant.toml"), "--port", "0")
+
+    assert found.exit_code == 1
+    assert found.stderr.count("\n") == 1
+    data = service.log.with_name("data")
+    assert f"another padwatch (process {service.process.pid}) works with {data}" in found.stderr
+    with service.client() as client:
+        assert client.get("/api/v1/overview").json()["plant"]["name"]

@@ -3,9 +3,11 @@
 import os
 import signal
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from acquisition.calibration import calibrate
@@ -18,7 +20,8 @@ from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
 from service.wiring.simulations import simulated_feed
 
-Start = Callable[..., Awaitable[Any]]
+from .conftest import Program, Start
+
 Children = Callable[[int], list[int]]
 Gone = Callable[[int], Awaitable[None]]
 
@@ -40,15 +43,23 @@ def has_results(overview: Any) -> bool:
     )
 
 
-async def test_the_demo_shows_stiffness_that_the_offline_analysis_confirms_to_the_last_bit(
-    start: Start, tmp_path: Path, demo_file: Path, children: Children, gone: Gone
-) -> None:
-    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
-    await demo.wait_for_url()
-    [daq] = children(demo.pid)
-    ready = await demo.get("/readyz")
-    assert ready["status"] == "ok"
+def all_are(state: str) -> Callable[[Any], bool]:
+    return lambda units: all(unit["source"]["state"] == state for unit in units)
 
+
+@pytest.fixture
+async def demo(start: Start, tmp_path: Path) -> Program:
+    """The demonstration without a past, ready to answer."""
+    program = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
+    await program.wait_for_url()
+    return program
+
+
+@pytest.mark.long
+async def test_the_demo_shows_stiffness_that_the_offline_analysis_confirms_to_the_last_bit(
+    demo: Program, demo_file: Path, children: Children, gone: Gone
+) -> None:
+    [daq] = children(demo.pid)
     overview = await demo.until("/api/v1/overview", has_results)
 
     plant = load_plant_file(demo_file)
@@ -79,15 +90,12 @@ async def test_the_demo_shows_stiffness_that_the_offline_analysis_confirms_to_th
     assert demo.errors.count("\n") == demo.errors.count('"event": "connected"') == 2
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
-async def test_the_demo_ends_in_order_and_takes_its_daq_along(
-    start: Start, tmp_path: Path, children: Children, gone: Gone, number: int
+async def test_the_demo_ends_with_ctrl_c_in_order_and_takes_its_daq_along(
+    demo: Program, tmp_path: Path, children: Children, gone: Gone
 ) -> None:
-    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
-    await demo.wait_for_url()
     [daq] = children(demo.pid)
 
-    assert await demo.end(number, within_s=5.0) == 0
+    assert await demo.end(signal.SIGINT) == 0
     await gone(daq)
 
     assert "Traceback" not in demo.errors
@@ -95,10 +103,8 @@ async def test_the_demo_ends_in_order_and_takes_its_daq_along(
 
 
 async def test_a_service_that_is_killed_leaves_no_daq_behind(
-    start: Start, tmp_path: Path, children: Children, gone: Gone
+    demo: Program, children: Children, gone: Gone
 ) -> None:
-    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
-    await demo.wait_for_url()
     [daq] = children(demo.pid)
 
     demo.kill()
@@ -107,19 +113,14 @@ async def test_a_service_that_is_killed_leaves_no_daq_behind(
 
 
 async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(
-    start: Start, tmp_path: Path, children: Children
+    demo: Program, children: Children
 ) -> None:
-    demo = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
-    await demo.wait_for_url()
-    await demo.until(
-        "/api/v1/units", lambda units: all(u["source"]["state"] == "connected" for u in units)
-    )
+    await demo.until("/api/v1/units", all_are("connected"))
+    assert (await demo.get("/readyz"))["status"] == "ok"
     [daq] = children(demo.pid)
 
     os.kill(daq, signal.SIGKILL)
-    units = await demo.until(
-        "/api/v1/units", lambda units: all(u["source"]["state"] == "not_connected" for u in units)
-    )
+    units = await demo.until("/api/v1/units", all_are("not_connected"))
 
     for unit in units:
         assert "127.0.0.1" in unit["source"]["reason"]
@@ -127,7 +128,7 @@ async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(
         assert latest["quality"] == {"level": "bad", "reason": "not_connected"}
         assert {r["value"] for r in latest["readings"].values()} == {None}
     assert (await demo.get("/readyz"))["status"] == "ok"
-    assert await demo.end() == 0
+    assert await demo.end(signal.SIGTERM) == 0
 
 
 class OnTheWire:
@@ -137,10 +138,6 @@ class OnTheWire:
         self._feed = feed
 
     def advance(self, n_samples: int) -> RawBlock:
-        from dataclasses import replace
-
-        import numpy as np
-
         raw = self._feed.advance(n_samples)
         return replace(raw, slow=tuple(float(np.float32(value)) for value in raw.slow))
 
@@ -190,6 +187,7 @@ def assert_same(shown: Any, expected: Assessment) -> None:
         assert shown["readings"][name]["reason"] == reading.quality.reason.value, name
 
 
+@pytest.mark.long
 async def test_the_demo_begins_with_a_simulated_year_and_goes_on_from_it(
     start: Start, tmp_path: Path
 ) -> None:

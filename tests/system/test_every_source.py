@@ -2,11 +2,15 @@
 
 import asyncio
 import json
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rigs.command_line import padwatch_program
+from rigs.tiers import fast_and_long
+
+from .conftest import Start
 
 RECORDED_PLANT = Path(__file__).parents[1] / "recordings" / "plant.toml"
 CHANNELS = ("ujb_shaft_x", "ujb_shaft_y", "ujb_bearing_x", "ujb_bearing_y")
@@ -20,7 +24,12 @@ QUEUE_HZ = 100.0
 """A queue that a busy machine does not empty in time is a lost link."""
 
 POLLED_UP_TO_HZ = 8.0
-PATIENCE_S = 60.0
+
+ONE_OF_EACH = ("RING_TCP", "RING_RTU", "FIFO_TCP", "POLLED_TCP", "VECTOR_RTU", "CAN_LINE")
+EVERY_ONE = (
+    *("RING_TCP", "RING_RTU", "FIFO_TCP", "FIFO_RTU", "POLLED_TCP", "POLLED_RTU"),
+    *("VECTOR_TCP", "VECTOR_RTU", "CAN_TCP", "CAN_FD_TCP", "CAN_LINE"),
+)
 
 
 def register_map(**of_channels: str) -> str:
@@ -63,13 +72,16 @@ def sources(folder: Path) -> dict[str, str]:
     }
 
 
-def plant_file(folder: Path, found: dict[str, dict[str, Any]] | None = None) -> Path:
+def plant_file(
+    folder: Path, ids: Sequence[str], found: dict[str, dict[str, Any]] | None = None
+) -> Path:
     """The first recorded unit once for each source; its slow values come with the waveforms."""
     head, unit, _ = RECORDED_PLANT.read_text(encoding="utf-8").split("[[unit]]\n")
     before, _, after = unit.partition("[unit.source]")
     after = after[after.index("[[unit.channel]]") :]
     text = head.replace("[analysis]", f"[analysis]\nmax_frequency_hz = {POLLED_UP_TO_HZ}")
-    for id_, source in sources(folder).items():
+    for id_ in ids:
+        source = sources(folder)[id_]
         if found and "port" in found[id_]:
             source = source.replace("port = 0", f"port = {found[id_]['port']}")
         if found and str(found[id_].get("channel", "")).startswith("socket"):
@@ -84,33 +96,31 @@ def plant_file(folder: Path, found: dict[str, dict[str, Any]] | None = None) -> 
     return path
 
 
-@pytest.mark.long
+@pytest.mark.parametrize("ids", fast_and_long(ONE_OF_EACH, EVERY_ONE), ids=len)
 async def test_the_service_reads_every_kind_of_source_over_every_wire(
-    start: Callable, tmp_path: Path
+    start: Start, tmp_path: Path, ids: Sequence[str]
 ) -> None:
-    daq = await start("daq", str(plant_file(tmp_path)))
+    daq = await start("daq", str(plant_file(tmp_path, ids)))
     found = json.loads(await daq.process.stdout.readline())
-    program = await start("run", str(plant_file(tmp_path, found)), "--port", "0")
+    program = await start("run", str(plant_file(tmp_path, ids, found)), "--port", "0")
     await program.wait_for_url()
 
     def all_deliver(units: list[dict[str, Any]]) -> bool:
-        return all(source["n_stored"] >= MIN_SAMPLES for source in units)
+        return all(
+            source["n_stored"] >= MIN_SAMPLES and source["state"] == "connected" for source in units
+        )
 
     read = {s["unit"]: s for s in await program.until("/api/v1/sources", all_deliver)}
-    assert set(read) == set(sources(tmp_path))
+    assert set(read) == set(ids)
     for id_, source in read.items():
-        assert (source["state"], source["reason"], source["rejected"]) == ("connected", None, {}), (
-            id_
-        )
-        assert source["n_failed"] == 0, id_
+        assert (source["reason"], source["rejected"]) == (None, {}), id_
     await asyncio.gather(*(speed_is_right(program, id_) for id_ in read))
     assert await program.end() == 0
     assert "Traceback" not in program.errors
 
-    recorded = ("--unit", "POLLED_TCP", "--seconds", "1", "--out", "runs/polls")
-    polls = await start("record", str(tmp_path / "plant.toml"), *recorded)
-    async with asyncio.timeout(PATIENCE_S):
-        assert await polls.process.wait() == 0
+    recorded = ("--unit", "POLLED_TCP", "--seconds", "1", "--out", tmp_path / "runs" / "polls")
+    polls = await asyncio.to_thread(padwatch_program, "record", tmp_path / "plant.toml", *recorded)
+    assert polls.exit_code == 0, polls.stderr
     manifest = json.loads((tmp_path / "runs" / "polls" / "manifest.json").read_text())
     assert manifest["rate_hz"] == 1.0 / POLLED_EACH_S
     assert await daq.end() == 0

@@ -23,12 +23,9 @@ not reading a table."""
 
 
 async def test_the_service_serves_and_stops_among_hanging_clients(
-    start: Start, tmp_path: Path, demo_file: Path
+    start: Start, tmp_path: Path, write_plant: Callable[..., Path]
 ) -> None:
-    plant = tmp_path / "plant.toml"
-    demo = demo_file.read_text(encoding="utf-8").replace("var/demo", str(tmp_path))
-    plant.write_text(demo.replace("port = 0", "port = 1"), encoding="utf-8")
-    service = await start("run", str(plant), "--port", "0")
+    service = await start("run", str(write_plant(tmp_path)), "--port", "0")
     url = await service.wait_for_url()
     host, _, port = url.removeprefix("http://").partition(":")
     async with AsyncExitStack() as stack:
