@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from socket import socket
 from typing import Annotated
 
 import typer
@@ -11,7 +12,7 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError, LinkError
 from service.cli.daq import SpeedOption
-from service.cli.daq_process import daq_process
+from service.cli.daq_process import RunningDaq, daq_process
 from service.cli.ending import run_to_its_end
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import announce
@@ -58,12 +59,15 @@ def replay(
         folder = out or replay_folder(file, units.values(), SystemClock().now_ns())
         played = replayed_plant(file, units, folder)
         _require_new(database_path(played))
-        with _performance(played, plant, units, through, speed, serve) as performance:
-            _run(performance, port)
+        database = database_path(played)
+        line = json.dumps({"database": str(database)}) if json_output else f"results: {database}"
+        with (
+            _performance(played, plant, units, through, speed, serve) as (performance, daq),
+            listener_of(performance.plant, port) as listener,
+        ):
+            run_to_its_end(_play(performance, listener, daq, line))
     except (PortInUseError, StoreError, AcquisitionError, LookupError) as error:
         fail(f"padwatch replay: {error.args[0]}")
-    database = database_path(played)
-    typer.echo(json.dumps({"database": str(database)}) if json_output else f"results: {database}")
 
 
 @contextmanager
@@ -74,15 +78,14 @@ def _performance(
     through: Wire | None,
     speed: float,
     serve: bool,
-) -> Iterator[Performance]:
+) -> Iterator[tuple[Performance, RunningDaq | None]]:
+    """What is to be run, and the DAQ that plays the recordings, if there is one."""
     clock = SystemClock()
     if through is None:
-        yield Performance(
-            plant,
-            watched_units(plant, lambda u: replay_source(units[u.id], u, clock, speed or None)),
-            Origin.REPLAY,
-            ends=not serve,
+        watched = watched_units(
+            plant, lambda unit: replay_source(units[unit.id], unit, clock, speed or None)
         )
+        yield Performance(plant, watched, Origin.REPLAY, ends=not serve), None
         return
     arguments = [str(plant_path), "--through", through.value, "--speed", str(speed)]
     for folder in units.values():
@@ -93,11 +96,7 @@ def _performance(
         watched = watched_units(
             attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id], gone)
         )
-        yield Performance(attached, watched, Origin.REPLAY, ends=not serve)
-        if daq.has_failed:
-            raise LinkError(
-                "the simulated DAQ has ended before its recordings did: results are incomplete"
-            )
+        yield Performance(attached, watched, Origin.REPLAY, ends=not serve), daq
 
 
 def _require_new(database: Path) -> None:
@@ -112,6 +111,19 @@ def _require_new(database: Path) -> None:
         raise LookupError(f"{database} holds results already; a replay needs a folder of its own")
 
 
-def _run(performance: Performance, port: int) -> None:
-    with listener_of(performance.plant, port) as listener:
-        run_to_its_end(run_service(performance, listener, SystemClock(), announce))
+async def _play(
+    performance: Performance, listener: socket, daq: RunningDaq | None, line: str
+) -> None:
+    """Run the service and print where the results are, before threads may be left behind.
+
+    Raises
+    ------
+    LinkError
+        If the DAQ has ended too early.
+    """
+    await run_service(performance, listener, SystemClock(), announce)
+    if daq is not None and daq.has_failed:
+        raise LinkError(
+            "the simulated DAQ has ended before its recordings did: results are incomplete"
+        )
+    typer.echo(line)
