@@ -1,11 +1,13 @@
 """Blocks that use everything a block can hold, and a real server."""
 
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from harness.ledger_plant import LedgerPlant
+from harness.moving_unit import MovingUnit
 from harness.nats_server import NatsServer, nats_server, nats_server_command
 from nats import connect
 from rigs.memory_folder import memory_folder
@@ -17,6 +19,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.stream.identity import UnitIdentity, fingerprint
 
+SHORT = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
 T0 = 1_767_225_600_123_456_789
 
 
@@ -62,6 +65,23 @@ def plant() -> PlantFile:
 def tmp_path(folder_in_memory: Path) -> Path:
     """A folder in memory: most of the time went into syncs of the disk."""
     return folder_in_memory
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(3)
+
+
+@pytest.fixture
+def moving_unit(tmp_path: Path) -> Callable[[str], MovingUnit]:
+    """Builds units whose analysis is moved, each with a folder of its own."""
+
+    def build(name: str) -> MovingUnit:
+        folder = tmp_path / name
+        folder.mkdir()
+        return MovingUnit(SHORT.write(folder / "plant.toml", folder / "data", {"U1": 9}))
+
+    return build
 
 
 @pytest.fixture(scope="session")

@@ -4,14 +4,14 @@ What is on the stream is as bad as it comes: gaps of all lengths, devices that c
 links, blocks that overlap or come twice, messages that nobody understands.
 """
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Message, MovingUnit
 from harness.stream_rig import found_in
+from rigs.tiers import fast_and_long
 
 from core.arrays import FloatArray, SampleArray
 from core.blocks import SampleBlock
@@ -27,6 +27,7 @@ SPAN = LEDGER.n_segments * LEDGER.hop_samples
 T0 = 1_767_225_600 * NS_PER_S
 N_SAMPLES = 240
 N_MESSAGES = 100
+MakeUnit = Callable[[str], MovingUnit]
 TURN_HZ = 10.0
 
 
@@ -119,19 +120,13 @@ def messages(unit: MovingUnit, seed: int) -> Iterator[Message]:
                 yield sequence, payload
 
 
-def moving_unit(folder: Path) -> MovingUnit:
-    ports = dict.fromkeys(LEDGER.units, 9)
-    folder.mkdir()
-    return MovingUnit(LEDGER.write(folder / "plant.toml", folder / "data", ports))
-
-
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", fast_and_long(1, 2))
 async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(
-    tmp_path: Path, seed: int
+    moving_unit: MakeUnit, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
-    whole, moved = moving_unit(tmp_path / "whole"), moving_unit(tmp_path / "moved")
+    whole, moved = moving_unit("whole"), moving_unit("moved")
     sent = list(messages(whole, seed))
     await whole.live(sent, None, rng)
     for _ in range(8):
@@ -177,9 +172,18 @@ async def lived_until_its_blocks_have_gone(unit: MovingUnit, device: Device) -> 
     return word
 
 
-async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(tmp_path: Path) -> None:
-    unit = moving_unit(tmp_path / "plant")
-    device = SteadyDevice(unit.plant.unit[0], 1)
+Steady = tuple[MovingUnit, SteadyDevice]
+
+
+@pytest.fixture
+def steady(moving_unit: MakeUnit) -> Steady:
+    """A unit, and its device."""
+    unit = moving_unit("plant")
+    return unit, SteadyDevice(unit.plant.unit[0], 1)
+
+
+async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(steady: Steady) -> None:
+    unit, device = steady
     word = await lived_until_its_blocks_have_gone(unit, device)
     device.skip(5 * SPAN)
 
@@ -195,10 +199,9 @@ async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(tmp_path: P
 
 
 async def test_a_device_that_counts_anew_after_all_blocks_went_is_analysed_at_once(
-    tmp_path: Path,
+    steady: Steady,
 ) -> None:
-    unit = moving_unit(tmp_path / "plant")
-    device = SteadyDevice(unit.plant.unit[0], 1)
+    unit, device = steady
     word = await lived_until_its_blocks_have_gone(unit, device)
     device.restart()
 
@@ -210,9 +213,8 @@ async def test_a_device_that_counts_anew_after_all_blocks_went_is_analysed_at_on
     assert found["gap"]
 
 
-async def test_a_stream_that_lost_its_end_is_not_analysed_a_second_time(tmp_path: Path) -> None:
-    unit = moving_unit(tmp_path / "plant")
-    device = SteadyDevice(unit.plant.unit[0], 1)
+async def test_a_stream_that_lost_its_end_is_not_analysed_a_second_time(steady: Steady) -> None:
+    unit, device = steady
     sent = sent_by(device, unit, 60, 101)
     await unit.live(sent, None, np.random.default_rng(1))
     first = found_in(unit.database)["assessment"]

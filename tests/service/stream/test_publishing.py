@@ -7,7 +7,7 @@ from pathlib import Path
 import nats
 import numpy as np
 import pytest
-from harness.nats_server import NatsServer
+from harness.nats_server import NatsServer, nats_server
 from nats.errors import ConnectionClosedError
 from nats.js.client import JetStreamContext
 
@@ -35,14 +35,10 @@ def block(plant: PlantFile, number: int, n_samples: int = 60) -> SampleBlock:
     return SampleBlock(unit.id, 1, first, first, unit.sampling_hz, samples, quality)
 
 
-def publisher(plant: PlantFile, server: NatsServer, **settings: object) -> Publisher:
+def publisher(plant: PlantFile, url: str, **settings: object) -> Publisher:
     unit = plant.unit[0]
-    return Publisher(
-        plant,
-        StreamSettings(servers=(server.url,), max_gb=0.1, **settings),
-        {unit.id: identity_of(plant, unit)},
-        SystemClock(),
-    )
+    given = StreamSettings(**{"servers": (url,), "max_gb": 0.1, **settings})  # type: ignore[arg-type]
+    return Publisher(plant, given, {unit.id: identity_of(plant, unit)}, SystemClock())
 
 
 @asynccontextmanager
@@ -89,7 +85,7 @@ async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(
     plant: PlantFile, server: NatsServer
 ) -> None:
     unit = plant.unit[0].id
-    async with running(publisher(plant, server)) as out:
+    async with running(publisher(plant, server.url)) as out:
         out.tell(LinkNews(unit, LinkState.CONNECTED))
         for number in range(5):
             await out.publish(block(plant, number))
@@ -106,7 +102,7 @@ async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_b
     plant: PlantFile, server: NatsServer
 ) -> None:
     anew = [replace(block(plant, n), start_ns=10**9 + n) for n in (0, 1)]
-    async with running(publisher(plant, server)) as out:
+    async with running(publisher(plant, server.url)) as out:
         for each in (block(plant, 0), block(plant, 1), *anew):
             await out.publish(each)
         await drained(out)
@@ -116,19 +112,19 @@ async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_b
 async def test_a_block_that_is_published_twice_is_kept_once(
     plant: PlantFile, server: NatsServer
 ) -> None:
-    async with running(publisher(plant, server)) as out:
+    async with running(publisher(plant, server.url)) as out:
         for number in (0, 1, 0, 1, 2):
             await out.publish(block(plant, number))
         await drained(out)
         assert out.n_doubles == 2
-    async with running(publisher(plant, server)) as again:
+    async with running(publisher(plant, server.url)) as again:
         await again.publish(block(plant, 2))
         await drained(again)
     assert numbers(await kept(plant, server)) == [0, 1, 2]
 
 
 async def test_a_server_that_is_killed_costs_no_block(plant: PlantFile, server: NatsServer) -> None:
-    async with running(publisher(plant, server)) as out:
+    async with running(publisher(plant, server.url)) as out:
         for number in range(30):
             await out.publish(block(plant, number))
         await out.waiting.published_at_least(10)
@@ -144,9 +140,8 @@ async def test_a_server_that_is_killed_costs_no_block(plant: PlantFile, server: 
 async def test_a_full_memory_makes_the_device_wait_and_loses_nothing(
     plant: PlantFile, server: NatsServer
 ) -> None:
-    out = publisher(plant, server, buffer_mb=1.0)
-    n_samples = 60_000 // len(plant.unit[0].channel)
-    put = asyncio.create_task(_publish_all(out, plant, 12, n_samples))
+    out = publisher(plant, server.url, buffer_mb=1.0)
+    put = asyncio.create_task(_publish_all(out, plant, 12))
     while not put.done() and out.waiting.n_waiting < 4:
         await asyncio.sleep(0)
     assert not put.done()
@@ -157,27 +152,22 @@ async def test_a_full_memory_makes_the_device_wait_and_loses_nothing(
     assert len(await kept(plant, server)) == 12
 
 
-async def _publish_all(out: Publisher, plant: PlantFile, n_blocks: int, n_samples: int) -> None:
+async def _publish_all(out: Publisher, plant: PlantFile, n_blocks: int) -> None:
+    """Publish blocks of a quarter of a megabyte."""
     for number in range(n_blocks):
-        await out.publish(block(plant, number, n_samples))
+        await out.publish(block(plant, number, 60_000 // len(plant.unit[0].channel)))
 
 
 async def test_a_full_stream_refuses_aloud_and_drops_nothing(
     plant: PlantFile, server: NatsServer
 ) -> None:
-    out = publisher(plant, server)
+    out = publisher(plant, server.url)
     async with running(out):
         await out.publish(block(plant, 0))
         await drained(out)
-    tight = Publisher(
-        plant,
-        StreamSettings(servers=(server.url,), max_gb=0.001),
-        {plant.unit[0].id: identity_of(plant, plant.unit[0])},
-        SystemClock(),
-    )
-    n_samples = 60_000 // len(plant.unit[0].channel)
+    tight = publisher(plant, server.url, max_gb=0.001)
     async with running(tight):
-        await _publish_all(tight, plant, 8, n_samples)
+        await _publish_all(tight, plant, 8)
         await until(lambda: "is full" in (tight.trouble or ""))
     first = (await kept(plant, server))[0]
     assert isinstance(first, SampleBlock)
@@ -190,18 +180,24 @@ async def until(so: Callable[[], bool]) -> None:
             await asyncio.sleep(0.02)
 
 
-async def test_without_a_server_it_waits_and_says_so(plant: PlantFile, tmp_path: Path) -> None:
-    absent = NatsServer(tmp_path / "absent")
-    absent.start()
-    absent.stop()
-    async with running(publisher(plant, absent)) as out:
+def test_news_of_a_link_do_not_pile_up_while_the_servers_are_away(plant: PlantFile) -> None:
+    out, unit = publisher(plant, "nats://127.0.0.1:9"), plant.unit[0].id
+    for second in range(1000):
+        out.tell(LinkNews(unit, LinkState.NOT_CONNECTED, f"silent for {second} s"))
+
+    queue = out.waiting._waiting[unit]
+    assert len(queue) == 2
+    assert out.waiting.n_bytes == sum(len(message.payload) for message in queue)
+    assert b"999 s" in queue[-1].payload
+
+
+async def test_without_a_server_it_waits_and_says_so(plant: PlantFile, server: NatsServer) -> None:
+    server.kill()
+    async with running(publisher(plant, server.url)) as out:
         await out.publish(block(plant, 0))
         await until(lambda: "is not reached" in (out.trouble or ""))
-        absent.start()
-        try:
-            await drained(out)
-        finally:
-            absent.stop()
+        server.start()
+        await drained(out)
 
 
 async def test_a_server_without_jetstream_is_named_with_what_to_do(
@@ -210,7 +206,7 @@ async def test_a_server_without_jetstream_is_named_with_what_to_do(
     bare = NatsServer(tmp_path / "bare", has_jetstream=False)
     bare.start()
     try:
-        async with running(publisher(plant, bare)) as out:
+        async with running(publisher(plant, bare.url)) as out:
             await until(lambda: "-js" in (out.trouble or ""))
     finally:
         bare.stop()
@@ -223,31 +219,26 @@ async def test_a_stream_of_another_plant_is_left_alone(
     other = shared.model_copy(
         update={"plant": plant.plant.model_copy(update={"name": "Another plant"})}
     )
-    async with running(publisher(shared, server)) as out:
+    async with running(publisher(shared, server.url)) as out:
         await out.publish(block(plant, 0))
         await drained(out)
-    async with running(publisher(other, server)) as out:
+    async with running(publisher(other, server.url)) as out:
         await out.publish(block(plant, 1))
         await until(lambda: "belongs to another plant" in (out.trouble or ""))
     assert numbers(await kept(shared, server)) == [0]
 
 
-@pytest.mark.parametrize("lines", ['authorization { token: "s3cret" }'])
 async def test_a_server_that_lets_nobody_in_without_a_token_is_named_with_what_to_do(
-    plant: PlantFile, tmp_path: Path, lines: str
+    plant: PlantFile, tmp_path: Path
 ) -> None:
-    closed = NatsServer(tmp_path / "closed", lines)
-    closed.start()
     token = tmp_path / "token"
     token.write_text("s3cret\n")
-    try:
-        async with running(publisher(plant, closed)) as out:
+    with nats_server(tmp_path / "closed", 'authorization { token: "s3cret" }') as closed:
+        async with running(publisher(plant, closed.url)) as out:
             await until(lambda: "token_file" in (out.trouble or ""))
-        async with running(publisher(plant, closed, token_file=str(token))) as out:
+        async with running(publisher(plant, closed.url, token_file=str(token))) as out:
             await out.publish(block(plant, 0))
             await drained(out)
-    finally:
-        closed.stop()
 
 
 async def fail(error: Exception) -> None:
@@ -275,7 +266,7 @@ async def test_a_connection_that_several_lose_at_once_is_one_trouble(server: Nat
 async def test_a_stream_that_is_deleted_meanwhile_is_made_again(
     plant: PlantFile, server: NatsServer
 ) -> None:
-    async with running(publisher(plant, server)) as publishing:
+    async with running(publisher(plant, server.url)) as publishing:
         await publishing.publish(block(plant, 0))
         await drained(publishing)
         async with looking(server) as stream:

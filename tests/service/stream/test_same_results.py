@@ -1,9 +1,9 @@
 """Acquire and analyse apart find what a single process finds, to the last bit, kills or not."""
 
-import asyncio
 from pathlib import Path
 
 import pytest
+from harness import stream_rig
 from harness.nats_server import NatsServer
 from harness.service_rig import ServiceRig, until
 from harness.stream_rig import (
@@ -16,11 +16,8 @@ from harness.stream_rig import (
     written_plant,
 )
 
-from acquisition.clock import SystemClock
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.stream.names import identity_of
-from service.stream.publisher import Publisher
 
 SEED = 3
 N_BLOCKS = 120
@@ -28,19 +25,9 @@ N_BLOCKS = 120
 
 async def publish(plant: PlantFile, first: int, last: int) -> None:
     """Publish a stretch of every unit's blocks."""
-    assert plant.stream is not None
-    identities = {unit.id: identity_of(plant, unit) for unit in plant.unit}
-    publisher = Publisher(plant, plant.stream, identities, SystemClock())
-    running = asyncio.create_task(publisher.run())
-    try:
-        for pair in zip(*(blocks(plant, u, N_BLOCKS, SEED) for u in LEDGER.units), strict=True):
-            for block in pair:
-                if first <= number_of(block.start_ns) < last:
-                    await publisher.publish(block)
-        await asyncio.wait_for(publisher.waiting.drained(), 60.0)
-    finally:
-        running.cancel()
-        await asyncio.wait([running])
+    pairs = zip(*(blocks(plant, u, N_BLOCKS, SEED) for u in LEDGER.units), strict=True)
+    sent = (block for pair in pairs for block in pair)
+    await stream_rig.publish(plant, (b for b in sent if first <= number_of(b.start_ns) < last))
 
 
 def number_of(start_ns: int) -> int:

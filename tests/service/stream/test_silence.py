@@ -11,24 +11,15 @@ from typing import Protocol
 import pytest
 from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Life, Message, MovingUnit
-from harness.stream_rig import blocks
+from harness.stream_rig import analysing, blocks
 
-from acquisition.clock import Clock, SystemClock
+from acquisition.clock import Clock
 from core.alarms.alarm import AlarmKind
-from service.analyse_program import Analysing
-from service.delivery.facts import Around
-from service.heartbeats import Heartbeats
 from service.live import LinkState
-from service.metrics.timings import Timings
-from service.origin import Origin
-from service.roles.ground import Ground, live_view
-from service.roles.partition import Partition
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery
 from service.stream.silence import Silence
 from service.stream.wire import encoded_block
-from service.wiring.sources import monitor_of
-from service.wiring.stores import open_store
 
 LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
 UNIT = "U1"
@@ -224,34 +215,15 @@ async def test_a_unit_whose_blocks_wait_for_the_store_is_not_silent(place: Place
         assert first.changes == [("raised", 1)]
 
 
-@pytest.fixture
-async def unreached(tmp_path: Path) -> AsyncIterator[Ground]:
-    """What the whole process knows while the servers of its stream are not there."""
+async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_lost(
+    tmp_path: Path,
+) -> None:
     stream = '[stream]\nservers = ["nats://127.0.0.1:9"]\nsilent_after_s = 2.0\n'
     ports = dict.fromkeys(LEDGER.units, 9)
-    plant = load_plant_file(LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream))
-    assert plant.stream is not None
-    clock = SystemClock()
-    store, live = open_store(plant), live_view(plant, clock)
-    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
-    watched = (Heartbeats(clock), Timings(monitors, clock))
-    ground = Ground(plant, Origin.LIVE, clock, store, live, *watched)
-    process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(live))
-    task = asyncio.create_task(process._analyse())
-    try:
-        yield ground
-    finally:
-        task.cancel()
-        await asyncio.wait([task])
-        await process.close()
-        store.close()
-
-
-async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_lost(
-    unreached: Ground,
-) -> None:
-    while unreached.live.status(UNIT).state is LinkState.CONNECTING:
-        await asyncio.sleep(0.01)
-    status = unreached.live.status(UNIT)
+    plant = LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream)
+    async with analysing(load_plant_file(plant)) as (_, ground):
+        while ground.live.status(UNIT).state is LinkState.CONNECTING:
+            await asyncio.sleep(0.01)
+        status = ground.live.status(UNIT)
     assert status.state is LinkState.NOT_CONNECTED
     assert "127.0.0.1:9 is not reached" in str(status.reason)

@@ -2,13 +2,10 @@
 
 import sqlite3
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import pytest
-from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Message, MovingUnit
 from harness.stream_rig import found_in
 
@@ -18,21 +15,10 @@ from core.quality import GOOD, Reading
 from core.units import NS_PER_S
 from service.stream.wire import encoded_block
 
-LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
-T0 = 1_767_225_600 * NS_PER_S
 N_SAMPLES = 240
 EPOCH = 3
-
-
-@pytest.fixture
-def rng() -> np.random.Generator:
-    return np.random.default_rng(3)
-
-
-def moving_unit(folder: Path) -> MovingUnit:
-    folder.mkdir()
-    ports = dict.fromkeys(LEDGER.units, 9)
-    return MovingUnit(LEDGER.write(folder / "plant.toml", folder / "data", ports))
+T0 = 1_767_225_600 * NS_PER_S
+MakeUnit = Callable[[str], MovingUnit]
 
 
 def blocks(unit: MovingUnit, first_index: int, n: int, begin_s: float = 0.0) -> list[SampleBlock]:
@@ -69,9 +55,9 @@ def windows(unit: MovingUnit) -> list[tuple[int, int]]:
 
 
 async def test_samples_of_a_device_that_counts_anew_without_telling_are_analysed(
-    tmp_path: Path, rng: np.random.Generator
+    moving_unit: MakeUnit, rng: np.random.Generator
 ) -> None:
-    whole, moved = moving_unit(tmp_path / "whole"), moving_unit(tmp_path / "moved")
+    whole, moved = moving_unit("whole"), moving_unit("moved")
     seconds = 10**6 / whole.plant.unit[0].sampling_hz + 100.0
     sent = messages(whole, blocks(whole, 10**6, 20) + blocks(whole, 0, 30, seconds))
     await whole.live(sent, None, rng)
@@ -85,9 +71,9 @@ async def test_samples_of_a_device_that_counts_anew_without_telling_are_analysed
 
 
 async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(
-    tmp_path: Path, rng: np.random.Generator
+    moving_unit: MakeUnit, rng: np.random.Generator
 ) -> None:
-    clean, late = moving_unit(tmp_path / "clean"), moving_unit(tmp_path / "late")
+    clean, late = moving_unit("clean"), moving_unit("late")
     once = blocks(clean, 10**6, 30)
     await clean.live(messages(clean, once), None, rng)
     torn = replace(once[3], rejected=(Rejection("torn", 7),))
@@ -97,9 +83,9 @@ async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(
 
 
 async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies_of_them(
-    tmp_path: Path, rng: np.random.Generator
+    moving_unit: MakeUnit, rng: np.random.Generator
 ) -> None:
-    clean, spoilt = moving_unit(tmp_path / "clean"), moving_unit(tmp_path / "spoilt")
+    clean, spoilt = moving_unit("clean"), moving_unit("spoilt")
     once = blocks(clean, 10**6, 30)
     await clean.live(messages(clean, once), None, rng)
     one = once[10]
@@ -120,9 +106,9 @@ async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies
 
 
 async def test_a_block_that_says_nothing_of_a_slow_channel_is_analysed_without_it(
-    tmp_path: Path, rng: np.random.Generator
+    moving_unit: MakeUnit, rng: np.random.Generator
 ) -> None:
-    unit = moving_unit(tmp_path / "unit")
+    unit = moving_unit("unit")
     sent = blocks(unit, 0, 30)
     sent = [*sent[:15], *(replace(block, slow={}) for block in sent[15:])]
     assert not await unit.live(messages(unit, sent), None, rng)

@@ -1,8 +1,10 @@
 """Blocks on a real stream, and what a single process makes of the same blocks in the same order."""
 
+import asyncio
 import sqlite3
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import nats
@@ -14,6 +16,7 @@ from core.quality import GOOD, Reading
 from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
+from service.analyse_program import Analysing
 from service.bus import Bus
 from service.delivery.facts import Around
 from service.heartbeats import Heartbeats
@@ -23,16 +26,20 @@ from service.origin import Origin
 from service.roles.analysis import analysis_on
 from service.roles.ground import Ground, live_view
 from service.roles.link_news import LinkNews
+from service.roles.partition import Partition
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
 from service.stream.names import identity_of, stream_name, subject
+from service.stream.publisher import Publisher
 from service.stream.wire import Taken, decoded
 from service.wiring.sources import monitor_of
+from service.wiring.stores import open_store
 
 LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
 T0 = 1_767_225_600 * NS_PER_S
 N_SAMPLES = 600
+WAIT_S = 60.0
 
 
 def written_plant(folder: Path, server: NatsServer, name: str = "plant") -> Path:
@@ -76,6 +83,41 @@ def blocks(plant: PlantFile, unit: str, n_blocks: int, seed: int) -> Iterator[Sa
             },
         )
         first += N_SAMPLES
+
+
+async def publish(plant: PlantFile, sent: Iterable[SampleBlock]) -> None:
+    """Put blocks on the stream; returns when the servers have confirmed them all."""
+    assert plant.stream is not None
+    identities = {unit.id: identity_of(plant, unit) for unit in plant.unit}
+    publisher = Publisher(plant, plant.stream, identities, SystemClock())
+    running = asyncio.create_task(publisher.run())
+    try:
+        for block in sent:
+            await publisher.publish(block)
+        await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+@asynccontextmanager
+async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, Ground]]:
+    """Run the analysis of a process; what is not stored when this is left is lost."""
+    clock = SystemClock()
+    store, live = open_store(plant), live_view(plant, clock)
+    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
+    beats, timings = Heartbeats(clock), Timings(monitors, clock)
+    ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
+    assert plant.stream is not None
+    process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(live))
+    task = asyncio.create_task(process._analyse())
+    try:
+        yield process, ground
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+        await process.close()
+        store.close()
 
 
 Sent = tuple[str, SampleBlock | LinkNews]

@@ -49,12 +49,9 @@ def test_what_comes_piece_by_piece_is_gathered_like_what_comes_at_once(
 
 
 @pytest.mark.parametrize("at_once", [2, 50])
+@pytest.mark.usefixtures("rolled")
 def test_a_bounded_number_of_readings_is_gathered_at_a_time(
-    at_once: int,
-    plain: SqliteStore,
-    rolled: SqliteStore,
-    path_of: Callable[[str], Path],
-    monkeypatch: Any,
+    plain: SqliteStore, path_of: Callable[[str], Path], monkeypatch: Any, at_once: int
 ) -> None:
     monkeypatch.setattr(rolling, "MAX_READINGS", at_once)
     gather_all(plain)
