@@ -6,7 +6,8 @@ device keeps nothing while nobody is connected: what is not asked for in time is
 module lies in `rigs`.
 """
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from typing import Any
 
 import pytest
 from rigs.can import CanFdRig, CanRig
@@ -39,49 +40,65 @@ WIRED = [
 ALL = [*WIRED, SimulatedRig, RecordingRig, UnitsRecordingRig]
 
 
-@pytest.fixture(params=ALL, ids=lambda kind: kind.__name__)
-async def rig(request, counting_feed, counts_calibration, stepped_clock) -> AsyncIterator:
-    async with request.param(counting_feed(), counts_calibration(), stepped_clock) as rig:
+SAME_SOURCE_ON_A_LINE = (PolledRtuRig, VectorRtuRig, FifoRtuRig)
+"""Sources that are in `ALL` over TCP, too: in the fast tier a line is only lost and found again."""
+
+
+def rigs_of(kinds: list[type]) -> list:
+    """Parameters of a fixture that builds rigs."""
+    long = dict.fromkeys(SAME_SOURCE_ON_A_LINE, pytest.mark.long)
+    return [pytest.param(kind, id=kind.__name__, marks=long.get(kind, ())) for kind in kinds]
+
+
+@pytest.fixture
+def build_rig(counting_feed, counts_calibration, stepped_clock) -> Callable[..., Any]:
+    """Build a rig of some kind; all that was converted but is lost is given in `losses`."""
+
+    def build(kind: type, losses: dict[int, int] | None = None) -> Any:
+        feed = lossy(counting_feed(), losses or {})
+        rig = kind(feed, counts_calibration(), stepped_clock)
+        rig.losses = losses
+        return rig
+
+    return build
+
+
+@pytest.fixture(params=rigs_of(ALL))
+async def rig(request, build_rig) -> AsyncIterator:
+    async with build_rig(request.param) as rig:
         yield rig
 
 
 LOSSES = {1000: 50, 2000: 350, 3000: 1000}
-"""Samples that the converter of a lossy rig never delivers: the first of them, and how many."""
+"""Samples that are lost: the first of them, and how many."""
 
 
-def lossy(feed):
-    """A feed that leaves out what is lost."""
+def lossy(feed, losses: dict[int, int]):
+    """A converter that never delivers what is lost."""
     advance = feed.advance
 
     def leaving_out(n_samples: int):
-        feed.n_samples += LOSSES.get(feed.n_samples, 0)
+        feed.n_samples += losses.get(feed.n_samples, 0)
         return advance(n_samples)
 
     feed.advance = leaving_out
     return feed
 
 
-@pytest.fixture(
-    params=[kind for kind in ALL if getattr(kind, "keeps", True)], ids=lambda kind: kind.__name__
-)
-async def lossy_rig(request, counting_feed, counts_calibration, stepped_clock) -> AsyncIterator:
-    feed = lossy(counting_feed())
-    async with request.param(feed, counts_calibration(), stepped_clock) as rig:
-        rig.losses = LOSSES
+@pytest.fixture(params=rigs_of([kind for kind in ALL if getattr(kind, "keeps", True)]))
+async def lossy_rig(request, build_rig) -> AsyncIterator:
+    async with build_rig(request.param, LOSSES) as rig:
         yield rig
 
 
-@pytest.fixture(
-    params=[kind for kind in ALL if not getattr(kind, "keeps", True)],
-    ids=lambda kind: kind.__name__,
-)
-async def polled_rig(request, counting_feed, counts_calibration, stepped_clock) -> AsyncIterator:
-    async with request.param(counting_feed(), counts_calibration(), stepped_clock) as rig:
+@pytest.fixture(params=rigs_of([kind for kind in ALL if not getattr(kind, "keeps", True)]))
+async def polled_rig(request, build_rig) -> AsyncIterator:
+    async with build_rig(request.param) as rig:
         rig.losses = LOSSES
         yield rig
 
 
 @pytest.fixture(params=WIRED, ids=lambda kind: kind.__name__)
-async def wired_rig(request, counting_feed, counts_calibration, stepped_clock) -> AsyncIterator:
-    async with request.param(counting_feed(), counts_calibration(), stepped_clock) as rig:
+async def wired_rig(request, build_rig) -> AsyncIterator:
+    async with build_rig(request.param) as rig:
         yield rig

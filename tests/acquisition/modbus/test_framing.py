@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu.file_message import ReadFifoQueueRequest
 from pymodbus.pdu.mei_message import ReadDeviceInformationRequest
-from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteSingleRegisterRequest
+from pymodbus.pdu.register_message import ReadHoldingRegistersRequest
 
-from acquisition.errors import ConfigError
 from acquisition.modbus.framing import Reply, RtuFramer, TcpFramer
 
 PAYLOAD = bytes(range(10))
@@ -39,11 +38,6 @@ def test_a_read_leaves_as_twelve_bytes():
     framer = TcpFramer()
     request = ReadHoldingRegistersRequest(dev_id=1, transaction_id=7, address=100, count=5)
     assert framer.buildFrame(request).hex() == "000700000006010300640005"
-
-
-def test_a_write_never_leaves():
-    with pytest.raises(ConfigError, match="function code 6 is never sent"):
-        TcpFramer().buildFrame(WriteSingleRegisterRequest(address=1, registers=[1]))
 
 
 @given(st.lists(st.integers(0, len(RIGHT)), max_size=20))

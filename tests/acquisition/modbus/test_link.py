@@ -12,7 +12,6 @@ import pytest
 from pymodbus.pdu import ModbusPDU
 
 from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.framing import RtuFramer, TcpFramer
 from acquisition.modbus.identification import Identification
 
 
@@ -134,17 +133,6 @@ def arguments_of(kind: type[ModbusPDU]) -> dict[str, object]:
 def test_pymodbus_has_more_requests_than_may_be_sent():
     assert {kind.__name__ for kind in requests_of_pymodbus()} > READS
     assert len(requests_of_pymodbus()) > 15
-
-
-@pytest.mark.parametrize("kind", requests_of_pymodbus(), ids=lambda kind: kind.__name__)
-@pytest.mark.parametrize("framer", [TcpFramer, RtuFramer])
-def test_nothing_but_reads_can_be_framed(framer, kind):
-    request = kind(**arguments_of(kind))
-    if kind.__name__ in READS:
-        assert framer().buildFrame(request)
-        return
-    with pytest.raises(ConfigError, match=f"function code {kind.function_code} is never sent"):
-        framer().buildFrame(request)
 
 
 @pytest.mark.parametrize("kind", requests_of_pymodbus(), ids=lambda kind: kind.__name__)

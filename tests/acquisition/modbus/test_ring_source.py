@@ -1,7 +1,6 @@
 """What a block-ring source makes of a device that loses, tears, repeats, restarts or stops."""
 
 import numpy as np
-import pytest
 
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
@@ -9,7 +8,6 @@ from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.modbus.profile import RingHeader, encode_header
 from acquisition.modbus.slot import encode_slot
-from core.blocks import Rejection
 from core.device_clock import StampFault
 from core.quality import Reason
 
@@ -25,63 +23,6 @@ async def test_only_the_newest_slot_is_read_on_the_first_connection(device, serv
     async with source_at(server.port).connect() as stream:
         block = await anext(stream)
     assert (block.first_index, block.stop_index) == (300, 350)
-
-
-async def test_slots_that_follow_each_other_come_as_blocks_without_a_gap(
-    device, server, source_at, read_until
-):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(6)
-        blocks = await read_until(stream, 350)
-    assert [block.first_index for block in blocks] == [50, 100, 150, 200, 250, 300]
-    samples = np.concatenate([block.samples for block in blocks], axis=1)
-    np.testing.assert_array_equal(samples, np.arange(50, 350) + np.arange(3)[:, np.newaxis])
-
-
-async def test_a_slot_that_was_never_written_is_an_exact_gap(device, server, source_at):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(2, faults.dropped)
-        device.produce(1)
-        block = await anext(stream)
-    assert (block.first_index, block.rejected) == (150, ())
-
-
-async def test_a_reader_that_falls_behind_records_exactly_what_was_overwritten(
-    device, server, source_at, read_until
-):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(7)
-        blocks = await read_until(stream, 400)
-        assert blocks[0].first_index == 50
-        device.produce(8)
-        blocks = await read_until(stream, 800)
-    assert blocks[0].first_index == 450
-    assert not any(block.rejected for block in blocks)
-
-
-@pytest.mark.parametrize(
-    ("fault", "reason"),
-    [
-        (faults.torn, "torn_slot"),
-        (faults.wrong_sequence, "wrong_sequence"),
-        (faults.wrong_index, "inconsistent_index"),
-        (faults.impossible_time, "impossible_time"),
-    ],
-)
-async def test_a_nonsense_slot_is_refused_and_counted(
-    fault, reason, device, server, source_at, read_until
-):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(1)
-        device.produce(1, fault)
-        device.produce(2)
-        before, after, _ = await read_until(stream, 250)
-    assert (before.first_index, before.stop_index) == (50, 100)
-    assert (after.first_index, after.rejected) == (150, (Rejection(reason, 50),))
 
 
 async def test_a_slot_with_a_wrong_stamp_keeps_its_samples_and_says_so(
@@ -110,16 +51,6 @@ async def test_a_device_clock_that_was_set_costs_no_sample(counting_feed, source
     assert [block.first_index for block in blocks] == [50, 100, 150]
     assert {block.epoch for block in blocks} == {first.epoch}
     assert blocks[1].start_ns - first.start_ns > 3600 * 10**9
-
-
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
-async def test_a_damaged_slot_is_refused_and_counted(device, server, source_at):
-    async with source_at(server.port).connect() as stream:
-        await anext(stream)
-        device.produce(1, faults.damaged)
-        device.produce(1)
-        block = await anext(stream)
-    assert (block.first_index, block.rejected) == (100, (Rejection("damaged_slot", 50),))
 
 
 async def test_a_slot_that_is_being_written_is_read_again(device, server, source_at):

@@ -1,40 +1,39 @@
-"""Modbus sources on a counting plant."""
+"""Modbus sources on a counting plant: their links, and the block ring."""
 
 import tempfile
 from contextlib import AsyncExitStack
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.daq.modbus_server import ModbusServer
+from acquisition.daq.modbus_server import ModbusDevice, ModbusServer
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer, RtuRingServer
+from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.rtu_server import ModbusRtuServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from acquisition.source import SampleSource
 
 
-class _RingRig:
-    """A block ring on a real link; the plant runs when told."""
+class Rig:
+    """A device on a real link; pulling the plug takes the link away."""
 
     absence: str
+    keeps = True
+    n_kept = 0
+    """Samples that have been offered, if the device keeps them all until they are read."""
 
-    def __init__(self, feed, calibration, clock) -> None:  # noqa: ARG002 - links have their own
-        self._device = RingDevice(feed)
-        self._calibration = calibration
+    def __init__(self, feed, calibration, clock) -> None:
+        self._feed, self._calibration, self._clock = feed, calibration, clock
         self._plug = AsyncExitStack()
+        self._folder = tempfile.TemporaryDirectory()
         self._server: ModbusServer
-        self.step_samples = self._device.layout.samples_per_slot
+        self.step_samples = 1
         self.source: SampleSource
-
-    async def _plug_in_and_read(self, timeout_s: float, transport) -> None:
-        await self.plug_in()
-        settings = ModbusRingSettings(
-            transport=transport(), poll_period_s=0.001, timeout_s=timeout_s
-        )
-        self.source = ModbusRingSource(settings, self._calibration, SystemClock())
 
     async def __aexit__(self, *_: object) -> None:
         await self.pull()
+        self._folder.cleanup()
 
     async def plug_in(self) -> None:
         await self._plug.enter_async_context(self._server)
@@ -42,40 +41,57 @@ class _RingRig:
     async def pull(self) -> None:
         await self._plug.aclose()
 
+    def _serve(self, device: ModbusDevice) -> ModbusServer:
+        return ModbusTcpServer(device)
+
+    def _transport(self) -> Transport:
+        return TcpTransport(**self._server.endpoint)
+
+
+class OnTcp(Rig):
+    absence = r"127\.0\.0\.1:\d+: Connection refused"
+    timeout_s = 5.0
+
+
+class OnRtu(Rig):
+    absence = r"/line: No such file or directory"
+    timeout_s = 0.6
+
+    def _serve(self, device: ModbusDevice) -> ModbusServer:
+        return ModbusRtuServer(device, link=Path(self._folder.name) / "line")
+
+    def _transport(self) -> Transport:
+        device = str(self._server.endpoint["device"])
+        return SerialTransport(device=device, baudrate=4_000_000, parity="none")
+
+
+class RingRig(Rig):
+    """A block ring; the plant runs when `run` is called."""
+
+    shape = RingDeviceSettings()
+
+    async def __aenter__(self) -> "RingRig":
+        self.device = RingDevice(self._feed, settings=self.shape)
+        self.step_samples = self.shape.samples_per_slot
+        self._server = self._serve(self.device)
+        await self.plug_in()
+        settings = ModbusRingSettings(
+            transport=self._transport(), poll_period_s=0.001, timeout_s=self.timeout_s
+        )
+        self.source = ModbusRingSource(settings, self._calibration, SystemClock())
+        return self
+
+    @property
+    def n_kept(self) -> int:
+        return self.device.ledger.n_samples("U1")
+
     def run(self, n_samples: int) -> None:
-        self._device.produce(n_samples // self.step_samples)
+        self.device.produce(n_samples // self.step_samples)
 
 
-class ModbusRig(_RingRig):
+class ModbusRig(OnTcp, RingRig):
     """A block ring over Modbus TCP."""
 
-    absence = r"127\.0\.0\.1:\d+: Connection refused"
 
-    async def __aenter__(self) -> "ModbusRig":
-        self._server = ModbusRingServer(self._device)
-        await self._plug_in_and_read(5.0, self._transport)
-        return self
-
-    def _transport(self) -> Transport:
-        return TcpTransport(host="127.0.0.1", port=self._server.port)
-
-
-class ModbusRtuRig(_RingRig):
-    """A block ring over Modbus RTU; pulling the plug takes the line's device away."""
-
-    absence = r"/line: No such file or directory"
-
-    async def __aenter__(self) -> "ModbusRtuRig":
-        self._folder = tempfile.TemporaryDirectory()
-        self._server = RtuRingServer(self._device, link=Path(self._folder.name) / "line")
-        await self._plug_in_and_read(0.3, self._transport)
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        await super().__aexit__()
-        self._folder.cleanup()
-
-    def _transport(self) -> Transport:
-        return SerialTransport(
-            device=str(self._server.endpoint["device"]), baudrate=230_400, parity="none"
-        )
+class ModbusRtuRig(OnRtu, RingRig):
+    """A block ring over Modbus RTU."""

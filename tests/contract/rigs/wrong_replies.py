@@ -13,7 +13,9 @@ import numpy as np
 
 from rigs.hostile_modbus import rtu_frame
 
-TIMEOUT_S = 0.05
+TIMEOUT_S = 0.25
+"""A right reply takes milliseconds; a busy machine may take a hundred."""
+
 HANG_UP = object()
 LATE = object()
 """What a lie may consist of beside bytes: closing the connection, or the time-out passing."""
@@ -192,6 +194,25 @@ RTU_CONTENTS = {
     "random registers with a right checksum": lambda w: [w.with_data(w.random.bytes(len(w.data)))],
     "registers of another place": lambda w: [w.with_data(w.data[::-1])],
 }
+
+WITHOUT_CONTENTS = {
+    "the reply twice",
+    "the reply twice at once",
+    "its own request",
+    "its own request, then the reply",
+    "silence",
+    "the reply too late",
+    "hanging up",
+    "the reply backwards",
+    "an exception cut short",
+    "length zero",
+    "length with its bytes exchanged",
+    "checksum zero",
+    "checksum with its bytes exchanged",
+    "registers of another place",
+    "words exchanged",
+}
+"""Kinds that leave nothing but their place to chance: a few of each are all there are."""
 
 FORMS = {"tcp": TCP_FORMS, "rtu": RTU_FORMS}
 CONTENTS = {"tcp": TCP_CONTENTS, "rtu": RTU_CONTENTS}
