@@ -9,6 +9,26 @@ A_NUMBER = re.compile(r"\d")
 DATA_MS = 60_000
 """Until a number that has to be measured first is there, on a busy machine."""
 
+CHARTS = ("stiffness-trend", "amplitude-trend", "orbit", "centre", "spectrum")
+"""Of the page of a bearing."""
+
+SECOND_SPECTRUM = "() => Number(document.querySelector('#moment')?.max) > 0"
+HAS_ORBIT = """() => {
+  const canvas = document.querySelector("canvas.orbit-canvas");
+  const dots = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  return dots.some((value) => value > 0);
+}"""
+
+NO_NUMBER = """() => [...document.querySelectorAll('.number')].every(n => n.textContent === '—')
+    && [...document.querySelectorAll('.spread')].every(n => n.hidden)
+    && [...document.querySelectorAll('.interval')].every(n => n.textContent === '')"""
+
+AGE = """() => {
+    const words = document.querySelector('.source .data-age').textContent;
+    const [, minutes, seconds] = /Data age (?:(\\d+) min )?(\\d+) s/.exec(words);
+    return 60 * Number(minutes ?? 0) + Number(seconds);
+}"""
+
 N_TABS = 60
 WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
@@ -19,6 +39,29 @@ async def number_with(reading: Locator, unit: str) -> float:
     await expect(reading.locator(".suffix")).to_have_text(unit, timeout=DATA_MS)
     await expect(number).to_have_text(A_NUMBER, timeout=DATA_MS)
     return float(await number.inner_text())
+
+
+async def await_charts(page: Page) -> None:
+    for name in CHARTS:
+        curve = page.locator(f"[data-chart={name}] .chart path.js-line").first
+        await expect(curve).to_be_attached(timeout=DATA_MS)
+
+
+async def await_spectra(page: Page) -> None:
+    chart = page.locator("[data-chart=waterfall] .chart")
+    await expect(chart.locator(".heatmaplayer image").first).to_be_attached(timeout=DATA_MS)
+    await page.wait_for_function(SECOND_SPECTRUM, timeout=DATA_MS)
+
+
+async def await_orbit(page: Page) -> None:
+    await expect(page.locator("canvas.orbit-canvas")).to_be_visible(timeout=DATA_MS)
+    await page.wait_for_function(HAS_ORBIT, timeout=DATA_MS)
+
+
+async def await_older(page: Page, by_s: int) -> None:
+    """Wait until the data of the page's first source are older than they are now."""
+    before_s = await page.evaluate(AGE)
+    await page.wait_for_function(f"limit => ({AGE})() > limit", arg=before_s + by_s)
 
 
 async def assert_fits(page: Page) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import expect
 
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
 DATA_MS = 90_000
 ALARM = "U1:UJB:order1_shaft_x"
 ROW = f"[data-alarm='{ALARM}']"

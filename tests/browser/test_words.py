@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from core.alarms.alarm import AlarmKind, AlarmState
+from core.alarms.event import AlarmChange
 from core.condition.operating_state import OperatingState
 from core.decision.attribution import Cause
 from core.decision.verdict import Verdict
@@ -15,6 +17,7 @@ from core.speed import SpeedSource
 
 STATIC = Path(__file__).parents[2] / "service" / "dashboard" / "static"
 SOURCE, FILM_WORDS = STATIC / "words.js", STATIC / "film_words.js"
+ALARM_WORDS = STATIC / "alarm_words.js"
 ONLY_THE_PAGE_KNOWS = {"service_not_reachable"}
 ENTRY = re.compile(r"^  (\w+): (.+),$", re.MULTILINE)
 WORDS_AND_SENTENCE = re.compile(r"\[\"[^\"]{2,25}\", \"[A-Z][^\"]+[.]\"\]")
@@ -27,13 +30,21 @@ def entries(table: str, source: Path = SOURCE) -> dict[str, str]:
     return dict(ENTRY.findall(body[1]))
 
 
-@pytest.mark.parametrize("reason", list(Reason))
-def test_every_reason_has_words_and_a_sentence(reason) -> None:
-    assert WORDS_AND_SENTENCE.fullmatch(entries("REASONS")[reason])
+def test_every_reason_has_words_and_a_sentence_and_nothing_else_has() -> None:
+    reasons = entries("REASONS")
+    assert reasons.keys() == {reason.value for reason in Reason} | ONLY_THE_PAGE_KNOWS
+    assert [name for name, said in reasons.items() if not WORDS_AND_SENTENCE.fullmatch(said)] == []
 
 
-def test_no_words_are_kept_for_reasons_that_nobody_gives() -> None:
-    assert entries("REASONS").keys() == {reason.value for reason in Reason} | ONLY_THE_PAGE_KNOWS
+@pytest.mark.parametrize(
+    ("table", "codes"),
+    [("KINDS", AlarmKind), ("STATES", AlarmState), ("CHANGES", AlarmChange)],
+    ids=["kinds", "states", "changes"],
+)
+def test_every_code_of_an_alarm_has_words(table, codes) -> None:
+    words = entries(table, ALARM_WORDS)
+    assert words.keys() == {code.value for code in codes}
+    assert all(4 < len(said) < 43 for said in words.values())
 
 
 def test_every_estimator_has_words() -> None:

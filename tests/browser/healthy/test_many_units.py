@@ -3,8 +3,11 @@
 import copy
 from typing import Any
 
-from on_screen import DATA_MS
-from playwright.async_api import Page, Route, expect
+import pytest
+from on_screen import DATA_MS, assert_fits
+from playwright.async_api import Route, expect
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 N_UNITS = 20
 LOST = 7
@@ -28,16 +31,12 @@ async def twenty_of_one(route: Route) -> None:
     await route.fulfill(json=overview)
 
 
-async def see(page: Page, url: str) -> None:
-    await page.route("**/api/v1/overview", twenty_of_one)
-    await page.goto(url)
-    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=DATA_MS)
-
-
 async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
-    running_plant, page, picture_of
+    plant, page, picture_of
 ) -> None:
-    await see(page, running_plant.url)
+    await page.route("**/api/v1/overview", twenty_of_one)
+    await page.goto(plant.url)
+    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=DATA_MS)
     stiffness = page.locator("[data-unit=U20] [data-bearing=UJB] .number").first
     await expect(stiffness).not_to_have_text("—", timeout=DATA_MS)
     width, height = await page.evaluate(SIZE)
@@ -48,14 +47,8 @@ async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
     well = page.locator("[data-unit=U8] .tile-head .mark").filter(visible=True)
     await expect(well).to_have_count(0)
     await picture_of(page, "twenty")
+    await page.set_viewport_size({"width": 360, "height": 780})
+    await assert_fits(page)
+    await picture_of(page, "twenty-on-a-phone")
     await page.get_by_role("link", name="Unit 8").click()
     await expect(page.locator("h1")).to_contain_text("Unit 8")
-
-
-async def test_twenty_units_never_scroll_a_phone_sideways(
-    running_plant, phone_page, picture_of
-) -> None:
-    await see(phone_page, running_plant.url)
-    width, _ = await phone_page.evaluate(SIZE)
-    assert width <= 360
-    await picture_of(phone_page, "twenty")

@@ -1,7 +1,10 @@
 """The page of a unit: its bearings side by side, what is wrong with it, and the way on."""
 
-from on_screen import A_NUMBER, DATA_MS, assert_fits
+import pytest
+from on_screen import A_NUMBER, DATA_MS
 from playwright.async_api import Page, Response, expect
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 UNIT = "#/units/U1"
 HREFS = "links => links.map(link => link.getAttribute('href'))"
@@ -23,10 +26,10 @@ def overviews_of(page: Page) -> list[Response]:
 
 
 async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
-    living_plant, page, complaints_of, picture_of
+    plant, page, complaints_of, picture_of
 ) -> None:
     complaints, heard = complaints_of(page), overviews_of(page)
-    await page.goto(living_plant.url + UNIT)
+    await page.goto(plant.url + UNIT)
     table = page.get_by_role("table", name="side by side")
     await expect(table.locator(OIL)).to_have_count(3)
     await expect(table.locator(OIL).first).to_have_text(A_NUMBER, timeout=DATA_MS)
@@ -49,47 +52,3 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     assert all(await page.evaluate(LEADS_SOMEWHERE, ways))
     await picture_of(page, "unit")
     assert complaints == []
-
-
-async def test_the_keyboard_leads_from_the_plant_to_a_unit_and_to_its_bearing(
-    running_plant, page
-) -> None:
-    await page.goto(running_plant.url)
-    await page.get_by_role("link", name="Unit 1").focus()
-    await page.keyboard.press("Enter")
-    await expect(page.locator("h1")).to_contain_text("Unit 1")
-    await page.get_by_role("link", name="UJB").focus()
-    await page.keyboard.press("Enter")
-    await expect(page.locator("h1")).to_contain_text(", UJB")
-
-
-async def test_a_unit_fits_a_phone(running_plant, phone_page) -> None:
-    await phone_page.goto(running_plant.url + UNIT)
-    await expect(phone_page.locator(OIL).first).to_have_text(A_NUMBER, timeout=DATA_MS)
-    await assert_fits(phone_page)
-
-
-async def test_an_unknown_unit_is_named_and_leads_back(running_plant, page) -> None:
-    await page.goto(running_plant.url + "#/units/U9")
-    await expect(page.get_by_text("This plant has no unit U9.")).to_be_visible()
-    await page.locator("main").get_by_role("link", name="Overview").click()
-    await expect(page.locator("[data-unit=U1]")).to_be_visible()
-
-
-PLACES = """
-async (alarms) => {
-  const { alarmPlace } = await import("/static/alarm_place.js");
-  return alarms.map(alarmPlace);
-}
-"""
-
-
-async def test_an_alarm_leads_to_where_most_is_told_about_it(running_plant, page) -> None:
-    await page.goto(running_plant.url)
-    bearing = ("order1_shaft_x", "zone_bearing_y", "oil_temperature", "gap_x", "opposite_gap_y")
-    alarms = [("stiffness_x", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
-    alarms += [(kind, "UJB") for kind in bearing]
-    told = [{"unit": "U1", "subject": subject, "kind": kind} for kind, subject in alarms]
-    found = await page.evaluate(PLACES, told)
-    place = "#/units/U1/bearings/UJB"
-    assert found == [f"{place}/film", "#/units/U1", "#/sources", *([place] * len(bearing))]

@@ -1,9 +1,12 @@
 """What a page says is what the API says, to the last digit shown; nothing else passes for it."""
 
-import json
+import copy
 
+import pytest
 from on_screen import A_NUMBER, DATA_MS
-from playwright.async_api import Page, Route, expect
+from playwright.async_api import Page, expect
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 BEARING = "#/units/U1/bearings/UJB"
 N_NUMBERS = 57
@@ -19,6 +22,7 @@ WORDS = {
     "ratio_vortex": "equation (5) at vortex",
 }
 
+INTERVAL = ("low_95", "high_95")
 DECIMALS = {
     "_n_per_m": (1e9, 3),
     "_n_s_per_m": (1e6, 2),
@@ -53,15 +57,10 @@ def shown(name: str, value: float | None) -> str:
 
 
 async def freeze(page: Page, url: str) -> dict:
-    """Let the page hear one real answer of the service again and again."""
-    answer = await page.request.get(f"{url}api/v1/overview")
-    body = await answer.body()
-
-    async def replay(route: Route) -> None:
-        await route.fulfill(body=body, content_type="application/json")
-
-    await page.route("**/api/v1/overview", replay)
-    return json.loads(body)
+    """Let the page receive one real answer of the service again and again."""
+    overview = await (await page.request.get(f"{url}api/v1/overview")).json()
+    await page.route("**/api/v1/overview", lambda route: route.fulfill(json=overview))
+    return copy.deepcopy(overview)
 
 
 async def numbers_in(page: Page, selector: str) -> dict[str, str]:
@@ -94,51 +93,45 @@ async def await_stiffness(page: Page) -> None:
 
 
 async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(
-    running_plant, page, picture_of
+    plant, page, picture_of
 ) -> None:
-    await page.goto(running_plant.url + BEARING)
+    await page.goto(plant.url + BEARING)
     await await_stiffness(page)
-    overview = await freeze(page, running_plant.url)
+    overview = await freeze(page, plant.url)
     await page.reload()
-    readings = overview["units"][0]["bearings"][0]["readings"]
-    assert readings["order1_k_eff_xx_n_per_m"]["value"] is not None
+    latest = overview["units"][0]["bearings"][0]
+    readings = latest["readings"]
     stiffness = page.locator("[data-reading=order1_k_eff_xx_n_per_m] .number")
     value = readings["order1_k_eff_xx_n_per_m"]["value"]
+    assert value is not None
     await expect(stiffness).to_have_text(shown("order1_k_eff_xx_n_per_m", value))
     numbers = await numbers_in(page, ".bearing")
     assert numbers == {name: shown(name, readings[name]["value"]) for name in numbers}
     assert len(numbers) >= N_NUMBERS
-    await picture_of(page, "bearing")
 
-
-async def test_the_preferred_stiffness_states_its_interval_and_its_estimator(
-    running_plant, page
-) -> None:
-    await page.goto(running_plant.url + BEARING)
-    await await_stiffness(page)
-    overview = await freeze(page, running_plant.url)
-    latest = overview["units"][0]["bearings"][0]
-    await page.reload()
     for axes in ("xx", "yy"):
         name = f"stiffness_{axes}_n_per_m"
-        reading = latest["readings"][name]
         tile = page.locator(f".preferred-axis:has([data-reading={name}])")
-        await expect(tile.locator(".number")).to_have_text(shown(name, reading["value"]))
-        low, high = (shown(name, reading["uncertainty"][end]) for end in ("low_95", "high_95"))
+        low, high = (shown(name, readings[name]["uncertainty"][end]) for end in INTERVAL)
         await expect(tile.locator(".interval")).to_have_text(f"95 %: {low} to {high},")
         await expect(tile.locator(".estimator")).to_have_text(WORDS[latest["estimators"][axes]])
     spreads = await spreads_in(page, ".bearing")
-    known = {name: r for name, r in latest["readings"].items() if r["uncertainty"]}
-    assert spreads == {name: spread(name, known[name]) for name in spreads}
+    assert spreads == {name: spread(name, readings[name]) for name in spreads}
     assert {"stiffness_xx_n_per_m", "order1_k_eff_yy_n_per_m"} <= spreads.keys()
 
+    rows = await page.locator(".estimators [data-estimator]").all()
+    assert [await row.get_attribute("data-estimator") for row in rows] == list(WORDS)
+    await expect(page.locator("[data-estimator=dynamic] th")).to_have_text("dynamic preferred")
+    for name in ("dynamic_k_xx_n_per_m", "dynamic_c_yy_n_s_per_m", "dynamic_n_lines"):
+        number = page.locator(f".film [data-reading={name}] .number")
+        await expect(number).to_have_text(A_NUMBER)
+    await picture_of(page, "bearing")
 
-async def test_the_overview_shows_the_numbers_of_every_bearing(
-    running_plant, page, picture_of
-) -> None:
-    await page.goto(running_plant.url)
+
+async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page, picture_of) -> None:
+    await page.goto(plant.url)
     await await_stiffness(page)
-    overview = await freeze(page, running_plant.url)
+    overview = await freeze(page, plant.url)
     await page.reload()
     for latest in overview["units"][0]["bearings"]:
         row = f"[data-unit=U1] [data-bearing={latest['bearing']}]"
@@ -157,17 +150,24 @@ async def test_the_overview_shows_the_numbers_of_every_bearing(
     await picture_of(page, "overview")
 
 
-async def test_a_number_without_value_says_why_instead_of_zero(running_plant, page) -> None:
-    await page.goto(running_plant.url)
+async def test_a_number_without_value_says_why_instead_of_zero(plant, page) -> None:
+    await page.goto(plant.url)
     await await_stiffness(page)
-    overview = await freeze(page, running_plant.url)
-    reading = overview["units"][0]["bearings"][0]["readings"]["vortex_k_eff_xx_n_per_m"]
-    reading |= {"value": None, "level": "bad", "reason": "insufficient_excitation"}
-
-    async def replay(route: Route) -> None:
-        await route.fulfill(json=overview)
-
-    await page.route("**/api/v1/overview", replay)
+    overview = await freeze(page, plant.url)
+    readings = overview["units"][0]["bearings"][0]["readings"]
+    for name, reading in readings.items():
+        if name == "vortex_k_eff_xx_n_per_m" or name.startswith("dynamic_"):
+            reading |= {"value": None, "level": "bad", "reason": "insufficient_excitation"}
+            reading["uncertainty"] = None
+    await page.route("**/api/v1/overview", lambda route: route.fulfill(json=overview))
     cell = page.locator("[data-bearing=UJB] [data-reading=vortex_k_eff_xx_n_per_m]")
     await expect(cell.locator(".number")).to_have_text("—")
     await expect(cell.locator(".why")).to_have_text("not enough excitation")
+
+    await page.goto(plant.url + BEARING)
+    quality = page.locator("[data-estimator=dynamic] .mark")
+    await expect(quality).to_have_text("No value: not enough excitation")
+    for place in ("[data-estimator=dynamic]", ".film"):
+        for number in await page.locator(f"{place} [data-reading] .number").all():
+            await expect(number).to_have_text("—")
+        await expect(page.locator(f"{place} .spread:visible")).to_have_count(0)

@@ -10,6 +10,8 @@ import pytest
 from on_screen import DATA_MS
 from playwright.async_api import Page, Request, expect
 
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
 STIFFNESS = "[data-chart=trend-film-stiffness-gn-m]"
 COMPARED = "#/trends?b=U1/UJB&b=U1/LJB&q=stiffness_xx_n_per_m"
 CURVES = ".chart .scatterlayer .trace path.js-line"
@@ -30,10 +32,10 @@ def days(request: Request) -> float:
 
 
 async def test_two_bearings_are_compared_and_the_address_says_so(
-    living_plant, page, complaints_of, picture_of
+    plant, page, complaints_of, picture_of
 ) -> None:
     complaints = complaints_of(page)
-    await page.goto(living_plant.url + "#/trends")
+    await page.goto(plant.url + "#/trends")
     await expect(page.locator("summary").first).to_have_text("Bearings: 1", timeout=DATA_MS)
 
     await page.locator("summary").first.click()
@@ -49,8 +51,10 @@ async def test_two_bearings_are_compared_and_the_address_says_so(
     assert complaints == []
 
 
-async def test_quantities_are_found_by_words_and_have_charts_by_kind(living_plant, page) -> None:
-    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+async def test_quantities_are_found_by_words_coloured_and_taken_away(
+    plant, page, picture_of, tmp_path
+) -> None:
+    await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
 
     await page.locator("summary", has_text="Quantities").click()
@@ -64,9 +68,29 @@ async def test_quantities_are_found_by_words_and_have_charts_by_kind(living_plan
     await expect(heading).to_have_text("Oil temperature")
     assert "q=oil_temperature_c" in await page.evaluate("location.hash")
 
+    await page.get_by_role("radio", name="Oil temperature").check()
 
-async def test_zooming_asks_for_finer_data_and_back_leads_back(living_plant, page) -> None:
-    await page.goto(living_plant.url + COMPARED + "&last=2592000")
+    await expect(page.locator(f"{STIFFNESS} .cbtitle")).to_contain_text("oil", timeout=DATA_MS)
+    fills = await page.locator(f"{STIFFNESS} .points path.point").evaluate_all(
+        "points => new Set(points.map((point) => getComputedStyle(point).fill)).size"
+    )
+    assert fills > 5
+    await expect(page.locator(f"{STIFFNESS} figcaption")).to_contain_text("Colour: oil temp")
+    assert "colour=oil_temperature_c" in await page.evaluate("location.hash")
+    await picture_of(page, "coloured")
+
+    async with page.expect_download() as started:
+        await page.get_by_role("link", name="U1 LJB as CSV").click()
+    path = tmp_path / "trend.csv"
+    await (await started.value).save_as(path)
+
+    rows = list(csv.DictReader(Path(path).read_text().splitlines()))
+    assert len(rows) > 100
+    assert "stiffness_xx_n_per_m_mean [N/m]" in rows[0]
+
+
+async def test_the_mouse_and_the_keyboard_zoom_and_back_leads_back(plant, page) -> None:
+    await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
     before = page.url
 
@@ -87,11 +111,6 @@ async def test_zooming_asks_for_finer_data_and_back_leads_back(living_plant, pag
     await expect(page.get_by_role("radio", name="Month")).to_be_checked()
     await expect(page.get_by_role("button", name="Back")).to_be_disabled()
 
-
-async def test_the_keyboard_zooms_and_moves_as_well(living_plant, page) -> None:
-    await page.goto(living_plant.url + COMPARED + "&last=2592000")
-    await await_curve(page)
-
     for words in ("Zoom in", "Earlier"):
         await page.get_by_role("button", name=words).focus()
         await page.keyboard.press("Enter")
@@ -102,25 +121,9 @@ async def test_the_keyboard_zooms_and_moves_as_well(living_plant, page) -> None:
     assert datetime.now(UTC) - end > timedelta(days=12)
 
 
-async def test_oil_temperature_colours_the_points(living_plant, page, picture_of) -> None:
-    await page.goto(living_plant.url + COMPARED + "&last=2592000")
-    await await_curve(page)
-
-    await page.get_by_role("radio", name="Oil temperature").check()
-
-    await expect(page.locator(f"{STIFFNESS} .cbtitle")).to_contain_text("oil", timeout=DATA_MS)
-    fills = await page.locator(f"{STIFFNESS} .points path.point").evaluate_all(
-        "points => new Set(points.map((point) => getComputedStyle(point).fill)).size"
-    )
-    assert fills > 5
-    await expect(page.locator(f"{STIFFNESS} figcaption")).to_contain_text("Colour: oil temp")
-    assert "colour=oil_temperature_c" in await page.evaluate("location.hash")
-    await picture_of(page, "coloured")
-
-
-async def test_a_time_without_results_says_so(living_plant, page) -> None:
+async def test_a_time_without_results_says_so(plant, page) -> None:
     empty = "&from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z"
-    await page.goto(living_plant.url + COMPARED + empty)
+    await page.goto(plant.url + COMPARED + empty)
     sentence = page.locator(f"{STIFFNESS} .sentence")
     await expect(sentence).to_contain_text("Nothing was stored from 2001-01-01", timeout=DATA_MS)
 
@@ -133,12 +136,14 @@ async def test_a_time_without_results_says_so(living_plant, page) -> None:
     await expect(none).to_be_visible(timeout=DATA_MS)
 
 
-async def test_an_address_restores_what_was_shown(living_plant, page) -> None:
+async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
+    plant, page
+) -> None:
     address = (
         "#/trends?b=U1/TJB&q=speed_rpm&q=power_mw&last=604800&state=full_load"
         "&colour=eccentricity_ratio"
     )
-    await page.goto(living_plant.url + address)
+    await page.goto(plant.url + address)
 
     await expect(page.locator("[data-chart=trend-operation-r-min]")).to_be_visible(timeout=DATA_MS)
     await expect(page.locator("[data-chart=trend-operation-mw]")).to_be_visible()
@@ -147,9 +152,15 @@ async def test_an_address_restores_what_was_shown(living_plant, page) -> None:
     await expect(page.get_by_label("While at")).to_have_value("full_load")
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
 
+    address = "#/trends?b=U1/UJB&b=U9/XYZ&q=stiffness_xx_n_per_m&q=warp_factor&last=2592000"
+    await page.goto(plant.url + address)
+    await await_curve(page)
+    await expect(page.get_by_text("This padwatch knows no quantity warp_factor.")).to_be_visible()
+    await expect(page.get_by_text("U9 XYZ:")).to_be_visible()
 
-async def test_the_page_of_a_bearing_leads_to_its_trends(living_plant, page) -> None:
-    await page.goto(living_plant.url + "#/units/U1/bearings/LJB")
+
+async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page) -> None:
+    await page.goto(plant.url + "#/units/U1/bearings/LJB")
     await page.get_by_role("radio", name="1 y").check(timeout=DATA_MS)
     await page.get_by_role("link", name="Compare in Trends").click()
 
@@ -158,38 +169,3 @@ async def test_the_page_of_a_bearing_leads_to_its_trends(living_plant, page) -> 
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
     assert "b=U1%2FLJB" in await page.evaluate("location.hash")
     assert "order1_shaft_x_um_pk" in await page.evaluate("location.hash")
-
-
-async def test_an_address_from_elsewhere_is_complained_of_in_words(living_plant, page) -> None:
-    address = "#/trends?b=U1/UJB&b=U9/XYZ&q=stiffness_xx_n_per_m&q=warp_factor&last=2592000"
-    await page.goto(living_plant.url + address)
-
-    await await_curve(page)
-    await expect(page.get_by_text("This padwatch knows no quantity warp_factor.")).to_be_visible()
-    await expect(page.get_by_text("U9 XYZ:")).to_be_visible()
-
-
-async def test_what_is_shown_can_be_taken_away(living_plant, page, tmp_path) -> None:
-    await page.goto(living_plant.url + COMPARED + "&last=2592000")
-    await await_curve(page)
-
-    async with page.expect_download() as started:
-        await page.get_by_role("link", name="U1 LJB as CSV").click()
-    path = tmp_path / "trend.csv"
-    await (await started.value).save_as(path)
-
-    rows = list(csv.DictReader(Path(path).read_text().splitlines()))
-    assert len(rows) > 100
-    assert "stiffness_xx_n_per_m_mean [N/m]" in rows[0]
-
-
-async def test_a_phone_shows_it_without_scrolling_sideways(
-    living_plant, phone_page, picture_of
-) -> None:
-    await phone_page.goto(living_plant.url + COMPARED + "&q=speed_rpm&last=2592000")
-    await await_curve(phone_page)
-    width, visible = await phone_page.evaluate(
-        "() => [document.documentElement.scrollWidth, window.innerWidth]"
-    )
-    assert width <= visible
-    await picture_of(phone_page, "phone")

@@ -1,0 +1,1 @@
+"""Pages of a plant with accounts whose DAQ does not answer."""

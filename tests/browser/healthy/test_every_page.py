@@ -1,0 +1,150 @@
+"""What holds for every page there is: no complaint, a title, phone width, light and dark."""
+
+import json
+from pathlib import Path
+
+import pytest
+from on_screen import (
+    A_NUMBER,
+    DATA_MS,
+    assert_fits,
+    await_charts,
+    await_orbit,
+    await_spectra,
+    number_with,
+)
+from playwright.async_api import Page, expect
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
+SEGMENTS = {":unit": "U1", ":bearing": "UJB"}
+BEARING = "#/units/U1/bearings/UJB"
+
+PATTERNS = "import('/static/pages.js').then(({ PAGES }) => PAGES.map(({ pattern }) => pattern))"
+WAITING = "Asking the service."
+BAND = "getComputedStyle(document.body).backgroundColor"
+GRAVE = """async () => {
+  const options = { rules: { "target-size": { enabled: true } }, resultTypes: ["violations"] };
+  const { violations } = await axe.run(document, options);
+  const grave = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+  return grave.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]);
+}"""
+REDRAWN = """before =>
+    document.querySelector('[data-chart=spectrum] .chart path.xgrid').style.stroke !== before"""
+
+
+async def addresses(page: Page, url: str) -> list[str]:
+    await page.goto(url)
+    patterns = await page.evaluate(PATTERNS)
+    assert len(patterns) >= 4
+    for segment, name in SEGMENTS.items():
+        patterns = [pattern.replace(segment, name) for pattern in patterns]
+    assert not any("/:" in address for address in patterns), patterns
+    return patterns
+
+
+async def open_settled(page: Page, address: str) -> None:
+    """Open a page and wait until it has had the answers that it opens with."""
+    await page.goto(address)
+    await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)
+    await expect(page.locator("#main").get_by_role("heading").first).to_be_attached()
+    waiting = page.locator("#main").get_by_text(WAITING).filter(visible=True)
+    await expect(waiting).to_have_count(0, timeout=DATA_MS)
+
+
+async def unfold(page: Page, address: str) -> None:
+    """Wait for the widest contents of a page, and open what is folded up."""
+    if address in ("#/", "#/units/U1", BEARING):
+        await expect(page.locator(".number").first).to_have_text(A_NUMBER, timeout=DATA_MS)
+    if address == "#/sources":
+        await expect(page.locator("[data-source=U1]")).to_contain_text("Connected")
+        await page.get_by_role("button", name="Details").click()
+    if address == BEARING:
+        await await_charts(page)
+        await page.locator(".estimators button.spread:visible").first.click()
+        await expect(page.locator(".estimators .budget tbody tr").first).to_be_visible()
+    if address.endswith("/waterfall"):
+        await await_spectra(page)
+    if address.endswith("/orbits"):
+        await await_orbit(page)
+
+
+async def test_every_page_opens_without_a_complaint_and_under_a_title_of_its_own(
+    plant, page, complaints_of, picture_of
+) -> None:
+    complaints = complaints_of(page)
+    titles = set()
+    pages = await addresses(page, plant.url)
+    for address in pages:
+        await open_settled(page, plant.url + address)
+        titles.add(await page.title())
+        await picture_of(page, "-".join(address.split("/")[1:]) or "overview")
+        assert complaints == [], address
+    assert len(titles) == len(pages)
+
+
+async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page, picture_of) -> None:
+    for address in await addresses(phone_page, plant.url):
+        await open_settled(phone_page, plant.url + address)
+        await unfold(phone_page, address)
+        await assert_fits(phone_page)
+        await picture_of(phone_page, "-".join(address.split("/")[1:]) or "overview")
+
+
+@pytest.mark.parametrize(
+    "schemes",
+    [
+        pytest.param(("light", "dark"), id="one-for-each-page"),
+        *(
+            pytest.param((scheme,), id=scheme, marks=pytest.mark.long)
+            for scheme in ("light", "dark")
+        ),
+    ],
+)
+async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, schemes) -> None:
+    if not AXE.is_file():
+        pytest.skip("needs npm")
+    pages = await addresses(page, plant.url)
+    await page.evaluate(AXE.read_text())
+    for number, address in enumerate(pages):
+        scheme = schemes[number % len(schemes)]
+        await page.emulate_media(color_scheme=scheme)
+        await open_settled(page, plant.url + address)
+        await expect(page.locator(f"html[data-theme={scheme}]")).to_be_attached()
+        grave = await page.evaluate(GRAVE)
+        assert not grave, f"{address}, {scheme}: {json.dumps(grave, indent=1)}"
+
+
+async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembered(
+    plant, page, picture_of
+) -> None:
+    await page.emulate_media(color_scheme="dark")
+    await page.goto(plant.url + BEARING)
+    dark = await page.evaluate(BAND)
+    await page.get_by_label("Look").select_option("light")
+    light = await page.evaluate(BAND)
+    assert light != dark
+    await page.reload()
+    assert await page.evaluate(BAND) == light
+    grid = page.locator("[data-chart=spectrum] .chart path.xgrid").first
+    await expect(grid).to_be_attached(timeout=DATA_MS)
+    stroke = "node => node.style.stroke"
+    drawn = await grid.evaluate(stroke)
+    await page.get_by_label("Look").select_option("system")
+    assert await page.evaluate(BAND) == dark
+    await page.wait_for_function(REDRAWN, arg=drawn)
+    await picture_of(page, "dark")
+
+
+async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, page) -> None:
+    await page.goto(plant.url + BEARING)
+    shaft = page.locator("[data-reading=order1_shaft_x_um_pk]")
+    before = await number_with(shaft, "µm pk")
+    await page.get_by_label("Amplitudes").select_option("pp")
+    after = await number_with(shaft, "µm pk-pk")
+    assert after / before == pytest.approx(2.0, rel=0.1)  # the machine lives on in between
+    chart = page.locator("[data-chart=amplitude-trend] .ytitle")
+    await expect(chart).to_have_text("µm pk-pk", timeout=DATA_MS)
+    await page.reload()
+    await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk", timeout=DATA_MS)

@@ -1,0 +1,35 @@
+"""The page of the audit trail: who did what to what, found again by keyboard."""
+
+import pytest
+from on_screen import DATA_MS
+from playwright.async_api import expect
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+AUDIT = "#/audit"
+
+
+async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_finds_it(
+    plant, page, complaints_of, picture_of
+) -> None:
+    complaints = complaints_of(page)
+    told = await (await page.request.get(f"{plant.url}api/v1/audit?limit=100")).json()
+    await page.goto(plant.url + AUDIT)
+    rows = page.locator("[data-entry]")
+    await expect(rows).to_have_count(len(told["entries"]), timeout=DATA_MS)
+    accepted = page.locator("[data-entry]", has_text="baseline accepted").first
+    await expect(accepted).to_contain_text("in force: none → 1")
+    await expect(accepted).to_contain_text(", version 1")
+    await expect(page.locator(".page-head .mark")).to_have_attribute("data-look", "good")
+    await picture_of(page, "audit")
+
+    await page.get_by_label("To what").fill("service")
+    await page.keyboard.press("Enter")
+    await expect(page.locator("[data-entry]")).to_have_count(1)
+    await expect(page.locator("[data-entry]")).to_contain_text("service started")
+    await page.get_by_label("Who").fill("nobody of that name")
+    await page.keyboard.press("Enter")
+    await expect(page.get_by_text("No entry fits.")).to_be_visible()
+    await page.get_by_role("button", name="Clear").press("Enter")
+    await expect(page.locator("[data-entry]").nth(1)).to_be_visible()
+    assert complaints == []

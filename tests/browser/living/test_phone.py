@@ -1,0 +1,26 @@
+"""Pages with a long past on a phone."""
+
+import pytest
+from on_screen import DATA_MS, assert_fits, await_charts
+from playwright.async_api import expect
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+BEARING = "#/units/U1/bearings/UJB"
+WIDEST = {
+    BEARING: ".verdict .mark",
+    f"{BEARING}/film": "[data-chart=baseline-map] .heatmaplayer image",
+    "#/trends?b=U1/UJB&b=U1/LJB&q=stiffness_xx_n_per_m&q=speed_rpm&last=2592000": (
+        "[data-chart=trend-film-stiffness-gn-m] .chart .scatterlayer .trace path.js-line"
+    ),
+}
+
+
+async def test_films_and_trends_fit_a_phone(plant, phone_page, picture_of) -> None:
+    for address, widest in WIDEST.items():
+        await phone_page.goto(plant.url + address)
+        await expect(phone_page.locator(widest).first).to_be_attached(timeout=DATA_MS)
+        if address == BEARING:
+            await await_charts(phone_page)
+        await assert_fits(phone_page)
+        await picture_of(phone_page, address.rpartition("/")[2].partition("?")[0])

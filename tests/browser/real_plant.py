@@ -1,0 +1,168 @@
+"""A real plant: simulated DAQ and service as processes."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+
+from service.cli.access import access_of
+from service.demo.past import fill
+from service.security.passwords import Hashing
+from service.security.people import People
+from service.security.roles import Role
+from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
+from service.wiring.simulated_lives import simulated_history
+from service.wiring.stores import open_store
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+DEMO, DEMO_LIFE = DEPLOY / "demo.toml", DEPLOY / "demo-life.toml"
+PAST_YEARS = 0.2
+PADWATCH = [sys.executable, "-m", "service.cli.main"]
+STOP_S = 10.0
+
+QUICK_ANALYSIS = """
+[analysis]
+segment_samples = 4096
+overlap = 0.5
+n_segments = 6
+
+[alarms]
+link_lost_after_s = 2.0
+
+[spectra]
+dense_every_s = 1.0
+"""
+"""The first result after seven seconds, then one every 3.4, each with its spectrum; the plant's own
+are 14 and 12."""
+
+OWN_TABLES = re.compile(r"^\[(?:analysis|alarms)\]\n(?:[^\[\n].*\n|\n)*", re.MULTILINE)
+"""What an example itself says of these."""
+
+PASSWORD = "the river is high in may"  # noqa: S105 - of accounts that exist in tests alone
+
+TO_SET_UP = "to make the first account"
+"""In what the service says before its address, where somebody must log in and nobody can."""
+
+
+class Plant:
+    """Unit U1 of a demo plant: its DAQ and the service that watches it."""
+
+    def __init__(self, folder: Path, example: Path = DEMO) -> None:
+        self._folder, self._example = folder, example
+        self._processes = ExitStack()
+        self._daq: subprocess.Popen[str] | None = None
+        self._service: subprocess.Popen[str] | None = None
+        self._daq_port = free_port()
+        self.url = self.token = ""
+        self.settings = QUICK_ANALYSIS
+
+    def start_daq(self) -> None:
+        self._daq = self._start("daq", str(self._plant_file()), "--control")
+        self._daq_port = json.loads(read_line(self._daq))["U1"]["port"]
+
+    def stop_daq(self) -> None:
+        stop(self._daq)
+
+    def start_service(self) -> None:
+        """The first time on a free port, then on the same one."""
+        port = self.url.rstrip("/").rpartition(":")[2] or "0"
+        self._service = self._start("run", str(self._plant_file()), "--port", port)
+        line = read_line(self._service)
+        if TO_SET_UP in line:
+            self.token = line.rpartition(" ")[2].strip()
+            line = read_line(self._service)
+        self.url = line.removeprefix("padwatch: ").strip()
+
+    def stop_service(self) -> None:
+        stop(self._service)
+
+    @contextmanager
+    def silent_daq(self) -> Iterator[None]:
+        """Let the DAQ neither sample nor answer, as if its cable were pulled."""
+        assert self._daq is not None
+        self._daq.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._daq.send_signal(signal.SIGCONT)
+
+    def add_accounts(self) -> None:
+        """Add an account of each role, named after it, before anything is started."""
+        with access_of(self._plant_here(), "padwatch users add", creates=True) as access:
+            people = People(access, Hashing())
+            for role in Role:
+                people.add(role.value, role, PASSWORD, time.time_ns())
+
+    def live_first(self) -> None:
+        """Give the unit a past with a learned baseline before anything is started."""
+        plant, now_ns = self._plant_here(), time.time_ns()
+        with closing(open_store(plant)) as store:
+            lives = {"U1": simulated_history(plant.unit[0], now_ns, PAST_YEARS)}
+            fill(store.films, plant, lives, now_ns)
+
+    def _plant_here(self) -> PlantFile:
+        """The plant as a process that runs in its folder sees it."""
+        plant = load_plant_file(self._plant_file())
+        folder = str(self._folder / plant.service.data_folder)
+        service = plant.service.model_copy(update={"data_folder": folder})
+        return plant.model_copy(update={"service": service})
+
+    def __enter__(self) -> "Plant":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._processes.close()
+
+    def _start(self, *arguments: str) -> "subprocess.Popen[str]":
+        log = self._processes.enter_context((self._folder / f"{arguments[0]}.log").open("a"))
+        process = subprocess.Popen(
+            [*PADWATCH, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            cwd=self._folder,
+        )
+        self._processes.callback(stop, process)
+        return process
+
+    def _plant_file(self) -> Path:
+        head, units = self._example.read_text().split("[[unit]]", 1)
+        first_unit = units.split("[[unit]]", 1)[0].replace("port = 0", f"port = {self._daq_port}")
+        path = self._folder / "plant.toml"
+        path.write_text(f"{OWN_TABLES.sub('', head)}{self.settings}\n[[unit]]{first_unit}")
+        return path
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+        return port
+
+
+def read_line(process: "subprocess.Popen[str]") -> str:
+    line = process.stdout.readline() if process.stdout else ""
+    assert line, "the process ended without a word; see its log beside the plant file"
+    return line
+
+
+def stop(process: "subprocess.Popen[str] | None") -> None:
+    if process is None:
+        return
+    if process.poll() is None:
+        process.send_signal(signal.SIGTERM)
+    try:
+        process.wait(STOP_S)
+    finally:
+        process.kill()  # one that does not end when asked fails the test, but does not outlive it
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
