@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from rigs.fake_bus import VIRTUAL, FakeBus
 
-from acquisition.can.settings import CanLinkSettings
+from acquisition.can.assembly import Assembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
 from acquisition.daq.can_dbc import daq_settings
@@ -91,6 +93,35 @@ def shape_of() -> Callable[..., CanShape]:
             slow=tuple(DaqSignal(f"slow{n}", "degC") for n in range(n_slow)),
             **others,
         )
+
+    return build
+
+
+@pytest.fixture
+def settings_of(tmp_path) -> Callable[..., CanSettings]:
+    """Settings of a DBC's text and the signals of each channel; other settings as keywords."""
+
+    def build(text: str, signals: dict[str, str], channel: str = "none", **others) -> CanSettings:
+        (tmp_path / "device.dbc").write_text(text)
+        return CanSettings(
+            link=CanLinkSettings(interface="virtual", channel=channel),
+            dbc=tmp_path / "device.dbc",
+            channels=tuple(CanChannel(id_, "um", tuple(s.split())) for id_, s in signals.items()),
+            **others,
+        )
+
+    return build
+
+
+@pytest.fixture
+def assembler_by(counts_calibration) -> Callable[..., Assembler]:
+    """Builds the assembler of settings; the rate and the time of its beginning as arguments."""
+
+    def build(settings: CanSettings, rate_hz: float = 600.0, begun_ns: int = 0) -> Assembler:
+        n_channels, n_slow = len(settings.channels), len(settings.slow)
+        calibration = counts_calibration(n_channels=n_channels, n_slow=n_slow, rate_hz=rate_hz)
+        plan = compile_plan(settings, calibration)
+        return Assembler(plan, n_channels, n_slow, rate_hz, settings.hold_s, begun_ns)
 
     return build
 

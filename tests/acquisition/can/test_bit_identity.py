@@ -7,13 +7,10 @@ import pytest
 from rigs.tiers import covering, fast_and_long
 
 from acquisition.clock import SystemClock
-from acquisition.daq.can_bus import CanBusServer
 from acquisition.daq.can_device import CanDevice
-from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.daq.can_slcan import SlcanTcpServer
 from acquisition.delivery import Delivery
 from acquisition.raw import FeedEndedError
-
-NO_WAIT = {"sleep_after_open": 0.0}
 
 
 def fingerprint(blocks) -> list[str]:
@@ -73,32 +70,6 @@ async def test_blocks_of_any_length_come_through(
     async with SlcanTcpServer(device, on_demand=True) as server:
         source = source_of(shape, server.endpoint, when_full="wait")
         wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
-    assert fingerprint(wired) == fingerprint(direct)
-
-
-@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
-async def test_a_pseudo_terminal_carries_the_same(
-    fd, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
-):
-    direct = straight(eventful_feed(), counts_calibration(n_channels=4))
-    shape = shape_of(fd=fd, extended=True, base_id=0x18FF0100)
-    async with SlcanPtyServer(CanDevice(eventful_feed(), shape), on_demand=True) as server:
-        source = source_of(shape, server.endpoint, options=NO_WAIT, when_full="wait")
-        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
-    assert fingerprint(wired) == fingerprint(direct)
-
-
-async def test_a_virtual_bus_carries_the_same(
-    eventful_feed, shape_of, source_of, counts_calibration
-):
-    direct = straight(eventful_feed(), counts_calibration(n_channels=4))
-    shape = shape_of(fd=True)
-    device = CanDevice(eventful_feed(), shape)
-    async with CanBusServer(device, channel="bit identity") as server:
-        source = source_of(shape, server.endpoint)
-        async with source.connect() as stream:
-            server.produce(100)
-            wired = [await anext(stream) for _ in direct]
     assert fingerprint(wired) == fingerprint(direct)
 
 

@@ -1,20 +1,17 @@
 """Counters of any width make one unbroken axis: wrap, gap, restart, and what nobody can know."""
 
 from collections import Counter
+from functools import partial
 
 import numpy as np
 import pytest
 from rigs.tiers import covering
 
-from acquisition.can.assembly import Assembler
-from acquisition.can.compiler import compile_plan
-from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from core.blocks import Rejection
 
 RATE_HZ = 600.0
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
-LINK = CanLinkSettings(interface="virtual", channel="none")
 WIDTHS = [4, 5, 8, 12, 16, 20, 24, 32]
 
 
@@ -22,7 +19,7 @@ class CounterPlant:
     """One message with a counter of some width and a sample that is its own number."""
 
     def __init__(
-        self, folder, calibration, n_bits: int, counts: str = "samples", n: int = 1
+        self, settings_of, assembler_by, n_bits: int, counts: str = "samples", n: int = 1
     ) -> None:
         self._n_bits = n_bits
         self._n = n
@@ -30,18 +27,10 @@ class CounterPlant:
         names = [f"x{i}" for i in range(n)]
         text = [f' SG_ c : 0|{n_bits}@1+ (1,0) [0|0] "" N\n']
         text += [f' SG_ {s} : {32 + 16 * i}|16@1- (1,0) [0|0] "V" N\n' for i, s in enumerate(names)]
-        dbc = folder / "counter.dbc"
         head = f'VERSION ""\nBU_: N\nBO_ 256 M: {4 + 2 * n} N\n'
-        dbc.write_text(head + "".join(text))
-        settings = CanSettings(
-            link=LINK,
-            dbc=dbc,
-            channels=(CanChannel("x", "um", tuple(f"M.{s}" for s in names)),),
-            counters=("M.c",),
-            counter_counts=counts,
-        )
-        plan = compile_plan(settings, calibration(n_channels=1, n_slow=0))
-        self.assembler = Assembler(plan, 1, 0, RATE_HZ, 5.0)
+        signals = {"x": " ".join(f"M.{s}" for s in names)}
+        counted = {"counters": ("M.c",), "counter_counts": counts}
+        self.assembler = assembler_by(settings_of(head + "".join(text), signals, **counted))
 
     def frame(self, index: int, counter: int | None = None):
         counter = index if counter is None else counter
@@ -55,11 +44,8 @@ class CounterPlant:
 
 
 @pytest.fixture
-def plant(tmp_path, counts_calibration):
-    def build(n_bits, **others):
-        return CounterPlant(tmp_path, counts_calibration, n_bits, **others)
-
-    return build
+def plant(settings_of, assembler_by):
+    return partial(CounterPlant, settings_of, assembler_by)
 
 
 def summary(blocks):

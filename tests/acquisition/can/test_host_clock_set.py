@@ -6,7 +6,6 @@ import can
 import pytest
 from rigs.tiers import covering
 
-from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 
 HOST_NS = 1_767_225_600 * 10**9
@@ -30,18 +29,13 @@ class SetClock:
 
 
 @pytest.fixture
-def plant(request, tmp_path, counts_calibration, fake_bus):
+def plant(request, settings_of, counts_calibration, fake_bus):
     """A message with or without a counter, and a sample that is its own number."""
-    dbc, clock, n_bits = tmp_path / "device.dbc", SetClock(), request.param
+    clock, n_bits = SetClock(), request.param
     counter = f' SG_ c : 0|{n_bits}@1+ (1,0) [0|0] "" N\n' if n_bits else ""
     sample = ' SG_ x : 32|16@1- (1,0) [0|0] "V" N\n'
-    dbc.write_text(f'VERSION ""\nBU_: N\nBO_ 256 M: 6 N\n{counter}{sample}')
-    settings = CanSettings(
-        link=CanLinkSettings(interface="virtual", channel="none"),
-        dbc=dbc,
-        channels=(CanChannel("x", "um", ("M.x",)),),
-        counters=("M.c",) if n_bits else (),
-    )
+    text = f'VERSION ""\nBU_: N\nBO_ 256 M: 6 N\n{counter}{sample}'
+    settings = settings_of(text, {"x": "M.x"}, counters=("M.c",) if n_bits else ())
     calibration = counts_calibration(n_channels=1, n_slow=0)
     return CanSource(settings, calibration, clock, lambda *_: fake_bus), clock, n_bits
 

@@ -9,7 +9,6 @@ import pytest
 
 from acquisition.arrival import Arrival
 from acquisition.can.interface_clock import InterfaceClock
-from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 
 RATE_HZ = 600.0
@@ -69,17 +68,10 @@ def clock() -> HandClock:
 
 
 @pytest.fixture
-def source_by(tmp_path, clock, counts_calibration):
+def source_by(settings_of, clock, counts_calibration):
     def build(stamps: str, channel: str) -> CanSource:
-        dbc = tmp_path / "plain.dbc"
-        dbc.write_text(DBC)
-        settings = CanSettings(
-            link=CanLinkSettings(interface="virtual", channel=channel),
-            dbc=dbc,
-            channels=tuple(CanChannel(f"c{n}", "um", (f"M.s{n}",)) for n in range(4)),
-            stamps=stamps,
-            stale_after_s=3600.0,
-        )
+        signals = {f"c{n}": f"M.s{n}" for n in range(4)}
+        settings = settings_of(DBC, signals, channel, stamps=stamps, stale_after_s=3600.0)
         return CanSource(settings, counts_calibration(n_channels=4, n_slow=0), clock)
 
     return build

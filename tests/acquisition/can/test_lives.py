@@ -4,15 +4,12 @@ import can
 import pytest
 
 from acquisition.can.assembly import Assembler
-from acquisition.can.compiler import compile_plan
-from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
 
 RATE_HZ = 600.0
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
-LINK = CanLinkSettings(interface="virtual", channel="none")
 DBC = """VERSION ""
 BU_: N
 BO_ 256 M: 8 N
@@ -33,22 +30,14 @@ class StoppedClock(SystemClock):
 
 
 @pytest.fixture
-def life(tmp_path, counts_calibration):
+def life(settings_of, assembler_by):
     """Begins to read a device: a counter of some width or none, and whether an epoch is read."""
 
     def build(begun_s: float, n_bits: int | None, tells: bool) -> Assembler:
-        dbc = tmp_path / "device.dbc"
-        dbc.write_text(DBC.format(n_bits=n_bits or 32))
-        settings = CanSettings(
-            link=LINK,
-            dbc=dbc,
-            channels=(CanChannel("x", "um", ("M.x",)),),
-            counters=("M.c",) if n_bits else (),
-            epoch="M.e" if tells else None,
-        )
-        plan = compile_plan(settings, counts_calibration(n_channels=1, n_slow=0))
-        begun_ns = START_NS + round(begun_s * NS_PER_S)
-        return Assembler(plan, 1, 0, RATE_HZ, 5.0, begun_ns)
+        counters, epoch = ("M.c",) if n_bits else (), "M.e" if tells else None
+        text = DBC.format(n_bits=n_bits or 32)
+        settings = settings_of(text, {"x": "M.x"}, counters=counters, epoch=epoch)
+        return assembler_by(settings, begun_ns=START_NS + round(begun_s * NS_PER_S))
 
     return build
 
@@ -79,11 +68,9 @@ def test_each_life_is_a_count_of_its_own_unless_the_device_tells_all(n_bits, tel
 
 @pytest.mark.parametrize("begun_s", [0, 3600])
 async def test_the_life_of_a_source_begins_when_it_is_made(
-    begun_s, tmp_path, counts_calibration, fake_bus
+    begun_s, settings_of, counts_calibration, fake_bus
 ):
-    dbc = tmp_path / "device.dbc"
-    dbc.write_text(DBC.format(n_bits=32))
-    settings = CanSettings(link=LINK, dbc=dbc, channels=(CanChannel("x", "um", ("M.x",)),))
+    settings = settings_of(DBC.format(n_bits=32), {"x": "M.x"})
     begin_ns = START_NS + begun_s * NS_PER_S
     calibration = counts_calibration(n_channels=1, n_slow=0)
     source = CanSource(settings, calibration, StoppedClock(begin_ns), lambda *_: fake_bus)

@@ -1,26 +1,18 @@
 """A device that counts nothing: the clock finds what is missing, and nothing false is joined."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from rigs.tiers import covering
 
 from acquisition.can.assembly import Assembler
-from acquisition.can.compiler import compile_plan
-from acquisition.can.settings import (
-    CanChannel,
-    CanLinkSettings,
-    CanSettings,
-    CanSlowChannel,
-)
+from acquisition.can.settings import CanSettings, CanSlowChannel
 from acquisition.errors import ConfigError
 
 RATE_HZ = 600.0
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
-LINK = CanLinkSettings(interface="virtual", channel="none")
 IDS = (0x220, 0x221, 0x222)
 STATUS = 0x230
 DBC = "".join(
@@ -39,13 +31,10 @@ DBC = "".join(
 
 
 @pytest.fixture
-def settings(tmp_path) -> CanSettings:
-    dbc = tmp_path / "plain.dbc"
-    dbc.write_text(DBC)
-    return CanSettings(
-        link=LINK,
-        dbc=dbc,
-        channels=tuple(CanChannel(f"c{n}", "um", (f"M{n // 4}.s{n % 4}",)) for n in range(12)),
+def settings(settings_of) -> CanSettings:
+    return settings_of(
+        DBC,
+        {f"c{n}": f"M{n // 4}.s{n % 4}" for n in range(12)},
         slow=(CanSlowChannel("oil", "degC", "STATUS.t"),),
         ok_bits="STATUS.ok",
         epoch="STATUS.run",
@@ -54,9 +43,8 @@ def settings(tmp_path) -> CanSettings:
 
 
 @pytest.fixture
-def assembler(settings, counts_calibration) -> Assembler:
-    plan = compile_plan(settings, counts_calibration(n_channels=12, n_slow=1))
-    return Assembler(plan, 12, 1, RATE_HZ, settings.hold_s)
+def assembler(settings, assembler_by) -> Assembler:
+    return assembler_by(settings)
 
 
 def instant(number: int):
@@ -122,11 +110,6 @@ def test_a_loss_is_found_by_the_clock_flagged_and_counted(n_lost, assembler):
     assert len(blocks) > 400
 
 
-def at_rate(settings, counts_calibration, rate_hz: float) -> Assembler:
-    calibration = replace(counts_calibration(n_channels=12, n_slow=1), rate_hz=rate_hz)
-    return Assembler(compile_plan(settings, calibration), 12, 1, rate_hz, settings.hold_s)
-
-
 def nothing_at_all(_number: int):
     return []
 
@@ -144,10 +127,10 @@ def two_sets_that_lose_one(number: int):
     ),
 )
 def test_the_loss_of_a_single_instant_is_found_at_every_rate(
-    rate_hz, what_is_left, settings, counts_calibration
+    rate_hz, what_is_left, settings, assembler_by
 ):
     """Also where what is left of two instants looks like one: they are never mixed."""
-    assembler = at_rate(settings, counts_calibration, rate_hz)
+    assembler = assembler_by(settings, rate_hz)
     n_seen = 2 if what_is_left is two_sets_that_lose_one else 1
     blocks, number = [], 0
     while number < 8_000:
@@ -164,9 +147,9 @@ def test_the_loss_of_a_single_instant_is_found_at_every_rate(
     assert {r.reason for b in blocks for r in b.rejected} == {"uncounted_loss"}
 
 
-def test_a_rate_at_which_the_clock_cannot_tell_losses_is_refused(settings, counts_calibration):
+def test_a_rate_at_which_the_clock_cannot_tell_losses_is_refused(settings, assembler_by):
     with pytest.raises(ConfigError, match=r"counters: none is named, and 1251 .* which can 1250"):
-        at_rate(settings, counts_calibration, 1251.0)
+        assembler_by(settings, 1251.0)
 
 
 @pytest.mark.parametrize("share", [1.3, 2.0])

@@ -1,5 +1,6 @@
-"""A file that was cut off is refused: no rest is missed in silence, no half of a number read."""
+"""A file that was cut off or damaged is refused: no rest is missed, no half of a number read."""
 
+import random
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import h5py
 import nptdms
 import numpy as np
 import pytest
+from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError
 from acquisition.importing.job import ImportJob, TimeAxis
@@ -122,3 +124,39 @@ def test_parts_that_are_missing_at_the_end_are_noticed_at_their_border_too(
 def test_half_a_number_at_the_end_of_a_text_is_no_number(read_text: Callable[..., Any]) -> None:
     with pytest.raises(ConfigError, match="line 3: the file ends within it"):
         read_text("time,shaft x,shaft y\n0,1,2\n0.001667,1,2345"[:-2])
+
+
+@pytest.mark.parametrize("n_damaged", fast_and_long(2, 8))
+@pytest.mark.parametrize("kind", ["tdms", "mdf4", "blf", "hdf5"])
+@pytest.mark.usefixtures("confined")
+def test_any_damage_is_read_or_refused_but_never_more(
+    tmp_path: Path, job_for: Callable[[str], ImportJob], kind: str, n_damaged: int
+) -> None:
+    """Cut off anywhere, and bytes changed at random: the reading process may do what it likes."""
+    path, job = tmp_path / "run.mf4", job_for(kind)
+    WRITERS[kind](path)
+    content, chance = path.read_bytes(), random.Random(7)  # noqa: S311  not a secret
+    n_refused = 0
+    for n in range(n_damaged):
+        damaged = bytearray(content)
+        if n % 3 == 0:
+            damaged = damaged[: chance.randrange(len(damaged))]
+        else:
+            for _ in range(chance.randint(1, 30)):
+                damaged[chance.randrange(len(damaged))] = chance.randrange(256)
+        path.write_bytes(damaged)
+        try:
+            read_all(path, job)
+        except ConfigError as error:
+            n_refused += 1
+            assert str(error).startswith(str(path))  # noqa: PT017
+            assert "\n" not in str(error)  # noqa: PT017
+    assert n_refused > 0
+
+
+def test_an_index_file_beside_a_tdms_file_is_not_believed(
+    tmp_path: Path, job_for: Callable[[str], ImportJob]
+) -> None:
+    write_tdms(tmp_path / "run.tdms")
+    (tmp_path / "run.tdms_index").write_bytes(b"TDSh" + bytes(100))
+    assert read_all(tmp_path / "run.tdms", job_for("tdms")) == 600

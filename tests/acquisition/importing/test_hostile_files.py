@@ -1,24 +1,18 @@
 """A file that is damaged, or means harm, ends in one sentence and in bounded memory."""
 
 import pickle
-import random
 import struct
 import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import asammdf
-import can
 import nptdms
 import numpy as np
 import pytest
-from rigs.hostile_files import Placed, Read, measured, refusal, write_hdf5
-from rigs.tiers import fast_and_long
+from rigs.hostile_files import Placed, Read, measured, refusal
 
-from acquisition.errors import ConfigError
 from acquisition.importing.job import ImportJob, Place, TimeAxis
-from acquisition.importing.reading import reading
 
 
 @pytest.fixture
@@ -103,81 +97,6 @@ def test_an_archive_is_not_unpacked(tmp_path: Path, read: Read, job: ImportJob) 
     says = refusal(read, tmp_path / "run.mf4", replace(job, format="mdf4"))
     assert "not an MDF file of version 4" in says
     assert [path.name for path in tmp_path.iterdir()] == ["run.mf4"]
-
-
-def write_tdms(path: Path) -> None:
-    with nptdms.TdmsWriter(path) as file:
-        file.write_segment(
-            [nptdms.ChannelObject("g", n, np.arange(100) / 600.0) for n in ("time", "shaft x")]
-        )
-
-
-def write_mdf4(path: Path) -> None:
-    with asammdf.MDF() as mdf:
-        since_s = np.arange(100) / 600.0
-        mdf.append([asammdf.Signal(since_s, since_s, name="shaft x")])
-        mdf.save(path)
-
-
-def write_blf(path: Path) -> None:
-    with can.BLFWriter(path) as log:
-        for n in range(100):
-            log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes(8)))
-
-
-WRITERS = {"tdms": write_tdms, "mdf4": write_mdf4, "blf": write_blf, "hdf5": write_hdf5}
-
-
-@pytest.mark.parametrize("n_damaged", fast_and_long(2, 8))
-@pytest.mark.parametrize("kind", WRITERS)
-@pytest.mark.usefixtures("confined")
-def test_any_damage_is_read_or_refused_but_never_more(
-    tmp_path: Path, read: Read, job: ImportJob, kind: str, n_damaged: int
-) -> None:
-    """Cut off anywhere, and bytes changed at random: the reading process may do what it likes."""
-    path = tmp_path / "run.mf4"
-    WRITERS[kind](path)
-    content = path.read_bytes()
-    chance = random.Random(7)  # noqa: S311  not a secret
-    fitting = replace(job, format=kind, channels=job.channels[:1], slow=())
-    if kind in ("mdf4", "blf"):
-        fitting = replace(fitting, time=TimeAxis("file", 0))
-    outcomes = [outcome(read, path, fitting, content)]
-    for n in range(n_damaged):
-        damaged = bytearray(content)
-        if n % 3 == 0:
-            damaged = damaged[: chance.randrange(len(damaged))]
-        else:
-            for _ in range(chance.randint(1, 30)):
-                damaged[chance.randrange(len(damaged))] = chance.randrange(256)
-        outcomes.append(outcome(read, path, fitting, bytes(damaged)))
-    assert outcomes[0] == "read"
-    assert all(
-        said == "read" or (said.startswith(str(path)) and "\n" not in said) for said in outcomes
-    )
-    assert outcomes.count("read") < len(outcomes)
-
-
-def outcome(read: Read, path: Path, job: ImportJob, content: bytes) -> str:
-    path.write_bytes(content)
-    try:
-        if job.format == "blf":
-            with reading(path, job) as found:
-                list(found.frames())
-        else:
-            read(path, job)
-    except ConfigError as error:
-        return str(error)
-    return "read"
-
-
-def test_an_index_file_beside_a_tdms_file_is_not_believed(
-    tmp_path: Path, read: Read, job: ImportJob
-) -> None:
-    write_tdms(tmp_path / "run.tdms")
-    (tmp_path / "run.tdms_index").write_bytes(b"TDSh" + bytes(100))
-    fitting = replace(job, format="tdms", channels=job.channels[:1], slow=())
-    assert read(tmp_path / "run.tdms", fitting).samples.shape == (1, 100)
 
 
 @pytest.mark.usefixtures("confined")

@@ -4,13 +4,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.calibration import UnitCalibration, calibrate
 from acquisition.errors import ConfigError
 from acquisition.simulated.faults import Fault, FaultInjector, FaultKind
 from acquisition.simulated.scenario import ChannelScenario, Scenario
 from acquisition.simulated.unit import SimulatedUnit
 from core.arrays import CountArray
-from core.quality import Reason, bad
 
 BuildUnit = Callable[..., SimulatedUnit]
 START = 3000
@@ -70,24 +68,6 @@ def test_a_fault_begins_with_its_sample_whatever_pieces_are_asked_for(
     assert np.array_equal(whole[1:], healthy[1:])
     assert np.array_equal(whole[0, :START], healthy[0, :START])
     assert not np.array_equal(whole[0, START:], healthy[0, START:])
-
-
-@pytest.mark.parametrize(
-    ("kind", "reason"),
-    [(FaultKind.DEAD, Reason.SENSOR_FAILURE), (FaultKind.RAIL_HITS, Reason.CLIPPED)],
-)
-def test_calibration_notices_a_probe_without_voltage_and_a_loose_contact(
-    build_unit: BuildUnit,
-    calibration: UnitCalibration,
-    full_load: Scenario,
-    kind: FaultKind,
-    reason: Reason,
-) -> None:
-    faulty = replace(full_load, channels={"UJB_ux": ChannelScenario(faults=(Fault(kind),))})
-
-    block = calibrate(build_unit(faulty).advance(3000), calibration)
-
-    assert block.channel_quality[0] == bad(reason)
 
 
 def test_swapped_cables_carry_each_other_s_signal(
