@@ -39,8 +39,11 @@ def field_error(kind: type[Exception]) -> Exception:
 TEXT = "as seen in the field|Attempting to use a port that is not open"
 
 
-@pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
-async def test_what_pymodbus_raises_on_a_read_is_renamed(kind, server, monkeypatch, link_to):
+each_foreign_error = pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
+
+
+@each_foreign_error
+async def test_what_pymodbus_raises_is_renamed(kind, server, monkeypatch, link_to):
     async def fails(*_: object) -> None:
         raise field_error(kind)
 
@@ -49,19 +52,12 @@ async def test_what_pymodbus_raises_on_a_read_is_renamed(kind, server, monkeypat
     monkeypatch.setattr(ModbusBaseClient, "execute", fails)
     with pytest.raises(AcquisitionError, match=TEXT):
         await link.read(0, 1)
-
-
-@pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
-async def test_what_pymodbus_raises_on_connecting_is_renamed(kind, monkeypatch, link_to):
-    async def fails(*_: object) -> None:
-        raise field_error(kind)
-
     monkeypatch.setattr(ModbusBaseClient, "connect", fails)
     with pytest.raises(AcquisitionError, match=TEXT):
-        await link_to(1).open()
+        await link.open()
 
 
-@pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
+@each_foreign_error
 async def test_what_a_serial_port_raises_is_renamed(kind, hostile_line, monkeypatch, link_on):
     def fails(*_: object) -> None:
         raise field_error(kind)

@@ -85,19 +85,6 @@ async def test_input_registers_and_small_reads_bring_the_same_samples(
     assert set(server.function_codes) == {4}
 
 
-async def test_only_reads_reach_the_device_whatever_it_does(device, server, source_at):
-    source = source_at(server.port)
-    for fault in (faults.torn, faults.dropped, faults.wrong_index):
-        async with source.connect() as stream:
-            device.produce(1, fault)
-            device.produce(1)
-            await anext(stream)
-    device.restart()
-    async with source.connect() as stream:
-        await anext(stream)
-    assert set(server.function_codes) == {3}
-
-
 @pytest.mark.parametrize(
     ("wrong", "complaint"),
     [
