@@ -14,14 +14,7 @@ from acquisition.errors import LinkError
 
 N_EACH = 200
 N_CHANNELS = 4
-LINE_FAULTS = ["non_hex_line", "long_line", "truncated_line"]
-LOSING = {
-    "drop": "incomplete_frames",
-    "wrong_dlc": "incomplete_frames",
-    "non_hex_line": "incomplete_frames",
-    "truncated_line": "incomplete_frames",
-    "reorder": "incomplete_frames",
-}
+LOSING = {"drop", "wrong_dlc", "non_hex_line", "truncated_line", "reorder"}
 COUNTED_AS = {
     "repeat": "duplicate_frame",
     "wrong_dlc": "wrong_length",

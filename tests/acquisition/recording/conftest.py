@@ -65,12 +65,12 @@ def numbered() -> Callable[..., RawBlock]:
 
 
 @pytest.fixture
-def record(tmp_path: Path, unit: RecordedUnit) -> Callable[[Iterable[RawBlock]], Path]:
-    """Records blocks; gives the folder."""
+def record(tmp_path: Path, unit: RecordedUnit) -> Callable[..., Path]:
+    """Records blocks of a unit, of `unit` if none is given; gives the folder."""
 
-    def recorded(blocks: Iterable[RawBlock]) -> Path:
+    def recorded(blocks: Iterable[RawBlock], of: RecordedUnit = unit) -> Path:
         folder = tmp_path / "recording"
-        with RecordingWriter(folder, unit, MADE_BY) as writer:
+        with RecordingWriter(folder, of, MADE_BY) as writer:
             for block in blocks:
                 writer.write(block)
         return folder

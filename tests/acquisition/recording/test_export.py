@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import asammdf
@@ -18,9 +18,8 @@ from acquisition.recording.export.rows import export_rows
 from acquisition.recording.export.writing import ExportFormat, export_recording
 from acquisition.recording.manifest import RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.writer import RecordingWriter
 
-Record = Callable[[Iterable[RawBlock]], Path]
+Record = Callable[..., Path]
 Numbered = Callable[..., RawBlock]
 
 INDEX = [*range(100), *range(137, 200), *range(40, 90)]
@@ -125,13 +124,11 @@ def test_tdms_and_mdf4_have_groups_with_their_own_times(
 
 @pytest.mark.parametrize("kind", ExportFormat)
 def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
-    tmp_path: Path, unit: RecordedUnit, numbered: Numbered, kind: str
+    tmp_path: Path, unit: RecordedUnit, record: Record, numbered: Numbered, kind: str
 ) -> None:
     plain = unit.model_copy(update={"slow_channels": ()})
-    with RecordingWriter(tmp_path / "recording", plain, "a test") as writer:
-        for n in range(1200):
-            writer.write(numbered(7 * n, 7, slow=()))
-    recording = open_recording(tmp_path / "recording")
+    blocks = (numbered(7 * n, 7, slow=()) for n in range(1200))
+    recording = open_recording(record(blocks, plain))
     told: list[int] = []
     export_recording(recording, kind, tmp_path / "out", told.append)
     assert sum(told) == 8400
@@ -157,6 +154,7 @@ def test_a_slow_value_that_cannot_be_is_no_number_in_any_file(
 def test_a_channel_of_any_name_is_exported_or_refused_by_name(
     tmp_path: Path,
     unit: RecordedUnit,
+    record: Record,
     numbered: Numbered,
     kind: ExportFormat,
     id_: str,
@@ -164,9 +162,7 @@ def test_a_channel_of_any_name_is_exported_or_refused_by_name(
 ) -> None:
     first, *rest = getattr(unit, where)
     named = unit.model_copy(update={where: (first.model_copy(update={"id": id_}), *rest)})
-    with RecordingWriter(tmp_path / "recording", named, "a test") as writer:
-        writer.write(numbered(0, 50))
-    recording = open_recording(tmp_path / "recording")
+    recording = open_recording(record([numbered(0, 50)], named))
     try:
         export_recording(recording, kind, tmp_path / "run.mf4")
     except ConfigError as error:
