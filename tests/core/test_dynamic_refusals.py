@@ -16,9 +16,7 @@ from core.quality import Reason
 Recording = Callable[..., ComplexArray]
 
 
-def test_noise_alone_is_insufficient_excitation_and_never_a_stiffness(
-    recording: Recording,
-) -> None:
+def test_noise_alone_is_insufficient_excitation_and_never_a_stiffness(recording: Recording) -> None:
     for seed in range(30):
         noise = averaged(recording(seed, motion_um=0.0, probe_um=0.1, bearing_um=0.3))
         result = dynamic_stiffness(noise, BRACKET, TURN_HZ, DynamicSettings())

@@ -17,12 +17,7 @@ PLACES = {("U1", "UJB"), ("U1", "LJB"), ("U2", "UJB")}
 
 def columns(n: int = 6) -> dict[str, Any]:
     """Rows of three bearings, both directions, mixed as a plant would write them."""
-    rows = [
-        (time, unit, bearing, direction)
-        for time in range(n)
-        for unit, bearing in sorted(PLACES)
-        for direction in "xy"
-    ]
+    rows = [(time, *place, d) for time in range(n) for place in sorted(PLACES) for d in "xy"]
     size = len(rows)
     return {
         "time_ns": [STEP_NS * time for time, *_ in rows],

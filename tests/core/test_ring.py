@@ -37,13 +37,10 @@ def test_the_ring_equals_the_tail_of_all_that_was_written(sizes: list[int], star
     assert ring.account.n_stored == ring.account.n_offered == sum(sizes)
 
 
-@given(
-    st.lists(
-        st.tuples(st.integers(1, 30), st.integers(0, 50), st.integers(0, 5), st.booleans()),
-        min_size=1,
-        max_size=30,
-    )
-)
+STEPS = st.tuples(st.integers(1, 30), st.integers(0, 50), st.integers(0, 5), st.booleans())
+
+
+@given(st.lists(STEPS, min_size=1, max_size=30))
 def test_every_offered_sample_is_stored_flagged_missing_or_rejected(
     steps: list[tuple[int, int, int, bool]],
 ) -> None:
@@ -109,9 +106,8 @@ def test_old_samples_of_another_epoch_are_never_read() -> None:
 
 def test_a_window_has_the_worst_quality_and_the_mean_slow_reading_of_its_time() -> None:
     ring = Ring(2, CAPACITY)
-    ring.write(
-        block(0, 10, channel_quality=(bad(Reason.CLIPPED), GOOD), slow={"oil": Reading(99.0)})
-    )
+    clipped = (bad(Reason.CLIPPED), GOOD)
+    ring.write(block(0, 10, channel_quality=clipped, slow={"oil": Reading(99.0)}))
     ring.write(block(10, 10, slow={"oil": Reading(40.0)}))
     ring.write(block(20, 10, slow={"oil": Reading(50.0)}))
     window = ring.read(10, 30)

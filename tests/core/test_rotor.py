@@ -12,6 +12,7 @@ FILMS = {
     "LJB": Film.proportional(0.37e9, 0.4e9, -0.05e9),
     "TJB": Film.proportional(1.5e9, 1.5e9),
 }
+ISOTROPIC = {name: Film.proportional(1.0e9, 1.0e9) for name in FILMS}
 
 
 def test_mass_and_stiffness_are_symmetric_when_the_films_are() -> None:
@@ -58,9 +59,7 @@ def test_a_static_force_is_carried_by_the_springs_alone() -> None:
 
 
 def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_and_the_right_way() -> None:
-    matrices = rotor_matrices(
-        PARAMETERS, {name: Film.proportional(1.0e9, 1.0e9) for name in FILMS}, 92.3
-    )
+    matrices = rotor_matrices(PARAMETERS, ISOTROPIC, 92.3)
     pull_y = force_map(PARAMETERS, ForcePlane.RUNNER) @ np.array([0.0, 1.0e5 + 0j])
 
     response = bearing_response(PARAMETERS, matrices, 0.0, pull_y)
@@ -70,8 +69,7 @@ def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_and_the_right_way()
 
 
 def test_an_isotropic_machine_whirls_forward_in_circles_under_unbalance() -> None:
-    films = {name: Film.proportional(1.0e9, 1.0e9) for name in FILMS}
-    matrices = rotor_matrices(PARAMETERS, films, 92.3)
+    matrices = rotor_matrices(PARAMETERS, ISOTROPIC, 92.3)
     force = forward_force(PARAMETERS, ForcePlane.MASS_CENTRE, 75.6e3)
 
     for u_x, u_y, x_b, y_b in bearing_response(PARAMETERS, matrices, 1.538, force).values():

@@ -49,15 +49,20 @@ def test_a_channel_that_stops_within_a_segment_is_seen_in_that_segment(from_samp
     assert judged(signal).reason is not Reason.OK
 
 
-def test_without_a_known_resolution_only_perfect_silence_is_a_failure() -> None:
-    assert signal_quality(0.0, 5.0, 0.0, True, DEFAULT_LIMITS) == bad(Reason.STUCK)
-    assert signal_quality(0.0, 0.0, 0.0, True, DEFAULT_LIMITS) == bad(Reason.DEAD)
-    assert signal_quality(1e-9, 5.0, 0.0, True, DEFAULT_LIMITS) == GOOD
-
-
-def test_a_negative_sensitivity_is_judged_by_its_size() -> None:
-    assert signal_quality(0.1, 1900.0, -0.15, True, DEFAULT_LIMITS) == bad(Reason.STUCK)
-    assert signal_quality(0.2, 1900.0, -0.15, True, DEFAULT_LIMITS) == GOOD
+@pytest.mark.parametrize(
+    ("rms", "mean", "per_count", "quality"),
+    [
+        (0.0, 5.0, 0.0, bad(Reason.STUCK)),
+        (0.0, 0.0, 0.0, bad(Reason.DEAD)),
+        (1e-9, 5.0, 0.0, GOOD),
+        (0.1, 1900.0, -0.15, bad(Reason.STUCK)),
+        (0.2, 1900.0, -0.15, GOOD),
+    ],
+)
+def test_a_resolution_may_be_unknown_or_negative(
+    rms: float, mean: float, per_count: float, quality: Quality
+) -> None:
+    assert signal_quality(rms, mean, per_count, True, DEFAULT_LIMITS) == quality
 
 
 def test_too_few_samples_for_a_judgement_are_refused() -> None:
@@ -100,9 +105,6 @@ def test_a_speed_channel_that_contradicts_the_1x_line_is_doubted() -> None:
     assert checked_speed(told, None, 92.3, DEFAULT_LIMITS) == told
     doubted = checked_speed(told, 88.0, 92.3, DEFAULT_LIMITS)
     assert doubted == Reading(92.3, uncertain(Reason.SPEED_IMPLAUSIBLE))
-
-
-def test_a_speed_that_is_missing_stays_missing_for_its_own_reason() -> None:
     nothing = missing(Reason.NOT_MEASURED)
     assert checked_speed(nothing, 92.3, 92.3, DEFAULT_LIMITS) == nothing
 

@@ -18,14 +18,9 @@ def test_a_half_width_counts_as_a_uniform_distribution() -> None:
 
 
 def test_random_and_systematic_stay_apart_and_combine_by_squares() -> None:
-    budget = Budget(
-        100.0,
-        (
-            random_line("statistics", 3.0),
-            systematic_line("a", 4.0 * math.sqrt(3.0), -1.0),
-            systematic_line("b", 12.0 * math.sqrt(3.0), 1.0),
-        ),
-    )
+    a = systematic_line("a", 4.0 * math.sqrt(3.0), -1.0)
+    b = systematic_line("b", 12.0 * math.sqrt(3.0), 1.0)
+    budget = Budget(100.0, (random_line("statistics", 3.0), a, b))
     assert budget.random == pytest.approx(3.0)
     assert budget.systematic == pytest.approx(math.hypot(4.0, 12.0))
     assert budget.combined == pytest.approx(13.0)
@@ -36,9 +31,8 @@ def test_random_and_systematic_stay_apart_and_combine_by_squares() -> None:
 def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table() -> None:
     # GUM, table G.2: t_95 of 3, 6 and 20 degrees of freedom
     for freedoms, factor in ((3.0, 3.18), (6.0, 2.45), (20.0, 2.09)):
-        assert coverage_factor([random_line("a", 1.0, freedoms)]) == pytest.approx(
-            factor, abs=0.005
-        )
+        found = coverage_factor([random_line("a", 1.0, freedoms)])
+        assert found == pytest.approx(factor, abs=0.005)
     mixed = [random_line("a", 1.0, 6.0), systematic_line("b", 10.0, 1.0)]
     assert coverage_factor(mixed) == pytest.approx(1.96, abs=0.01)
 
@@ -74,13 +68,8 @@ def at_line() -> tuple[Budget, Budget]:
 
 def test_each_estimator_names_what_reaches_it(at_line: tuple[Budget, Budget]) -> None:
     ratio, transfer = ({line.name for line in budget.lines} for budget in at_line)
-    common = {
-        "spectral statistics",
-        "gain of shaft probe",
-        "gain of bearing transducer",
-        "bracket stiffness",
-        "runout",
-    }
+    common = {"spectral statistics", "gain of shaft probe", "gain of bearing transducer"}
+    common |= {"bracket stiffness", "runout"}
     assert transfer == common
     assert ratio == common | {"incoherent motion", "bracket inertia left out"}
 

@@ -49,33 +49,34 @@ async def taken(source) -> list[SampleBlock]:
         return [block async for block in blocks]
 
 
-async def test_a_device_that_stands_still_after_its_recording_ends_the_stream() -> None:
-    over = threading.Event()
-    over.set()
+@pytest.fixture
+def over() -> threading.Event:
+    """The end of the recording, which has come."""
+    event = threading.Event()
+    event.set()
+    return event
+
+
+async def test_a_device_that_stands_still_after_its_recording_ends_the_stream(over) -> None:
     assert await taken(PlayedOut(Standing([FIRST, SECOND]), over)) == [FIRST, SECOND]
     assert await taken(PlayedOut(Standing([], refuses=True), over)) == []
 
 
-async def test_a_device_that_plays_the_past_has_no_clock_that_could_be_off() -> None:
-    over = threading.Event()
-    over.set()
+async def test_a_device_that_plays_the_past_has_no_clock_that_could_be_off(over) -> None:
     off = DeviceClock(offset_s=-28e6, drift_ppm=5e5, u_drift_ppm=1.0)
     [played] = await taken(PlayedOut(Standing([block(1, off)]), over))
     assert played.clock is None
 
 
 @pytest.mark.parametrize("refuses", [False, True], ids=["while reading", "when connecting"])
-async def test_before_its_end_a_lost_link_stays_a_lost_link(refuses: bool) -> None:
-    source = PlayedOut(Standing([FIRST], refuses), threading.Event())
+async def test_before_its_end_a_lost_link_is_lost_and_a_daq_that_is_gone_is_not_waited_for(
+    over, refuses: bool
+) -> None:
+    daq = Standing([FIRST], refuses)
     with pytest.raises(LinkError, match="stand still"):
-        await taken(source)
-
-
-@pytest.mark.parametrize("refuses", [False, True], ids=["while reading", "when connecting"])
-async def test_a_daq_that_is_gone_is_not_waited_for(refuses: bool) -> None:
-    gone = threading.Event()
-    gone.set()
-    source = PlayedOut(Standing([FIRST], refuses), threading.Event(), gone)
+        await taken(PlayedOut(daq, threading.Event()))
+    gone = over
+    source = PlayedOut(daq, threading.Event(), gone)
     assert await taken(source) == ([] if refuses else [FIRST])
 
 

@@ -121,6 +121,9 @@ def test_what_comes_again_while_it_is_latched_is_a_new_occurrence(life: Make) ->
     alarm = life(latching=True)
     alarm.find(DANGER, 0)
     alarm.find(WITHIN, 1)
+    alarm.alarm = restored(alarm.alarm)  # a latch survives a restart
+    assert alarm.find(WITHIN, 1) == []
+    assert (alarm.alarm.level, alarm.alarm.is_latched) == (AlarmLevel.DANGER, True)
     alarm.ask(Acknowledge("A. Name", 1))
 
     assert alarm.find(ALERT, 2) == ["raised"]
@@ -129,17 +132,6 @@ def test_what_comes_again_while_it_is_latched_is_a_new_occurrence(life: Make) ->
     alarm.ask(Acknowledge("A. Name", 2))
     assert alarm.ask(Reset("A. Name")) == ["reset"]
     assert (alarm.alarm.level, alarm.alarm.state) == (AlarmLevel.ALERT, AlarmState.ACKNOWLEDGED)
-
-
-def test_a_latch_survives_a_restart(life: Make) -> None:
-    alarm = life(latching=True)
-    alarm.find(DANGER, 0)
-    alarm.find(WITHIN, 1)
-
-    alarm.alarm = restored(alarm.alarm)
-
-    assert alarm.find(WITHIN, 2) == []
-    assert (alarm.alarm.level, alarm.alarm.is_latched) == (AlarmLevel.DANGER, True)
 
 
 def test_a_shelved_alarm_comes_back_by_itself_and_is_announced_if_it_is_active(life: Make) -> None:
@@ -159,6 +151,8 @@ def test_a_shelved_alarm_comes_back_by_itself_and_is_announced_if_it_is_active(l
 
 def test_what_is_raised_and_returns_on_the_shelf_still_waits_to_be_seen(life: Make) -> None:
     alarm = life()
+    with pytest.raises(ActionRefusedError, match="has passed already"):
+        alarm.ask(Shelve("A. Name", "too late", 50), 50)
     alarm.ask(Shelve("A. Name", "test of the probes", 50), 0)
 
     assert alarm.find(ALERT, 10) == ["raised"]
@@ -167,11 +161,6 @@ def test_what_is_raised_and_returns_on_the_shelf_still_waits_to_be_seen(life: Ma
 
     assert alarm.alarm.state is AlarmState.RETURNED_UNACKNOWLEDGED
     assert alarm.ask(Unshelve("A. Name"), 31) == []
-
-
-def test_shelving_needs_a_time_that_is_still_to_come(life: Make) -> None:
-    with pytest.raises(ActionRefusedError, match="has passed already"):
-        life().ask(Shelve("A. Name", "too late", 50), 50)
 
 
 @pytest.mark.parametrize(

@@ -18,13 +18,19 @@ ORIGIN = Origin("U1", "UJB", "dynamic", 1, "Ada", 1_700_000_000_000_000_000, "co
 FilmLife = Callable[..., StiffnessHistory]
 
 
+def baseline_of(
+    history: StiffnessHistory,
+    settings: BaselineSettings | None = None,
+    watched: tuple[Watched, ...] = (Watched.STIFFNESS,),
+) -> BearingBaseline:
+    settled = np.ones(len(history), np.bool_)
+    return learn(history, settled, ORIGIN, settings or BaselineSettings(), watched)
+
+
 def learned(
     history: StiffnessHistory, settings: BaselineSettings | None = None
 ) -> QuantityBaseline:
-    settled = np.ones(len(history), np.bool_)
-    settings = settings or BaselineSettings()
-    baseline = learn(history, settled, ORIGIN, settings, (Watched.STIFFNESS,))
-    found = baseline.of(Watched.STIFFNESS, "x")
+    found = baseline_of(history, settings).of(Watched.STIFFNESS, "x")
     assert found is not None
     return found
 
@@ -74,12 +80,8 @@ def test_the_order_of_the_days_does_not_change_what_is_normal(healthy: Stiffness
     )
     before, after = learned(healthy), learned(shuffled)
     for one, other in zip(before.table.cells, after.table.cells, strict=True):
-        assert (one.cell, one.n_days, one.n_readings) == (
-            other.cell,
-            other.n_days,
-            other.n_readings,
-        )
-        assert one.location == other.location
+        for name in ("cell", "n_days", "n_readings", "location"):
+            assert getattr(one, name) == getattr(other, name)
         assert one.scatter == pytest.approx(other.scatter, rel=0.2)  # other spells are left out
     shift = deviation(after, healthy) - deviation(before, healthy)
     assert np.nanquantile(np.abs(shift), 0.95) < 1e-3  # alike days are weighed as one, and are not
@@ -134,9 +136,7 @@ def test_an_unseen_attitude_is_not_compared(healthy: StiffnessHistory) -> None:
     assert np.mean(found.place >= 0) < 0.01
 
 
-def test_readings_stray_further_where_position_counts_for_more(
-    healthy: StiffnessHistory,
-) -> None:
+def test_readings_stray_further_where_position_counts_for_more(healthy: StiffnessHistory) -> None:
     extra = np.random.default_rng(6).normal(0.0, 1.0, len(healthy) // 40 + 1).repeat(40)
     excess = np.maximum(healthy.eccentricity_ratio - 0.4, 0.0) * 0.6 * extra[: len(healthy)]
     cells = learned(with_ln_k(healthy, healthy.ln_k + excess)).table.cells
@@ -170,9 +170,7 @@ def test_what_position_does_lasts_and_the_rest_averages_out(film_life: FilmLife)
 def test_wrong_readings_hardly_move_a_baseline(healthy: StiffnessHistory, share: float) -> None:
     random = np.random.default_rng(7)
     is_wrong = random.random(healthy.ln_k.shape) < share
-    wrong = np.where(
-        is_wrong, healthy.ln_k + random.uniform(0.5, 3.0, is_wrong.shape), healthy.ln_k
-    )
+    wrong = healthy.ln_k + np.where(is_wrong, random.uniform(0.5, 3.0, is_wrong.shape), 0.0)
     clean, spoiled = learned(healthy), learned(with_ln_k(healthy, wrong))
     both = deviation(clean, healthy) - deviation(spoiled, healthy)
     assert np.nanquantile(np.abs(both), 0.95) < 0.02
@@ -189,14 +187,10 @@ def test_a_fault_in_the_last_quarter_of_learning_is_not_learned(film_life: FilmL
     assert spoiled.rejected_share > 0.15
 
 
-def test_a_few_days_are_no_baseline(film_life: FilmLife) -> None:
-    history = film_life(1, days=15)
-    assert (
-        learn(history, np.ones(len(history), np.bool_), ORIGIN, BaselineSettings()).quantities == ()
-    )
-
-
-def test_readings_that_had_not_settled_are_not_learned(healthy: StiffnessHistory) -> None:
+def test_from_a_few_days_or_what_had_not_settled_nothing_is_learned(
+    film_life: FilmLife, healthy: StiffnessHistory
+) -> None:
+    assert baseline_of(film_life(1, days=15)).quantities == ()
     unsettled = np.zeros(len(healthy), np.bool_)
     assert learn(healthy, unsettled, ORIGIN, BaselineSettings()).quantities == ()
 
@@ -224,9 +218,7 @@ def test_an_attitude_that_matters_is_learned(healthy: StiffnessHistory) -> None:
 
 
 def test_all_quantities_of_a_bearing_are_learned(healthy: StiffnessHistory) -> None:
-    settled = np.ones(len(healthy), np.bool_)
-    baseline = learn(healthy, settled, ORIGIN, BaselineSettings(), tuple(Watched))
-    assert isinstance(baseline, BearingBaseline)
+    baseline = baseline_of(healthy, watched=tuple(Watched))
     assert [(q.quantity.value, q.direction) for q in baseline.quantities] == [
         (name, direction) for name in ("stiffness", "shaft", "bearing") for direction in "xy"
     ]

@@ -88,9 +88,7 @@ def test_without_a_baseline_nothing_is_called_normal(films: Any) -> None:
     assert verdicts == {Verdict.NO_BASELINE, Verdict.TRANSIENT}
 
 
-def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(
-    films: Any,
-) -> None:
+def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(films: Any) -> None:
     watch = films.watch(has_baseline=False)
     times = [1_000_000 * S + i * 12 * S for i in range(500)]
     found = [watch.take([films.assessment(time_ns)])[1] for time_ns in times]

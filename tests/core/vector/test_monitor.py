@@ -61,9 +61,7 @@ def test_results_come_every_hop_whatever_the_blocks(rack) -> None:
         assert [a.window for a in other] == [a.window for a in results[0]]
 
 
-def test_velocity_and_acceleration_become_displacement_at_the_speed_of_the_poll(
-    unit: Unit,
-) -> None:
+def test_velocity_and_acceleration_become_displacement_at_the_speed_of_the_poll(unit: Unit) -> None:
     omega = 2 * np.pi * 92.3 / 60
     channels = (
         *unit.channels[:2],

@@ -41,11 +41,8 @@ def test_whole_nanoseconds_have_a_heading_of_their_own(text: Text) -> None:
     with pytest.raises(ReadingsError, match="line 2: time_ns is no integer: '2025-01-01T00:00:00Z"):
         read(nanoseconds)
     head, _, _ = nanoseconds.partition("\n")
-    assert read(f"{head}\n{line_of_ns(1_740_816_000_000_000_001)}\n")[0]["time_ns"] % 10 == 1
-
-
-def line_of_ns(time_ns: int) -> str:
-    return f"{time_ns},U1,UJB,x,1e9,0.01,0.3,40,part_load,good"
+    row = "1740816000000000001,U1,UJB,x,1e9,0.01,0.3,40,part_load,good"
+    assert read(f"{head}\n{row}\n")[0]["time_ns"] % 10 == 1
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
@@ -56,13 +53,9 @@ def test_a_spreadsheet_s_line_ends_mark_and_quotes_do_not_matter(
     assert read(begin + text().replace("\n", end).replace("U1", '"U1"')) == read(text())
 
 
-def test_empty_lines_count_as_lines_and_not_as_rows(text: Text, line: Line) -> None:
-    rows = read("\n" + text("", "", line(200)))
+def test_empty_lines_are_no_rows_and_empty_cells_no_numbers(text: Text, line: Line) -> None:
+    rows = read("\n" + text("", "", line(200, k_n_per_m="", quality="bad")))
     assert [row["line"] for row in rows] == [*range(3, 13), 15]
-
-
-def test_an_empty_cell_is_no_number_and_not_nought(text: Text, line: Line) -> None:
-    rows = read(text(line(200, k_n_per_m="", quality="bad")))
     assert rows[-1]["k_n_per_m"] != rows[-1]["k_n_per_m"]
 
 
@@ -99,11 +92,8 @@ def test_a_wrong_cell_is_named_with_its_line(
     assert refusal(text(line(100, **changes), line(110))).startswith(says)
 
 
-def test_a_line_that_is_cut_off_is_named(text: Text) -> None:
-    assert refusal(text()[:-20]) == "line 11: 8 columns where the heading has 10"
-
-
 def test_ten_lines_are_named_and_the_others_counted(text: Text, line: Line) -> None:
+    assert refusal(text()[:-20]) == "line 11: 8 columns where the heading has 10"  # cut off
     said = refusal(text(*(line(n, u_random="x") for n in range(100, 120))))
     assert "line 21: u_random is no number: 'x'; and 10 more" in said
 
@@ -128,11 +118,8 @@ def test_wrong_headings_are_named(text: Text, old: str, new: str, says: str) -> 
     assert says in refusal(text().replace(old, new, -1 if old == "," else 1))
 
 
-def test_a_file_without_rows_is_no_history() -> None:
+def test_a_file_without_rows_a_huge_heading_and_a_line_without_end_are_refused() -> None:
     assert refusal(b"") == refusal(b"\n\r\n") == "is empty: there is no heading"
-
-
-def test_a_heading_of_a_million_columns_and_a_line_without_end_are_refused() -> None:
     assert refusal(",".join(f"c{n}" for n in range(1_000_000))) == (
         "line 1: longer than 16384 bytes"
     )

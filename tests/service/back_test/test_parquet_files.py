@@ -155,9 +155,7 @@ def test_more_rows_than_are_read_are_refused_by_the_footer(
     assert refusal(written()) == "20 rows; at most 19 are read"
 
 
-def test_texts_that_unpack_to_more_than_memory_end_the_reading_process_only(
-    tmp_path: Path,
-) -> None:
+def test_texts_that_unpack_to_more_than_memory_end_the_reading_process_only(tmp_path: Path) -> None:
     n_rows = 60_000
     texts = pa.DictionaryArray.from_arrays(np.zeros(n_rows, np.int32), ["U" * 30_000])
     path = tmp_path / "bomb.parquet"

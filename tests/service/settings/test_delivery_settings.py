@@ -54,13 +54,7 @@ def test_every_recipient_is_a_receiver_and_secrets_in_addresses_are_not_shown(
     midnight_utc_ns, hour_ns = 1_767_225_600_000_000_000, 3600 * 10**9  # 21:00 in Asunción
     quiet = [found[0].quiet.hold_at(midnight_utc_ns + hours * hour_ns) for hours in range(0, 24, 3)]
     assert quiet == [False, True, True, False, False, False, False, False]
-
-
-def test_a_replay_tells_nobody(plant_text: str, tmp_path: Path) -> None:
-    path = tmp_path / "plant.toml"
-    path.write_text(plant_text + WEBHOOK + SMTP, encoding="utf-8")
-    plant, clock = load_plant_file(path), SystemClock()
-
+    # A replay tells nobody.
     assert receivers_of(plant, Origin.REPLAY, clock) == []
     assert router_of(plant, Origin.REPLAY, lambda _: Surroundings(), clock) is nobody
 
