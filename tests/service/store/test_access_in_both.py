@@ -1,7 +1,11 @@
 """Accounts, sessions, keys, the set-up token and the outbox, in both databases."""
 
 import pytest
+from harness.places import Place
 
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.event import AlarmNews
+from core.alarms.life_cycle import advance
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from service.security.keys import ApiKey
@@ -19,6 +23,11 @@ from service.store.vector_reference_port import SetVectorReference
 
 TOKEN, OTHER = b"t" * 32, b"o" * 32
 LATER = 10**18
+GAP = GapReference("U1", "UJB", 5, "A", (1.0, 2.0), None, ReferenceSource.GIVEN)
+VECTOR = SetVectorReference(
+    VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0)}),
+    *(6, "A", ""),
+)
 
 
 def test_the_first_account_takes_the_token_that_was_offered_last(store: SqlStore) -> None:
@@ -36,24 +45,19 @@ def test_the_first_account_takes_the_token_that_was_offered_last(store: SqlStore
 
 
 def test_what_is_written_again_because_nobody_could_tell_counts_once(store: SqlStore) -> None:
-    gap = GapReference("U1", "UJB", 5, "A", (1.0, 2.0), None, ReferenceSource.GIVEN)
-    vector = SetVectorReference(
-        VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0)}),
-        *(6, "A", ""),
-    )
     step = StoredStep("U1", "UJB", None, BaselineStep.RENEWED, 7, "A", "overhaul", 7)
     key = ApiKey("k1", "wall", TOKEN, Role.VIEWER, ("U1",), 8, LATER)
     command = Command("c1", "U1", "alarm", "{}", "A", None, 9, LATER)
     for _ in range(2):
-        store.add_reference(gap)
-        store.order1_references.add(vector)
+        store.add_reference(GAP)
+        store.order1_references.add(VECTOR)
         store.films.add_steps([step])
         store.access.accounts.add("anna", Role.ADMIN, "hash", 10)
         store.access.keys.add(key)
         store.commands.ask(command)
 
-    assert store.reference_history("U1", "UJB") == [gap]
-    assert store.order1_references.history("U1", "UJB") == [vector]
+    assert store.reference_history("U1", "UJB") == [GAP]
+    assert store.order1_references.history("U1", "UJB") == [VECTOR]
     assert store.films.steps("U1", "UJB") == [step]
     assert store.commands.open(["U1"]) == [OpenCommand(command, None)]
     assert len(store.audit.entries(AuditQuery())) == 5
@@ -106,3 +110,18 @@ def test_nothing_waits_for_anybody_in_a_new_outbox(store: SqlStore) -> None:
     assert store.outbox.expire("desk", 5, "too old", 6) == store.outbox.revive("desk", 7) == 0
     store.outbox.finish(1, LetterState.DELIVERED, "200", 8)
     assert list(store.alarms()) == []
+
+
+@pytest.mark.parametrize("table", ["gap_reference", "vector_reference", "alarm_event", "audit"])
+def test_what_is_on_record_is_never_changed_or_taken_away(
+    store: SqlStore, store_place: Place, table: str
+) -> None:
+    store.add_reference(GAP)
+    store.order1_references.add(VECTOR)
+    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X))
+    news = AlarmNews(*advance(alarm, Condition(AlarmLevel.ALERT), 7, AlarmRule()))
+    store.append([], [], [news])
+    column = "author" if table.endswith("reference") else "actor"
+    for statement in (f"UPDATE {table} SET {column} = 'x'", f"DELETE FROM {table}"):  # noqa: S608
+        with pytest.raises(store_place.refusal, match="kept"):
+            store_place.execute(statement)

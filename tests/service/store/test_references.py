@@ -1,8 +1,6 @@
 """References are kept as they were set, and the one set last rules."""
 
 import math
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +8,7 @@ import pytest
 from rigs.store_fixtures import At, Build
 
 from core.quality import Reading, Reason, missing, uncertain
-from service.store import schema, sql_store
+from service.store import sql_store
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -67,29 +65,6 @@ def test_a_clock_that_was_put_back_makes_the_last_reference_no_older(store: Sqli
     assert store.reference_history("U1", "UJB")[0] == reference(0)
 
 
-@pytest.mark.parametrize(
-    "change", ["UPDATE gap_reference SET x_um = 1.0", "DELETE FROM gap_reference"]
-)
-def test_nobody_rewrites_a_reference(store: SqliteStore, path: Path, change: str) -> None:
-    store.add_reference(reference())
-    connection = sqlite3.connect(path)
-    with pytest.raises(sqlite3.IntegrityError, match="references are kept"):
-        connection.execute(change)
-    connection.close()
-
-    assert store.references() == [reference()]
-
-
-def test_references_are_there_after_a_restart(path: Path) -> None:
-    for n in range(3):
-        store = SqliteStore(path)
-        store.add_reference(reference(n))
-        store.close()
-    store = SqliteStore(path)
-    assert store.reference_history("U1", "UJB") == [reference(n) for n in (2, 1, 0)]
-    store.close()
-
-
 def test_what_another_process_has_set_is_seen(store: SqliteStore, path: Path) -> None:
     assert store.references() == []
     other = SqliteStore(path)
@@ -97,33 +72,6 @@ def test_what_another_process_has_set_is_seen(store: SqliteStore, path: Path) ->
     other.close()
 
     assert store.references() == [reference()]
-
-
-def test_a_database_without_references_gets_room_for_them_and_keeps_its_data(
-    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    today = SqliteStore(path.with_name("today.sqlite3"))
-    today.append([assessment(gap_x_um=1998.5)], [])
-    today.close()
-    with monkeypatch.context() as at_that_time:
-        at_that_time.setattr(schema, "MIGRATIONS", schema.MIGRATIONS[:2])
-        SqliteStore(path).close()
-    with closing(sqlite3.connect(path)) as old:
-        columns = ", ".join(row[1] for row in old.execute("PRAGMA table_info (assessment)"))
-        old.execute("ATTACH ? AS today", (str(path.with_name("today.sqlite3")),))
-        old.execute("INSERT INTO series SELECT * FROM today.series")
-        old.execute(f"INSERT INTO assessment SELECT {columns} FROM today.assessment")  # noqa: S608
-        old.commit()
-
-    new = SqliteStore(path)
-    new.add_reference(reference())
-    newest = new.newest("U1", "UJB")
-    in_force = new.references()
-    new.close()
-
-    assert in_force == [reference()]
-    assert newest is not None
-    assert newest.readings["gap_x_um"] == Reading(1998.5)
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,11 @@
 
 import itertools
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
-from rigs.store_fixtures import At, Build
+from rigs.store_fixtures import At, Build, Execute
 
 from service.origin import Origin
 from service.store.port import StoreError
@@ -13,15 +14,19 @@ from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
 
 
-def run_sql(path: Path, script: str) -> None:
-    connection = sqlite3.connect(path)
-    connection.executescript(script)
-    connection.close()
-
-
-def test_a_database_of_another_program_is_refused_and_left_as_it_is(path: Path) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        "CREATE TABLE historian (x); INSERT INTO historian VALUES (1);",
+        "CREATE TABLE historian (x); PRAGMA application_id = 1234;",
+    ],
+)
+def test_a_database_of_another_program_is_refused_and_left_as_it_is(
+    path: Path, content: str
+) -> None:
     path.parent.mkdir()
-    run_sql(path, "CREATE TABLE historian (x); INSERT INTO historian VALUES (1);")
+    with closing(sqlite3.connect(path)) as other:
+        other.executescript(content)
     before = path.read_bytes()
 
     with pytest.raises(StoreError, match="is not a padwatch database"):
@@ -30,17 +35,11 @@ def test_a_database_of_another_program_is_refused_and_left_as_it_is(path: Path) 
     assert path.read_bytes() == before
 
 
-def test_a_database_marked_by_another_program_is_refused(path: Path) -> None:
-    path.parent.mkdir()
-    run_sql(path, "PRAGMA application_id = 1234; CREATE TABLE historian (x);")
-
-    with pytest.raises(StoreError, match="is not a padwatch database"):
-        SqliteStore(path)
-
-
-def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(path: Path) -> None:
+def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(
+    path: Path, execute: Execute
+) -> None:
     SqliteStore(path).close()
-    run_sql(path, f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
+    execute(f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
 
     said = f"schema {len(MIGRATIONS) + 1}, this padwatch knows up to {len(MIGRATIONS)}"
     with pytest.raises(StoreError, match=said):

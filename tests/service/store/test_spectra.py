@@ -1,6 +1,5 @@
 """Spectra over time: what is kept, how many, how exactly, and what becomes of damage."""
 
-import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rigs.store_fixtures import Build
+from rigs.store_fixtures import Build, Execute
 
 from core.arrays import FloatArray
 from core.assessment import Assessment
@@ -18,14 +17,9 @@ from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.cross_spectrum import CrossSpectrum
 from core.quality import Level, Reason, missing
-from service.origin import Origin
-from service.store import schema
-from service.store.schema import MIGRATIONS
 from service.store.spectra_codec import HIGHEST_UM, LOWEST_UM, decode, encode
 from service.store.spectra_port import Spectra, SpectraLimits, SpectraQuery, Tier, TierLimits
-from service.store.spectra_schema import SPECTRA_TABLES
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.migrating import migrate
 
 S = 1_000_000_000
 T0 = 1_767_225_600 * S
@@ -67,12 +61,6 @@ def read(store: SqliteStore, most: int = 1000, start_s: float = 0.0, end_s: floa
 
 def times_s(spectra: Spectra) -> list[float]:
     return [(each.time_ns - T0) / S for each in spectra.spectra]
-
-
-def n_in_tier(path: Path, tier: Tier) -> int:
-    with closing(sqlite3.connect(path)) as connection:
-        found = connection.execute("SELECT count(*) FROM spectrum WHERE tier = ?", (int(tier),))
-        return int(found.fetchone()[0])
 
 
 amplitudes = st.floats(0.0, 1e6, allow_subnormal=False)
@@ -128,7 +116,7 @@ def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(
 
 
 def test_old_spectra_thin_out_and_their_number_stays_bounded(
-    kept: SqliteStore, path: Path, found: Build
+    kept: SqliteStore, execute: Execute, found: Build
 ) -> None:
     for minute in range(60):
         kept.append([found(60.0 * minute), found(60.0 * minute, "LJB")], [])
@@ -138,7 +126,8 @@ def test_old_spectra_thin_out_and_their_number_stays_bounded(
     sparse, dense = [1200.0, 1800.0, 2400.0, 3000.0], [3300.0, 3360.0, 3420.0, 3480.0, 3540.0]
     assert times_s(spectra) == [*sparse, *dense]
     assert spectra.first_ns == T0 + 1200 * S
-    assert (n_in_tier(path, Tier.DENSE), n_in_tier(path, Tier.SPARSE)) == (10, 8)
+    per_tier = dict(execute("SELECT tier, count(*) FROM spectrum GROUP BY tier"))
+    assert per_tier == {Tier.DENSE: 10, Tier.SPARSE: 8}
 
 
 def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(
@@ -200,41 +189,15 @@ def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore, found: Build) ->
     ],
 )
 def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
-    kept: SqliteStore, path: Path, found: Build, damage: str
+    kept: SqliteStore, execute: Execute, found: Build, damage: str
 ) -> None:
     kept.append([found(0.0), found(60.0)], [])
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute(f"UPDATE spectrum SET {damage} WHERE time_ns = {T0 + 60 * S}")  # noqa: S608
-        connection.commit()
+    execute(f"UPDATE spectrum SET {damage} WHERE time_ns = {T0 + 60 * S}")  # noqa: S608
 
     spectra = read(kept)
 
     assert times_s(spectra) == [0.0]
     assert list(spectra.damaged_ns) == [T0 + 60 * S]
-
-
-def test_spectra_of_a_replay_are_in_a_database_of_its_own(
-    tmp_path: Path, kept: SqliteStore, found: Build
-) -> None:
-    with closing(SqliteStore(tmp_path / "replays" / "p.sqlite3", Origin.REPLAY)) as replay:
-        replay.append([found(0.0)], [])
-
-        assert len(read(replay).spectra) == 1
-    assert read(kept).spectra == []
-
-
-def test_an_older_database_gets_its_table_of_spectra(
-    path: Path, found: Build, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before = MIGRATIONS[: MIGRATIONS.index(SPECTRA_TABLES)]
-    path.parent.mkdir()
-    with monkeypatch.context() as earlier, closing(sqlite3.connect(path)) as connection:
-        earlier.setattr(schema, "MIGRATIONS", before)
-        migrate(connection, str(path))
-
-    with closing(SqliteStore(path)) as store:
-        store.append([found(0.0)], [])
-        assert len(read(store).spectra) == 1
 
 
 def test_a_result_without_a_spectrum_is_stored_without_one(

@@ -1,6 +1,5 @@
 """Reference vectors of 1× in the store: the newest of each state rules, none is changed."""
 
-import sqlite3
 from pathlib import Path
 
 import pytest
@@ -41,17 +40,6 @@ def test_the_newest_of_each_operating_state_rules_also_after_a_restart(path: Pat
     assert again.order1_references.history("U1", "UJB") == [newest, other, first]
     assert again.order1_references.history("U1", "TJB") == []
     again.close()
-
-
-@pytest.mark.parametrize(
-    "statement", ["UPDATE vector_reference SET author = 'x'", "DELETE FROM vector_reference"]
-)
-def test_what_was_set_is_kept(path: Path, statement: str) -> None:
-    store = SqliteStore(path)
-    store.order1_references.add(reference(1, FULL, 60.0))
-    store.close()
-    with sqlite3.connect(path) as other, pytest.raises(sqlite3.IntegrityError, match="kept"):
-        other.execute(statement)
 
 
 @pytest.mark.parametrize("vectors", ['{"shaft_x": [-1.0, null]}', '{"shaft_x": 7}'])

@@ -1,0 +1,98 @@
+"""Databases of earlier schemas are brought up to date, by one of those that open them, or not."""
+
+import sqlite3
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from harness.places import SqlitePlace
+from rigs.store_fixtures import Ask, Build
+
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.event import AlarmNews
+from core.alarms.life_cycle import advance
+from service.store import schema
+from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.port import StoreError
+from service.store.schema import MIGRATIONS
+from service.store.sqlite import SqliteStore
+from service.store.sqlite.migrating import migrate
+
+
+@pytest.fixture
+def filled(path: Path, assessment: Build) -> None:
+    """Make a database with one result."""
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(speed_rpm=92.3)], [])
+
+
+@pytest.mark.parametrize("n_before", [2, 3, len(MIGRATIONS) - 1])
+def test_an_older_database_keeps_its_data_and_gets_room_for_what_is_new(
+    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch, n_before: int
+) -> None:
+    path.parent.mkdir()
+    with monkeypatch.context() as at_that_time, closing(sqlite3.connect(path)) as old:
+        at_that_time.setattr(schema, "MIGRATIONS", MIGRATIONS[:n_before])
+        migrate(old, str(path))
+        old.execute(
+            "INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns)"
+            " VALUES ('U1', 1, 2, 3, 4)"
+        )
+        old.commit()
+    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X))
+    raised = AlarmNews(*advance(alarm, Condition(AlarmLevel.ALERT), 7, AlarmRule()))
+    reference = GapReference("U1", "UJB", 5, "A", (1.0, 2.0), None, ReferenceSource.GIVEN)
+
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(speed_rpm=92.3)], [], [raised])
+        store.add_reference(reference)
+
+        assert [gap.first_index for gap in store.gaps("U1", 0, 10)] == [2]
+        assert [found.identity for found in store.alarms()] == [alarm.identity]
+        assert store.references() == [reference]
+        newest = store.newest("U1", "UJB")
+    assert newest is not None
+    assert newest.readings["speed_rpm"].value == 92.3
+
+
+@pytest.mark.usefixtures("filled")
+def test_a_migration_that_fails_leaves_the_database_as_it_was(
+    path: Path, query: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = "CREATE TABLE more (x); DROP TABLE assessment; CREATE TABLE more (x);"
+    with monkeypatch.context() as next_release:
+        next_release.setattr(schema, "MIGRATIONS", (*MIGRATIONS, broken))
+        with pytest.raises(StoreError, match="table more already exists"):
+            SqliteStore(path)
+
+    with closing(SqliteStore(path)) as store:
+        assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
+
+
+@pytest.mark.usefixtures("filled")
+def test_a_migration_keeps_the_data_and_is_done_once(
+    path: Path, query: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(schema, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE more (x);"))
+
+    for _ in range(2):
+        with closing(SqliteStore(path)) as store:
+            assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
+    assert SqlitePlace(path).execute("SELECT count(*) FROM more") == [(0,)]
+
+
+def test_two_commands_that_upgrade_at_the_same_moment_find_the_newest_schema(
+    tmp_path: Path,
+) -> None:
+    for round_ in range(10):
+        path = tmp_path / f"{round_}.sqlite3"
+        with ThreadPoolExecutor(2) as pool:
+            versions = list(pool.map(_upgrade, [path, path]))
+        assert versions == [len(MIGRATIONS)] * 2, round_
+
+
+def _upgrade(path: Path) -> int:
+    with closing(sqlite3.connect(path, timeout=5.0, isolation_level=None)) as connection:
+        migrate(connection, str(path))
+        return int(connection.execute("PRAGMA user_version").fetchone()[0])
