@@ -16,10 +16,6 @@ async def entries(service: Any, **wanted: object) -> list[dict[str, Any]]:
     return found
 
 
-async def test_a_service_that_nobody_has_touched_has_an_empty_trail(service: Any) -> None:
-    assert await service.json(AUDIT) == {"entries": [], "next_before": None, "head_error": None}
-
-
 async def test_a_comment_on_an_alarm_is_told_with_its_peer(service: Any) -> None:
     service.alarms.link("U1", False, "no route")
     service.clock.s += 60.0
@@ -56,10 +52,10 @@ async def test_refused_actions_are_told_with_the_reason(service: Any) -> None:
     assert told[0]["peer"] == "127.0.0.1"
 
 
-async def test_reading_is_not_told_however_wrong_it_is(service: Any) -> None:
+async def test_reading_is_not_recorded_however_wrong_it_is(service: Any) -> None:
     await service.problem(AUDIT, 422, limit=0)
     await service.problem("/api/v1/units/U9", 404)
-    assert await entries(service) == []
+    assert await service.json(AUDIT) == {"entries": [], "next_before": None, "head_error": None}
 
 
 async def test_a_flood_of_refusals_is_counted_and_not_written_one_by_one(service: Any) -> None:
@@ -79,8 +75,10 @@ async def test_a_flood_of_refusals_is_counted_and_not_written_one_by_one(service
     assert later[0]["after"] == {"status": 422, "n_refused_more": 17}
 
 
-async def test_pages_lead_from_the_newest_to_the_oldest(service: Any) -> None:
-    for _ in range(5):
+async def test_pages_lead_from_the_newest_to_the_oldest_of_what_was_chosen(service: Any) -> None:
+    await service.client.post(UNKNOWN, json={"actor": ""})
+    await require_choice(service)
+    for _ in range(4):
         await service.client.post(UNKNOWN, json={"actor": ""})
     numbers, before = [], None
     while True:
@@ -93,8 +91,8 @@ async def test_pages_lead_from_the_newest_to_the_oldest(service: Any) -> None:
     assert numbers == [5, 4, 3, 2, 1]
 
 
-async def test_entries_are_chosen_by_actor_action_object_and_time(service: Any) -> None:
-    await service.client.post(UNKNOWN, json={"actor": ""})
+async def require_choice(service: Any) -> None:
+    """The only entry is found by its actor, action, object and time, and not by others."""
     [told] = await entries(service)
     for wanted in (
         {"actor": ""},

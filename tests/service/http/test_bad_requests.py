@@ -58,16 +58,6 @@ async def test_a_bad_request_is_refused(start, request_: bytes, status: int, cap
     assert not caplog.records
 
 
-@pytest.mark.parametrize("host", ["localhost", "127.0.0.1:8080", "[::1]:80", "LOCALHOST.:1", "Own"])
-async def test_the_service_is_known_by_its_own_names(start, host: str) -> None:
-    running = await start(hosts=["own"])
-    client = await running.client()
-
-    await client.send(f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
-
-    assert await client.status() == 200
-
-
 async def test_a_long_header_in_small_pieces_is_refused(start) -> None:
     running = await start()
     client = await running.client()

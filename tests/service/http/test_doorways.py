@@ -16,32 +16,23 @@ from service.http.tls import CertificateError, server_tls
 from service.http.trusted_proxy import TrustedProxy
 
 
-@pytest.fixture
-def pair(tmp_path: Path) -> tuple[Path, Path]:
-    files = tmp_path / "a.crt", tmp_path / "a.key"
-    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"]
-    out = ["-nodes", "-subj", "/CN=a", "-out", str(files[0]), "-keyout", str(files[1])]
-    subprocess.run([*command, *out], check=True, capture_output=True)
-    return files
-
-
-def test_nothing_older_than_tls_1_2_is_spoken(pair: tuple[Path, Path]) -> None:
-    assert server_tls(*pair).minimum_version is ssl.TLSVersion.TLSv1_2
+def test_nothing_older_than_tls_1_2_is_spoken(certificate: tuple[Path, Path]) -> None:
+    assert server_tls(*certificate).minimum_version is ssl.TLSVersion.TLSv1_2
 
 
 def test_a_certificate_that_cannot_be_used_is_refused_in_one_line(
-    pair: tuple[Path, Path], tmp_path: Path
+    certificate: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    certificate, key = pair
+    public, key = certificate
     locked = tmp_path / "locked.key"
     lock = ["openssl", "ec", "-in", str(key), "-aes128", "-passout", "pass:secret"]
     subprocess.run([*lock, "-out", str(locked)], check=True, capture_output=True)
     for wrong in (
         (tmp_path / "none.crt", key),
-        (certificate, tmp_path),
-        (key, certificate),
-        (certificate, certificate),
-        (certificate, locked),
+        (public, tmp_path),
+        (key, public),
+        (public, public),
+        (public, locked),
     ):
         with pytest.raises(CertificateError, match=r"^service\.tls: .+") as refused:
             server_tls(*wrong)

@@ -3,10 +3,10 @@
 import asyncio
 import socket
 import ssl
-import subprocess
 from pathlib import Path
 
 import pytest
+from rigs.tiers import covering
 from starlette.responses import PlainTextResponse
 
 from service.http.config import GuardedConfig
@@ -18,16 +18,14 @@ PATIENCE_S = 30.0
 
 
 @pytest.fixture
-def tls(tmp_path: Path) -> ssl.SSLContext:
-    pair = tmp_path / "a.crt", tmp_path / "a.key"
-    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"]
-    out = ["-nodes", "-subj", "/CN=a", "-out", str(pair[0]), "-keyout", str(pair[1])]
-    subprocess.run([*command, *out], check=True, capture_output=True)
-    return server_tls(*pair)
+def tls(certificate: tuple[Path, Path]) -> ssl.SSLContext:
+    return server_tls(*certificate)
 
 
-@pytest.mark.parametrize("said", [b"", b"\x16\x03\x01\x02\x00", b"GET / HTTP/1.1\r\n\r\n"])
-@pytest.mark.parametrize("is_stopped", [False, True])
+SENT = [b"", b"\x16\x03\x01\x02\x00", b"GET / HTTP/1.1\r\n\r\n"]
+
+
+@pytest.mark.parametrize(("said", "is_stopped"), covering(SENT, [False, True]))
 async def test_a_handshake_that_never_ends_is_given_up(
     tls: ssl.SSLContext, said: bytes, is_stopped: bool
 ) -> None:

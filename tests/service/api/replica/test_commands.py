@@ -43,6 +43,24 @@ async def post(pair: Any, action: str, **body: object) -> httpx2.Response:
     return answer
 
 
+def ask_for_a_comment(pair: Any) -> Command:
+    """Ask as a replica does, without waiting for an answer."""
+    asking = Asking(pair.service.store, pair.replica.alarms, pair.service.clock)
+    command = asking._command("U1", OnAlarm(LINK, Comment("anna", "seen")), "anna")
+    pair.service.store.commands.ask(command)
+    return command
+
+
+async def kill_after_commit(pair: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kill the process that analyses before it answers a command, and let it look again."""
+    with monkeypatch.context() as killed:
+        killed.setattr(pair.service.store.commands, "answer", _killed_in)
+        with pytest.raises(KeyboardInterrupt):
+            await pair.carrying_out.look()
+    await pair.carrying_out.look()
+    await pair.carrying_out.look()
+
+
 def changes(pair: Any) -> list[str]:
     events = pair.service.store.alarm_events(AlarmQuery(alarm=LINK))
     return [stored.event.change.value for stored in reversed(events)]
@@ -59,22 +77,16 @@ async def test_an_acknowledgement_reaches_the_engine_and_the_disk(answered: Any)
     assert (event.event.change.value, event.event.actor) == ("acknowledged", "A. Name")
 
 
-async def test_an_acknowledgement_of_an_older_occurrence_swallows_no_newer_one(
-    answered: Any,
-) -> None:
+async def test_what_a_replica_asks_wrongly_is_refused_as_elsewhere(answered: Any) -> None:
     await raise_alarm(answered)
     answer = await post(answered, "acknowledge", occurrence=7)
 
     assert answer.status_code == 409
     assert "look at it" in answer.json()["detail"]
     assert not answered.service.alarms.alarm(LINK).is_acknowledged
-
-
-async def test_an_unknown_alarm_is_unknown_to_a_replica_too(answered: Any) -> None:
     path = "/api/v1/alarms/U1:nothing:link_lost/acknowledge"
-    answer = await answered.client.post(path, json={**ANNA, "occurrence": 1})
-
-    assert answer.status_code == 404
+    unknown = await answered.client.post(path, json={**ANNA, "occurrence": 1})
+    assert unknown.status_code == 404
 
 
 async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair: Any) -> None:
@@ -109,10 +121,7 @@ async def test_a_process_killed_before_its_commit_leaves_the_command_to_the_next
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await raise_alarm(pair)
-    command = Asking(pair.service.store, pair.replica.alarms, pair.service.clock)._command(
-        "U1", OnAlarm(LINK, Comment("anna", "seen")), "anna"
-    )
-    pair.service.store.commands.ask(command)
+    command = ask_for_a_comment(pair)
     with monkeypatch.context() as killed:
         killed.setattr(pair.service.alarms, "operate", _killed_in)
         with pytest.raises(KeyboardInterrupt):
@@ -132,40 +141,24 @@ async def test_a_process_killed_after_its_commit_is_not_followed_by_a_second_tim
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await raise_alarm(pair)
-    store = pair.service.store
-    command = Asking(store, pair.replica.alarms, pair.service.clock)._command(
-        "U1", OnAlarm(LINK, Comment("anna", "seen")), "anna"
-    )
-    store.commands.ask(command)
-    with monkeypatch.context() as killed:
-        killed.setattr(store.commands, "answer", _killed_in)
-        with pytest.raises(KeyboardInterrupt):
-            await pair.carrying_out.look()
+    command = ask_for_a_comment(pair)
+    await kill_after_commit(pair, monkeypatch)
 
-    await pair.carrying_out.look()
-    await pair.carrying_out.look()
     assert changes(pair).count("commented") == 1
-    assert store.commands.look(command.id).state is CommandState.DONE
+    assert pair.service.store.commands.look(command.id).state is CommandState.DONE
 
 
+@pytest.mark.long
 @pytest.mark.planted("command answered apart from what it did")
 async def test_an_answer_apart_from_the_event_would_be_noticed(
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same with a planted bug: a command that is answered on its own comes twice."""
     await raise_alarm(pair)
-    store = pair.service.store
-    command = Asking(store, pair.replica.alarms, pair.service.clock)._command(
-        "U1", OnAlarm(LINK, Comment("anna", "seen")), "anna"
-    )
-    store.commands.ask(command)
+    ask_for_a_comment(pair)
     monkeypatch.setattr("service.store.alarms.answer_command", lambda *_: None)
-    with monkeypatch.context() as killed:
-        killed.setattr(store.commands, "answer", _killed_in)
-        with pytest.raises(KeyboardInterrupt):
-            await pair.carrying_out.look()
+    await kill_after_commit(pair, monkeypatch)
 
-    await pair.carrying_out.look()
     assert changes(pair).count("commented") == 2
 
 
