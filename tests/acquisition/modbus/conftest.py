@@ -2,16 +2,13 @@
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 
 import pytest
 from rigs.bench import Bench
 from rigs.hostile_modbus import HostileLine, HostileServer
-from rigs.polled import (
-    CALIBRATION,
-    Follower,
-    device_of,
-    map_of,
-)
+from rigs.polled import CALIBRATION, Follower, device_of, map_of
+from rigs.queues import queue_plant
 
 from acquisition.clock import SystemClock
 from acquisition.daq.map_device import MapDevice
@@ -24,9 +21,7 @@ from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
-from acquisition.registers.register_map import (
-    RegisterMap,
-)
+from acquisition.registers.register_map import RegisterMap
 from core.blocks import SampleBlock
 
 
@@ -135,6 +130,12 @@ def plant(stepped_clock) -> Callable:
             yield source, device, server, clock
 
     return build
+
+
+@pytest.fixture
+def queues(counting_feed, counts_calibration, stepped_clock) -> Callable:
+    """Serves queues of a layout, on a stepped clock; other settings as keywords."""
+    return partial(queue_plant, counting_feed(), counts_calibration(), stepped_clock)
 
 
 @pytest.fixture

@@ -9,12 +9,7 @@ from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
-from acquisition.modbus.transport import (
-    ConnectionUse,
-    LinkSettings,
-    SerialTransport,
-    TcpTransport,
-)
+from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
 from acquisition.registers.cells import Cell
 from acquisition.registers.register_map import Signature
 

@@ -1,30 +1,14 @@
 """A link that is lost while a queue is emptied: what was read is gone there, and is kept here."""
 
-from collections.abc import Callable
-from functools import partial
-
 import pytest
-from rigs.queues import (
-    INTERLEAVED,
-    PER_CHANNEL,
-    STEP,
-    UNCOUNTED,
-    assert_right,
-    gaps,
-    queue_plant,
-    up_to,
-)
+from rigs.queues import INTERLEAVED, PER_CHANNEL, STEP, UNCOUNTED, assert_right, gaps, up_to
 
 from acquisition.errors import LinkError
 from core.blocks import SampleBlock
 
+BOTH_LAYOUTS = pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL])
 N_READ = 7
 """Readings of each queue before the link is lost."""
-
-
-@pytest.fixture
-def plant(counting_feed, counts_calibration, stepped_clock) -> Callable:
-    return partial(queue_plant, counting_feed(), counts_calibration(), stepped_clock)
 
 
 def lose_the_link_after(p, n_answers: int) -> None:
@@ -53,9 +37,11 @@ async def until_lost(stream) -> list[SampleBlock]:
     return blocks
 
 
-@pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL], ids=["interleaved", "per_channel"])
-async def test_a_lost_link_loses_no_more_than_the_answer_that_was_on_its_way(plant, layout) -> None:
-    async with plant(layout) as p:
+@BOTH_LAYOUTS
+async def test_a_lost_link_loses_no_more_than_the_answer_that_was_on_its_way(
+    queues, layout
+) -> None:
+    async with queues(layout) as p:
         async with p.source.connect() as stream:
             first = await up_to(stream, STEP)
             p.run(10)
@@ -69,15 +55,15 @@ async def test_a_lost_link_loses_no_more_than_the_answer_that_was_on_its_way(pla
     assert_right(blocks)
 
 
-async def test_samples_that_are_not_counted_are_not_kept_where_some_may_be_missing(plant) -> None:
-    async with plant(UNCOUNTED) as p, p.source.connect() as stream:
+async def test_samples_that_are_not_counted_are_not_kept_where_some_may_be_missing(queues) -> None:
+    async with queues(UNCOUNTED) as p, p.source.connect() as stream:
         p.run(10)
         lose_the_link_after(p, N_READ)
         assert await until_lost(stream) == []
 
 
-async def test_what_was_read_over_too_slow_a_link_is_kept_too(plant) -> None:
-    async with plant(depth_samples=100_000) as p, p.source.connect() as stream:
+async def test_what_was_read_over_too_slow_a_link_is_kept_too(queues) -> None:
+    async with queues(depth_samples=100_000) as p, p.source.connect() as stream:
         first = await up_to(stream, STEP)
         answer = p.device.read_fifo
 

@@ -1,21 +1,9 @@
 """Samples from queues: each one once, losses exact, restarts and repetitions told."""
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 import pytest
-from rigs.queues import (
-    INTERLEAVED,
-    KEPT,
-    PER_CHANNEL,
-    STEP,
-    UNCOUNTED,
-    assert_right,
-    gaps,
-    queue_plant,
-    up_to,
-)
+from rigs.queues import INTERLEAVED, KEPT, PER_CHANNEL, STEP, UNCOUNTED, assert_right, gaps, up_to
+from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
@@ -23,15 +11,12 @@ from acquisition.modbus.transport import TcpTransport
 from acquisition.registers.fifo_layout import FifoLayout
 from core.blocks import SampleBlock
 
-
-@pytest.fixture
-def plant(counting_feed, counts_calibration, stepped_clock) -> Callable:
-    return partial(queue_plant, counting_feed(), counts_calibration(), stepped_clock)
+BOTH_LAYOUTS = pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL])
 
 
-@pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL], ids=["interleaved", "per_channel"])
-async def test_the_counter_wraps_without_a_gap(plant, layout) -> None:
-    async with plant(layout, first_counter=65_400) as p, p.source.connect() as stream:
+@BOTH_LAYOUTS
+async def test_the_counter_wraps_without_a_gap(queues, layout):
+    async with queues(layout, first_counter=65_400) as p, p.source.connect() as stream:
         p.run(40)
         blocks = await up_to(stream, 65_400 + 40 * STEP)
 
@@ -40,13 +25,14 @@ async def test_the_counter_wraps_without_a_gap(plant, layout) -> None:
     assert_right(blocks, offset=-65_400)
 
 
-@pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL], ids=["interleaved", "per_channel"])
-async def test_a_thousand_losses_are_counted_exactly(plant, layout) -> None:
+@BOTH_LAYOUTS
+@pytest.mark.parametrize("n_rounds", fast_and_long(10, 100))
+async def test_ten_losses_in_each_round_are_counted_exactly(queues, layout, n_rounds) -> None:
     rng = np.random.default_rng(8)
-    async with plant(layout, step=5) as p, p.source.connect() as stream:
+    async with queues(layout, step=5) as p, p.source.connect() as stream:
         blocks: list[SampleBlock] = []
         lost = 0
-        for _ in range(100):
+        for _ in range(n_rounds):
             for _ in range(10):
                 n_dropped = int(rng.integers(1, 4))
                 p.device.spoil("drop", n_dropped)
@@ -57,13 +43,13 @@ async def test_a_thousand_losses_are_counted_exactly(plant, layout) -> None:
         n_taken = sum(b.n_samples for b in blocks)
 
     assert sum(n for _, n in gaps(blocks)) + n_taken == blocks[-1].stop_index
-    assert len(gaps(blocks)) >= 990
+    assert len(gaps(blocks)) >= 10 * n_rounds - 10
     assert all(n % 5 == 0 for _, n in gaps(blocks))
     assert_right(blocks)
 
 
-async def test_a_loss_longer_than_the_counter_is_exact_by_the_clock(plant) -> None:
-    async with plant() as p:
+async def test_a_loss_longer_than_the_counter_is_exact_by_the_clock(queues) -> None:
+    async with queues() as p:
         async with p.source.connect() as stream:
             p.run(1)
             before = (await up_to(stream, 100))[-1]
@@ -77,8 +63,8 @@ async def test_a_loss_longer_than_the_counter_is_exact_by_the_clock(plant) -> No
     assert_right([after])
 
 
-async def test_a_restart_is_a_new_epoch(plant) -> None:
-    async with plant(first_counter=20_000) as p, p.source.connect() as stream:
+async def test_a_restart_is_a_new_epoch(queues) -> None:
+    async with queues(first_counter=20_000) as p, p.source.connect() as stream:
         p.run(4)
         before = await up_to(stream, 20_000 + 5 * STEP)
         p.server.inject("reset_counter")
@@ -89,8 +75,8 @@ async def test_a_restart_is_a_new_epoch(plant) -> None:
     assert after[0].first_index == 0
 
 
-async def test_an_overflow_is_an_exact_gap(plant) -> None:
-    async with plant(depth_samples=200) as p, p.source.connect() as stream:
+async def test_an_overflow_is_an_exact_gap(queues) -> None:
+    async with queues(depth_samples=200) as p, p.source.connect() as stream:
         first = await anext(stream)
         p.run(10)
         rest = await up_to(stream, 550)
@@ -100,8 +86,8 @@ async def test_an_overflow_is_an_exact_gap(plant) -> None:
     assert_right([first, *rest])
 
 
-async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(plant) -> None:
-    async with plant(KEPT, step=5) as p, p.source.connect() as stream:
+async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(queues) -> None:
+    async with queues(KEPT, step=5) as p, p.source.connect() as stream:
         blocks = []
         for n in range(40):
             p.run(1)
@@ -115,8 +101,8 @@ async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(plant)
     assert_right(blocks)
 
 
-async def test_times_are_even_and_rise_with_the_index(plant) -> None:
-    async with plant() as p, p.source.connect() as stream:
+async def test_times_are_even_and_rise_with_the_index(queues) -> None:
+    async with queues() as p, p.source.connect() as stream:
         blocks = []
         for n in range(1, 400):
             p.run(1)
@@ -129,8 +115,8 @@ async def test_times_are_even_and_rise_with_the_index(plant) -> None:
     assert blocks[-1].clock.offset_s is None
 
 
-async def test_without_a_counter_a_loss_ends_the_epoch(plant) -> None:
-    async with plant(UNCOUNTED) as p, p.source.connect() as stream:
+async def test_without_a_counter_a_loss_ends_the_epoch(queues) -> None:
+    async with queues(UNCOUNTED) as p, p.source.connect() as stream:
         p.run(1)
         first = await anext(stream)
         for _ in range(30):
@@ -150,8 +136,8 @@ async def test_without_a_counter_a_loss_ends_the_epoch(plant) -> None:
         assert (lost[0] == 0.0) == (block.epoch == first.epoch)
 
 
-async def test_without_a_counter_what_waited_for_a_reader_is_thrown_away(plant) -> None:
-    async with plant(UNCOUNTED) as p:
+async def test_without_a_counter_what_waited_for_a_reader_is_thrown_away(queues) -> None:
+    async with queues(UNCOUNTED) as p:
         async with p.source.connect() as stream:
             p.run(1)
             first = await anext(stream)
@@ -164,8 +150,8 @@ async def test_without_a_counter_what_waited_for_a_reader_is_thrown_away(plant) 
     assert after.samples[0, 0] >= 22 * STEP
 
 
-async def test_a_device_that_gives_nothing_new_is_not_connected(plant) -> None:
-    async with plant(settings={"poll_period_s": 0.5}) as p:
+async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
+    async with queues(settings={"poll_period_s": 0.5}) as p:
         async with p.source.connect() as stream:
             await anext(stream)
             with pytest.raises(LinkError, match="data stand still"):
@@ -175,8 +161,8 @@ async def test_a_device_that_gives_nothing_new_is_not_connected(plant) -> None:
             assert (await anext(stream)).first_index == STEP
 
 
-async def test_a_link_slower_than_the_device_is_told(plant, monkeypatch) -> None:
-    async with plant(depth_samples=100_000) as p, p.source.connect() as stream:
+async def test_a_link_slower_than_the_device_is_told(queues, monkeypatch) -> None:
+    async with queues(depth_samples=100_000) as p, p.source.connect() as stream:
         answer = p.device.read_fifo
 
         def slowly(address: int):
@@ -195,8 +181,8 @@ async def test_a_link_slower_than_the_device_is_told(plant, monkeypatch) -> None
         ("busy", LinkError, "busy"),
     ],
 )
-async def test_a_refused_reading_is_never_repeated(plant, fault, error, said) -> None:
-    async with plant() as p, p.source.connect() as stream:
+async def test_a_refused_reading_is_never_repeated(queues, fault, error, said) -> None:
+    async with queues() as p, p.source.connect() as stream:
         await anext(stream)
         n_before = p.server.function_codes[0x18]
         p.server.inject(fault)
@@ -206,8 +192,8 @@ async def test_a_refused_reading_is_never_repeated(plant, fault, error, said) ->
         assert set(p.server.function_codes) == {0x18}
 
 
-async def test_a_reading_that_holds_no_whole_records_is_refused(plant) -> None:
-    async with plant(step=7) as p:
+async def test_a_reading_that_holds_no_whole_records_is_refused(queues) -> None:
+    async with queues(step=7) as p:
         p.device._layout = UNCOUNTED
         with pytest.raises(LinkError, match="14 registers holds no whole records of 3"):
             async with p.source.connect() as stream:
@@ -221,8 +207,8 @@ def test_a_source_needs_a_queue_of_its_channels(counts_calibration, stepped_cloc
         FifoSource(settings, three, counts_calibration(), stepped_clock)
 
 
-async def test_a_queue_that_is_not_there_can_never_work(plant) -> None:
-    async with plant() as p:
+async def test_a_queue_that_is_not_there_can_never_work(queues) -> None:
+    async with queues() as p:
         p.source._layout = FifoLayout(addresses=(2000,), n_channels=2)
         with pytest.raises(ConfigError, match="illegal address"):
             async with p.source.connect() as stream:

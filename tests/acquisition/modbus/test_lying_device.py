@@ -20,10 +20,6 @@ def sent(make):
     return lie
 
 
-async def closed_at_once(request, reply, writer):  # noqa: ARG001
-    writer.close()
-
-
 @pytest.mark.parametrize(
     ("code", "error"),
     [(1, ConfigError), (2, ConfigError), (3, ConfigError)]
@@ -51,29 +47,6 @@ async def test_a_reply_in_slices_of_one_byte_reads_the_same(hostile, device, sou
         blocks = await read_until(stream, 150)
     samples = np.concatenate([block.samples[0] for block in blocks])
     np.testing.assert_array_equal(samples, np.arange(50, 150))
-
-
-async def test_a_device_that_hangs_up_is_noticed_before_the_time_out(hostile, source_at):
-    hostile.lie = closed_at_once
-    with pytest.raises(LinkError, match="the device closed the connection"):
-        async with source_at(hostile.port).connect():
-            pass
-
-
-async def unanswered(request, reply, writer):
-    pass
-
-
-async def test_after_a_missed_reply_the_link_is_closed_so_that_it_meets_nobody(hostile, link_to):
-    link = link_to(hostile.port, timeout_s=0.1)
-    await link.open()
-    hostile.lie = unanswered
-    with pytest.raises(LinkError):
-        await link.read(0, 16)
-    hostile.lie = None
-    with pytest.raises(LinkError, match="closed"):
-        await link.read(0, 16)
-    assert len(hostile.requests) == 1
 
 
 async def test_a_late_reply_that_a_gateway_passes_on_to_the_next_connection_is_nobodys(hostile):

@@ -3,11 +3,7 @@
 from rigs.polled import map_of, take
 
 from acquisition.registers.cells import Cell
-from acquisition.registers.register_map import (
-    FullScale,
-    MapValue,
-    RegisterMap,
-)
+from acquisition.registers.register_map import FullScale, MapValue, RegisterMap
 from core.quality import GOOD, Level, Reason
 
 

@@ -7,9 +7,7 @@ from rigs.polled import map_of, take
 from acquisition.errors import ConfigError, LinkError
 from acquisition.registers.cells import Cell, NumberType
 from acquisition.registers.device_time import EpochTime
-from acquisition.registers.register_map import (
-    Signature,
-)
+from acquisition.registers.register_map import Signature
 from core.quality import GOOD
 
 

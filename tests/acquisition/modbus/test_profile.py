@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.profile import (
-    RingHeader,
-    decode_header,
-    decode_progress,
-    encode_header,
-)
+from acquisition.modbus.profile import RingHeader, decode_header, decode_progress, encode_header
 from acquisition.modbus.ring_layout import RingLayout
 from acquisition.modbus.slot import Slot, decode_slot, decode_slow, encode_slot, encode_slow
 

@@ -4,8 +4,6 @@ import asyncio
 
 import pytest
 
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import RtuRingServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.transport import SerialTransport
 
@@ -52,17 +50,6 @@ async def test_a_line_is_only_used_when_it_is_silent(hostile_line, link_on):
     link.close()
 
 
-async def test_a_line_that_is_taken_away_is_noticed_before_the_time_out(hostile_line, link_on):
-    async def unplug(request, reply, line):  # noqa: ARG001
-        line.close()
-
-    link = link_on(hostile_line.path, timeout_s=0.2)
-    await link.open()
-    hostile_line.lie = unplug
-    with pytest.raises(LinkError, match="closed the connection"):
-        await link.read(0, 1)
-
-
 async def test_a_port_that_is_not_there_is_a_link_error_that_names_it(link_on):
     with pytest.raises(LinkError, match="/dev/nowhere: No such file or directory"):
         await link_on("/dev/nowhere").open()
@@ -96,18 +83,3 @@ def test_a_character_is_as_long_as_its_bits():
     assert line.frame_gap_s == pytest.approx(3.5 * 11 / 9600)
     fast = SerialTransport(device="/dev/ttyUSB0", baudrate=115_200, parity="none")
     assert fast.frame_gap_s == 0.00175
-
-
-async def test_a_cut_line_comes_back_at_the_same_path(counting_feed, link_on, tmp_path):
-    device = RingDevice(counting_feed())
-    async with RtuRingServer(device, link=tmp_path / "daq") as server:
-        assert server.endpoint == {"device": str(tmp_path / "daq"), "parity": "none"}
-        link = link_on(tmp_path / "daq", timeout_s=0.05)
-        await link.open()
-        server.inject("cut")
-        with pytest.raises(LinkError):
-            await link.read(0, 16)
-        await link.open()
-        assert len(await link.read(0, 16)) == 32
-        link.close()
-    assert not (tmp_path / "daq").is_symlink()

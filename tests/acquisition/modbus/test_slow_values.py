@@ -199,14 +199,6 @@ async def test_a_device_whose_values_stand_still_has_none(plant, stepped_clock) 
     assert "stand still" in slow.trouble or "refused" in slow.trouble
 
 
-async def test_leaving_leaves_no_task_behind(plant) -> None:
-    async with plant() as (source, *_):
-        before = asyncio.all_tasks()
-        async with source.connect() as stream:
-            await anext(stream)
-        assert {t for t in asyncio.all_tasks() - before if "poll slow" in t.get_name()} == set()
-
-
 async def test_a_bug_in_the_background_is_not_swallowed(plant, monkeypatch) -> None:
     async with plant() as (source, slow, *_):
         monkeypatch.setattr(slow, "_readings", lambda _: 1 // 0)

@@ -93,25 +93,34 @@ def test_any_map_finds_each_of_its_numbers(cells: list[tuple[str, str, int, int]
     assert set(reading.states) == {ValueState.OK}
 
 
+SKF = MapValue(
+    id="v",
+    cell=Cell(address=609, type=NumberType.INT16),
+    scale_register=ScaleRegister(cell=Cell(address=610, type=NumberType.INT16)),
+)
+
+
 def test_an_skf_value_is_its_mantissa_times_its_scale_register() -> None:
-    value = MapValue(
-        id="v",
-        cell=Cell(address=609, type=NumberType.INT16),
-        scale_register=ScaleRegister(cell=Cell(address=610, type=NumberType.INT16)),
-    )
     settings = {"base": 1, "together": (Together(address=609, count=2),)}
 
-    found, state = one(value, words(-16384, 200), **settings)
+    found, state = one(SKF, words(-16384, 200), **settings)
 
     assert found == pytest.approx(-16384 / 32767 * 200)
     assert state is ValueState.OK
 
 
 def test_a_scale_register_of_zero_gives_no_value_instead_of_zero() -> None:
-    scale = ScaleRegister(cell=Cell(address=610, type=NumberType.INT16))
-    value = MapValue(id="v", cell=Cell(address=609, type=NumberType.INT16), scale_register=scale)
+    assert one(SKF, words(12345, 0))[1] is ValueState.INVALID
 
-    assert one(value, words(12345, 0))[1] is ValueState.INVALID
+
+VM600 = MapValue(
+    id="v",
+    cell=Cell(address=1, function=4),
+    full_scale=FullScale(
+        minimum=Cell(address=100, function=4, type=NumberType.FLOAT32),
+        maximum=Cell(address=102, function=4, type=NumberType.FLOAT32),
+    ),
+)
 
 
 @pytest.mark.parametrize(
@@ -124,27 +133,13 @@ def test_a_scale_register_of_zero_gives_no_value_instead_of_zero() -> None:
     ],
 )
 def test_a_vm600_reading_at_the_end_of_its_scale_is_clipped(raw, expected, state) -> None:
-    low = Cell(address=100, function=4, type=NumberType.FLOAT32)
-    high = Cell(address=102, function=4, type=NumberType.FLOAT32)
-    value = MapValue(
-        id="v",
-        cell=Cell(address=1, function=4),
-        full_scale=FullScale(minimum=low, maximum=high),
-    )
-
-    found = one(value, words(raw) + struct.pack(">ff", -10.0, 50.0))
+    found = one(VM600, words(raw) + struct.pack(">ff", -10.0, 50.0))
 
     assert found == (pytest.approx(expected), state)
 
 
 def test_a_vm600_rack_that_gives_no_range_gives_no_value() -> None:
-    low = Cell(address=100, function=4, type=NumberType.FLOAT32)
-    high = Cell(address=102, function=4, type=NumberType.FLOAT32)
-    value = MapValue(
-        id="v", cell=Cell(address=1, function=4), full_scale=FullScale(minimum=low, maximum=high)
-    )
-
-    assert one(value, words(7, 0, 0, 0, 0))[1] is ValueState.INVALID
+    assert one(VM600, words(7, 0, 0, 0, 0))[1] is ValueState.INVALID
 
 
 @pytest.mark.parametrize(

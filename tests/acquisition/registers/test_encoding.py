@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.registers.cells import ByteOrder, Cell, NumberType
-from acquisition.registers.decoding import MapDecoder, ValueState
+from acquisition.registers.decoding import MapDecoder, MapReading, ValueState
 from acquisition.registers.device_time import CalendarTime, EpochTime
 from acquisition.registers.encoding import RegisterImage
 from acquisition.registers.register_map import (
@@ -21,14 +21,23 @@ from acquisition.registers.register_map import (
 )
 
 
-def content_of(decoder: MapDecoder, image: RegisterImage) -> bytes:
-    parts = []
-    for request in decoder.plan.requests:
-        read = image.read_bits if request.function in (1, 2) else image.read_registers
-        part = read(request.function, request.start, request.count)
-        assert part is not None
-        parts.append(part)
-    return b"".join(parts)
+class Device:
+    """A device's registers, and what is read of them by the same map."""
+
+    def __init__(self, *values: MapValue, ranges=None, **settings) -> None:
+        registers = RegisterMap(values=values, **settings)
+        self.decoder, self.image = MapDecoder(registers), RegisterImage(registers, ranges or {})
+
+    def content(self) -> bytes:
+        parts = []
+        for request in self.decoder.plan.requests:
+            image = self.image
+            read = image.read_bits if request.function in (1, 2) else image.read_registers
+            parts.append(read(request.function, request.start, request.count))
+        return b"".join(parts)
+
+    def read(self) -> MapReading:
+        return self.decoder.read(self.content())
 
 
 @given(
@@ -48,15 +57,14 @@ def test_a_value_comes_back_within_the_resolution_of_its_registers(
         offset=offset,
         flags=(FlagCheck(cell=Cell(address=9), mask=1, set_means=Meaning.BAD),),
     )
-    registers = RegisterMap(values=(value,))
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
+    device = Device(value)
     wanted = (number - offset) / scale
     if type_.value.startswith("u"):
         wanted = abs(wanted)
         number = wanted * scale + offset
 
-    image.put_value(value, number)
-    reading = decoder.read(content_of(decoder, image))
+    device.image.put_value(value, number)
+    reading = device.read()
 
     resolution = 1e-5 if type_.value.startswith("float") else 0.5 * abs(scale) + 1e-9
     assert reading.values[0] == pytest.approx(number, abs=resolution)
@@ -69,14 +77,13 @@ def test_a_scale_register_is_as_large_as_the_value_needs(number: float) -> None:
         cell=Cell(address=609, type=NumberType.INT16),
         scale_register=ScaleRegister(cell=Cell(address=610, type=NumberType.INT16)),
     )
-    registers = RegisterMap(values=(value,), base=1, together=(Together(address=609, count=14),))
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
-    image.put_value(value, number)
+    device = Device(value, base=1, together=(Together(address=609, count=14),))
+    device.image.put_value(value, number)
 
-    reading = decoder.read(content_of(decoder, image))
+    reading = device.read()
 
     assert reading.values[0] == pytest.approx(number, abs=0.05)
-    assert len(content_of(decoder, image)) == 28
+    assert len(device.content()) == 28
 
 
 @pytest.mark.parametrize(
@@ -89,11 +96,10 @@ def test_a_range_is_told_by_the_device_and_clips(number: float, state: ValueStat
         cell=Cell(address=1, function=4),
         full_scale=FullScale(minimum=ends[0], maximum=ends[1]),
     )
-    registers = RegisterMap(values=(value,))
-    decoder, image = MapDecoder(registers), RegisterImage(registers, {"v": (-100.0, 100.0)})
-    image.put_value(value, number)
+    device = Device(value, ranges={"v": (-100.0, 100.0)})
+    device.image.put_value(value, number)
 
-    reading = decoder.read(content_of(decoder, image))
+    reading = device.read()
 
     assert reading.states[0] == state
     assert reading.values[0] == pytest.approx(max(-100.0, min(number, 100.0)), abs=0.002)
@@ -105,40 +111,23 @@ FLAGS = (
     {"ok_values": (1,), "clipped_values": (2,)},
     {"mask": 0xFF00, "ok_values": (0, 1, 2)},
 )
-
-
-@pytest.mark.parametrize("flag", FLAGS)
-@pytest.mark.parametrize("order", [ByteOrder.ABCD, ByteOrder.DCBA])
-@pytest.mark.parametrize("good", [True, False])
-def test_a_flag_says_what_it_is_told_to_say(flag, order, good: bool) -> None:
-    check = FlagCheck(cell=Cell(address=1, byte_order=order), **flag)
-    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
-    registers = RegisterMap(values=(value,))
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
-    image.put_flag(check, not good)
-    image.put_flag(check, good)
-
-    state = decoder.read(content_of(decoder, image)).states[0]
-
-    assert state is (ValueState.OK if good else ValueState.FLAGGED)
+FLAGS_OF_ONE_BIT = ({"set_means": Meaning.OK}, {"set_means": Meaning.BAD}, {"ok_values": (0,)})
+BIT = {"type": NumberType.BIT}
 
 
 @pytest.mark.parametrize(
-    "flag", [{"set_means": Meaning.OK}, {"set_means": Meaning.BAD}, {"ok_values": (0,)}]
+    ("flag", "cell"),
+    [(flag, {"byte_order": o}) for flag in FLAGS for o in (ByteOrder.ABCD, ByteOrder.DCBA)]
+    + [(flag, BIT | at) for flag in FLAGS_OF_ONE_BIT for at in ({"bit": 3}, {"function": 2})],
 )
-@pytest.mark.parametrize("cell", [{"bit": 3}, {"function": 2}])
 @pytest.mark.parametrize("good", [True, False])
-def test_a_flag_of_one_bit_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:
-    check = FlagCheck(cell=Cell(address=1, type=NumberType.BIT, **cell), **flag)
-    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
-    registers = RegisterMap(values=(value,))
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
-    image.put_flag(check, not good)
-    image.put_flag(check, good)
+def test_a_flag_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:
+    check = FlagCheck(cell=Cell(address=1, **cell), **flag)
+    device = Device(MapValue(id="v", cell=Cell(address=0), flags=(check,)))
+    device.image.put_flag(check, not good)
+    device.image.put_flag(check, good)
 
-    state = decoder.read(content_of(decoder, image)).states[0]
-
-    assert state is (ValueState.OK if good else ValueState.FLAGGED)
+    assert device.read().states[0] is (ValueState.OK if good else ValueState.FLAGGED)
 
 
 def test_two_flags_of_one_register_do_not_disturb_each_other() -> None:
@@ -147,12 +136,11 @@ def test_two_flags_of_one_register_do_not_disturb_each_other() -> None:
     values = tuple(
         MapValue(id=f"v{n}", cell=Cell(address=n), flags=(check,)) for n, check in enumerate(checks)
     )
-    registers = RegisterMap(values=values)
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
+    device = Device(*values)
     for n, check in enumerate(checks):
-        image.put_flag(check, n != 1)
+        device.image.put_flag(check, n != 1)
 
-    states = decoder.read(content_of(decoder, image)).states
+    states = device.read().states
 
     assert [state is ValueState.OK for state in states] == [True, False, True]
 
@@ -169,11 +157,10 @@ def test_two_flags_of_one_register_do_not_disturb_each_other() -> None:
 )
 def test_what_a_device_does_not_know_is_no_value(type_: str, settings) -> None:
     value = MapValue(id="v", cell=Cell(address=0, type=NumberType(type_)), **settings)
-    registers = RegisterMap(values=(value,))
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
-    image.put_value(value, math.nan)
+    device = Device(value)
+    device.image.put_value(value, math.nan)
 
-    assert decoder.read(content_of(decoder, image)).states[0] is ValueState.INVALID
+    assert device.read().states[0] is ValueState.INVALID
 
 
 def test_bits_are_written_where_they_are_read() -> None:
@@ -184,12 +171,11 @@ def test_bits_are_written_where_they_are_read() -> None:
         Cell(address=9, function=2, type=NumberType.BIT),
     ]
     values = tuple(MapValue(id=f"b{n}", cell=cell) for n, cell in enumerate(cells))
-    registers = RegisterMap(values=values)
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
+    device = Device(*values)
     for n, value in enumerate(values):
-        image.put_value(value, float(n % 2))
+        device.image.put_value(value, float(n % 2))
 
-    assert decoder.read(content_of(decoder, image)).values.tolist() == [0.0, 1.0, 0.0, 1.0]
+    assert device.read().values.tolist() == [0.0, 1.0, 0.0, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -204,11 +190,10 @@ def test_bits_are_written_where_they_are_read() -> None:
     ],
 )
 def test_a_time_comes_back(time) -> None:
-    registers = RegisterMap(values=(MapValue(id="v", cell=Cell(address=0)),), time=time)
-    decoder, image = MapDecoder(registers), RegisterImage(registers)
-    image.put_time(1_800_000_123_250_000_000)
+    device = Device(MapValue(id="v", cell=Cell(address=0)), time=time)
+    device.image.put_time(1_800_000_123_250_000_000)
 
-    found = decoder.read(content_of(decoder, image)).time_ns
+    found = device.read().time_ns
 
     assert found // 10**9 == 1_800_000_123
 

@@ -7,12 +7,7 @@ from acquisition.daq.map_device import MapDevice
 from acquisition.modbus.polled_source import PolledSource
 from acquisition.raw import RawBlock
 from acquisition.registers.cells import Cell, NumberType
-from acquisition.registers.register_map import (
-    FlagCheck,
-    MapValue,
-    Meaning,
-    RegisterMap,
-)
+from acquisition.registers.register_map import FlagCheck, MapValue, Meaning, RegisterMap
 from core.blocks import SampleBlock
 
 STATUS = Cell(address=50)
