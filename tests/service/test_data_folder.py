@@ -23,18 +23,9 @@ def test_a_data_folder_on_a_network_file_system_is_refused_with_what_to_do(tmp_p
     assert not database.parent.exists()
 
 
-def test_a_data_folder_that_may_forget_is_used_and_warned_of(tmp_path: Path) -> None:
-    with (
-        capture_logs() as logs,
-        only_one(tmp_path / "x", lambda _: FileSystem("tmpfs", warning="is memory")),
-    ):
-        pass
-
-    assert [(entry["log_level"], entry["why"]) for entry in logs] == [("warning", "is memory")]
-
-
-def test_a_local_disk_is_nothing_to_speak_of(tmp_path: Path) -> None:
-    with capture_logs() as logs, only_one(tmp_path / "x", lambda _: FileSystem("ext4")):
-        pass
-
-    assert logs == []
+def test_a_data_folder_that_may_forget_is_warned_of_and_a_local_disk_is_not(tmp_path: Path) -> None:
+    for found in (FileSystem("ext4"), FileSystem("tmpfs", warning="is memory")):
+        with capture_logs() as logs, only_one(tmp_path / "x", lambda _, found=found: found):
+            pass
+        warned = [(entry["log_level"], entry["why"]) for entry in logs]
+        assert warned == ([("warning", found.warning)] if found.warning else [])

@@ -81,11 +81,8 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
     again = [found async for found in assessments(source, monitor, n_passed.append)]
 
     assert len(live) > 3 * 5
-    assert {reading.quality.reason.value for a in live for reading in a.readings.values()} >= {
-        "sensor_failure",
-        "clipped",
-        "out_of_range",
-    }
+    reasons = {reading.quality.reason.value for a in live for reading in a.readings.values()}
+    assert reasons >= {"sensor_failure", "clipped", "out_of_range"}
     assert bits(dict(enumerate(again))) == bits(dict(enumerate(live)))
     assert monitor.account == live_monitor.account
     assert monitor.drain_gaps() == live_monitor.drain_gaps() != []
@@ -121,10 +118,8 @@ def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:
     for name, reading in sample.readings.items():
         assert found["readings"][name]["value"] == reading.value
         assert found["readings"][name]["reason"] == reading.quality.reason.value
-    assert set(found) == {
-        "unit", "bearing", "time", "quality", "speed_source", "runout", "window",
-        "readings",
-    }  # fmt: skip
+    named = {"unit", "bearing", "time", "quality", "speed_source", "runout", "window", "readings"}
+    assert set(found) == named
 
 
 def test_a_changed_sensitivity_and_range_are_named_with_both_values(unit: UnitSettings) -> None:

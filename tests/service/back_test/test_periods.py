@@ -13,11 +13,8 @@ def event(day: float, text: str = "overhaul") -> MachineEvent:
     return MachineEvent("U1", None, round(day * DAY_NS), text)
 
 
-def test_without_events_there_is_one_period() -> None:
-    assert periods_of(DAYS, [], Learning(30)) == [Period(1, 0, 30, 100)]
-
-
 def test_each_event_begins_to_learn_anew_from_its_first_reading() -> None:
+    assert periods_of(DAYS, [], Learning(30)) == [Period(1, 0, 30, 100)]
     events = [event(70.5, "second"), event(50, "first")]
     assert periods_of(DAYS, events, Learning(20)) == [
         Period(1, 0, 20, 50),
@@ -52,14 +49,12 @@ def test_times_need_an_offset() -> None:
 
 def test_an_event_is_a_place_a_time_and_words() -> None:
     time_ns = 1_735_689_600 * 10**9
-    assert event_of("U1 2025-01-01T00:00:00Z new pads, LJB") == MachineEvent(
-        "U1", None, time_ns, "new pads, LJB"
-    )
-    assert event_of("U1/LJB 2025-01-01T00:00:00Z") == MachineEvent(
-        "U1", "LJB", time_ns, "machine event"
-    )
-    assert event_of("U1/LJB 2025-01-01T00:00:00Z").is_about("U1", "LJB")
-    assert not event_of("U1/LJB 2025-01-01T00:00:00Z").is_about("U1", "UJB")
+    of_unit = event_of("U1 2025-01-01T00:00:00Z new pads, LJB")
+    assert of_unit == MachineEvent("U1", None, time_ns, "new pads, LJB")
+    of_bearing = event_of("U1/LJB 2025-01-01T00:00:00Z")
+    assert of_bearing == MachineEvent("U1", "LJB", time_ns, "machine event")
+    assert of_bearing.is_about("U1", "LJB")
+    assert not of_bearing.is_about("U1", "UJB")
 
 
 @pytest.mark.parametrize("text", ["", "U1", "U1/ 2025-01-01T00:00:00Z", "U/1/2 x", "Ü 2025-01-01Z"])
