@@ -20,11 +20,12 @@ FOLDER = Path(__file__).parents[2] / "deploy" / "cluster"
 PLANT = FOLDER / "plant-cluster.toml"
 
 
-def composition() -> Any:
-    return yaml.safe_load((FOLDER / "compose.yaml").read_text(encoding="utf-8"))
+def composition(folder: Path = FOLDER) -> Any:
+    return yaml.safe_load((folder / "compose.yaml").read_text(encoding="utf-8"))
 
 
 SERVICES = composition()["services"]
+ALONE = composition(FOLDER.with_name("container"))["services"]["padwatch"]
 PADWATCH = {name: one for name, one in SERVICES.items() if one["image"] == "padwatch"}
 
 
@@ -37,19 +38,25 @@ def test_there_is_the_whole_chain() -> None:
     )
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_a_container_may_do_little(name: str) -> None:
-    one = SERVICES[name]
-
+@pytest.mark.parametrize("one", [*SERVICES.values(), ALONE], ids=[*SERVICES, "alone"])
+def test_a_container_may_do_little(one: dict[str, Any]) -> None:
     assert re.fullmatch(r"[1-9]\d{2,}:[1-9]\d{2,}", one["user"])
     assert one["read_only"] is True
     assert one["cap_drop"] == ["ALL"]
     assert one["security_opt"] == ["no-new-privileges:true"]
-    assert one["mem_limit"]
-    assert one["pids_limit"]
-    assert one["healthcheck"]["test"][0] == "CMD"
     assert "ports" not in one
     assert "privileged" not in one
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_container_among_others_is_limited_and_asked_how_it_is(name: str) -> None:
+    assert SERVICES[name]["mem_limit"]
+    assert SERVICES[name]["pids_limit"]
+    assert SERVICES[name]["healthcheck"]["test"][0] == "CMD"
+
+
+def test_a_container_alone_writes_temporary_files_only_to_memory() -> None:
+    assert [mount.split(":")[0] for mount in ALONE["tmpfs"]] == ["/tmp"]  # noqa: S108  in the container
 
 
 @pytest.mark.parametrize("name", SERVICES)
@@ -124,7 +131,7 @@ def test_nats_understands_its_file(tmp_path: Path) -> None:
     own = Path(sys.executable).with_name("nats-server")
     server = str(own) if own.exists() else shutil.which("nats-server")
     if server is None:
-        pytest.skip("no nats-server is installed")
+        pytest.skip("needs nats-server")
     shutil.copy(FOLDER / "nats.conf", tmp_path)
     (tmp_path / "nats-token.conf").write_text('authorization { token: "word" }\n')
     command = shlex.join([server, "-t", "-c", str(tmp_path / "nats.conf")])

@@ -46,21 +46,9 @@ def compose() -> Any:
 
 
 def test_every_instruction_is_one_that_engines_know() -> None:
-    known = [
-        "FROM",
-        "WORKDIR",
-        "RUN",
-        "COPY",
-        "ENV",
-        "USER",
-        "VOLUME",
-        "STOPSIGNAL",
-        "HEALTHCHECK",
-        "ENTRYPOINT",
-        "CMD",
-    ]
+    known = "FROM WORKDIR RUN COPY ENV USER VOLUME STOPSIGNAL HEALTHCHECK ENTRYPOINT CMD"
 
-    assert {name for name, _ in steps()} <= set(known)
+    assert {name for name, _ in steps()} <= set(known.split())
     assert [rest.split()[0] for name, rest in steps() if name == "FROM"] == [
         "python:3.11-slim-bookworm",
         "python:3.11-slim-bookworm",
@@ -136,17 +124,6 @@ def test_the_health_check_fails_unless_the_service_is_ready(
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, check=False)
 
     assert (done.returncode == 0) is is_healthy
-
-
-def test_the_composed_service_can_do_nothing_that_it_need_not() -> None:
-    service = compose()["services"]["padwatch"]
-
-    assert service["read_only"] is True
-    assert service["cap_drop"] == ["ALL"]
-    assert service["security_opt"] == ["no-new-privileges:true"]
-    assert [mount.split(":")[0] for mount in service["tmpfs"]] == ["/tmp"]  # noqa: S108  in the container
-    assert "privileged" not in service
-    assert "ports" not in service
 
 
 def test_the_composed_service_is_reached_from_the_host_only() -> None:

@@ -83,10 +83,3 @@ def test_commands_that_only_print_print(arguments: list[str]) -> None:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0
     assert result.output
-
-
-def test_the_first_steps_of_the_readme_lead_to_a_plant_file_that_is_fine(tmp_path: Path) -> None:
-    plant = tmp_path / "plant.toml"
-    plant.write_text(CliRunner().invoke(app, ["config", "example"]).output, encoding="utf-8")
-    checked = CliRunner().invoke(app, ["config", "check", str(plant)])
-    assert (checked.exit_code, "is fine" in checked.output) == (0, True), checked.output

@@ -144,18 +144,16 @@ def test_two_hundred_mebibytes_and_chunks_without_end_cost_no_memory(
         (b'{"text": "a\\u0000b"}', 422),
         (b'{"text": "a", "text2": "b"}', 422),
         *((b"", 422), (b"null", 422)),
+        *(
+            (b'{"actor": "A. Name", "reason": "none", "duration_s": %s}' % number, 422)
+            for number in (b"NaN", b"Infinity", b"-Infinity", b"1e999")
+        ),
     ],
 )
 def test_a_body_that_is_no_request_is_refused(service: Service, body: bytes, status: int) -> None:
-    refused(service.post(COMMENT, body), status)
+    path = COMMENT.replace("comment", "shelve") if b"duration_s" in body else COMMENT
 
-
-@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-def test_a_number_that_is_none_is_refused(service: Service, number: str) -> None:
-    shelve = COMMENT.replace("comment", "shelve")
-    body = f'{{"actor": "A. Name", "reason": "none", "duration_s": {number}}}'
-
-    refused(service.post(shelve, body.encode()), 422)
+    refused(service.post(path, body), status)
 
 
 @pytest.mark.parametrize(
@@ -266,27 +264,25 @@ def test_a_page_of_another_site_changes_nothing(service: Service, headers: dict[
     assert "from elsewhere" not in [event["reason"] for event in events]
 
 
-@pytest.mark.parametrize("host", ["evil.example", "localhost.evil.example", "10.0.0.1", "a" * 300])
-def test_a_name_that_is_not_the_service_s_is_refused(service: Service, host: str) -> None:
-    with service.client() as client:
-        refused(client.get("/api/v1/units", headers={"Host": host}), 421)
-
-
 @pytest.mark.parametrize(
-    "shown",
+    ("name", "value", "status"),
     [
-        "Bearer x",
-        "Bearer pw_" + "0" * 12 + "_" + "A" * 43,
-        "Bearer " + "A" * 8000,
-        "Bearer eyJhbGciOiJub25lIn0.eyJyb2xlIjoiYWRtaW4ifQ.",
-        "Bearer pw_' OR 1=1 --",
+        *(("Host", host, 421) for host in ("evil.example", "localhost.evil.example", "10.0.0.1")),
+        ("Host", "a" * 300, 421),
+        ("Authorization", "Bearer x", 401),
+        ("Authorization", "Bearer pw_" + "0" * 12 + "_" + "A" * 43, 401),
+        ("Authorization", "Bearer " + "A" * 8000, 401),
+        ("Authorization", "Bearer eyJhbGciOiJub25lIn0.eyJyb2xlIjoiYWRtaW4ifQ.", 401),
+        ("Authorization", "Bearer pw_' OR 1=1 --", 401),
     ],
 )
-def test_a_forged_key_opens_nothing(service: Service, shown: str) -> None:
+def test_a_foreign_name_and_a_forged_key_open_nothing(
+    service: Service, name: str, value: str, status: int
+) -> None:
     with service.client() as client:
-        words = refused(client.get("/api/v1/units", headers={"Authorization": shown}), 401)
+        words = refused(client.get("/api/v1/units", headers={name: value}), status)
 
-    assert shown not in words
+    assert name == "Host" or value not in words
 
 
 def test_who_was_refused_a_change_stands_in_the_audit_trail(service: Service) -> None:

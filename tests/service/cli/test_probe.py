@@ -132,14 +132,6 @@ async def test_nothing_but_reads_is_sent(probe, server) -> None:
     assert set(server.function_codes) <= {3, 43}
 
 
-async def test_bits_are_printed_as_bits(probe, server) -> None:
-    arguments = ("--address", "0", "--count", "3", "--function", "1")
-    result = await probe("modbus", at(server), *arguments)
-
-    assert result.exit_code == 1
-    assert "illegal address" in result.stderr
-
-
 async def test_a_device_tells_who_it_is(probe, server, gateway) -> None:
     gateway.identification = {0: b"Maker", 1: b"Rack 7", 2: b"1.2"}
     result = await probe("identity", at(server), "--json")
@@ -155,6 +147,7 @@ async def test_a_device_tells_who_it_is(probe, server, gateway) -> None:
     ("arguments", "code", "said"),
     [
         (("modbus", "127.0.0.1:{port}", "--address", "5000"), 1, "illegal address"),
+        (("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "1"), 1, "illegal address"),
         (("modbus", "127.0.0.1:1", "--address", "0"), 1, "refused"),
         (("modbus", "/dev/there-is-none", "--address", "0"), 1, "No such file"),
         (("modbus", "127.0.0.1:port", "--address", "0"), 2, "integer"),

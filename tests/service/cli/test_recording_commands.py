@@ -6,6 +6,7 @@ import signal
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rigs.command_line import padwatch, padwatch_program
@@ -15,7 +16,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
 from core.blocks import SampleBlock
 from core.monitor import UnitMonitor
-from service.cli.record import record_blocks
+from service.cli.record import Patience, record_blocks
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.reanalysis import assessment_model, assessments
 from service.settings.loading import load_plant_file
@@ -71,11 +72,11 @@ def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> N
 
 
 class Interrupted:
-    """A simulated unit; after three blocks something happens, and no more come."""
+    """A simulated unit; after some blocks something happens, and what passes then is missed."""
 
-    def __init__(self, unit: UnitSettings, event: Callable[[], None]) -> None:
+    def __init__(self, unit: UnitSettings, n_blocks: int, event: Callable[[], None]) -> None:
         self._feed, self._calibration = feed_of(unit, SystemClock()), calibration_of(unit)
-        self._event = event
+        self._n_blocks, self._event = n_blocks, event
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
@@ -83,10 +84,16 @@ class Interrupted:
             yield blocks
 
     async def _blocks(self) -> AsyncGenerator[SampleBlock]:
-        for _ in range(3):
-            yield calibrate(self._feed.advance(60), self._calibration)
+        for _ in range(self._n_blocks):
+            await asyncio.sleep(0)
+            yield calibrate(self._feed.advance(50), self._calibration)
+        self._feed.advance(100)
         self._event()
         await asyncio.Event().wait()
+
+
+def lose_the_link() -> None:
+    raise LinkError("cable cut")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -94,20 +101,34 @@ async def test_ending_a_recording_early_keeps_it(
     plant: PlantFile, tmp_path: Path, number: signal.Signals
 ) -> None:
     unit = plant.unit[0]
-    source = Interrupted(unit, lambda: signal.raise_signal(number))
+    source = Interrupted(unit, 3, lambda: signal.raise_signal(number))
     writer = recording_writer(unit, tmp_path / "run", "a test")
     assert await record_blocks(source, writer, seconds=600.0) is None
-    assert recording_of(tmp_path / "run").manifest.n_samples == 180
+    assert recording_of(tmp_path / "run").manifest.n_samples == 150
 
 
-async def test_a_lost_link_ends_a_recording_and_keeps_it(plant: PlantFile, tmp_path: Path) -> None:
-    def lose() -> None:
-        raise LinkError("cable cut")
-
+@pytest.mark.parametrize("patience_s", [None, 0.2])
+async def test_a_link_that_stays_lost_ends_a_recording_and_keeps_it(
+    plant: PlantFile, tmp_path: Path, stepped_clock: Any, patience_s: float | None
+) -> None:
     unit = plant.unit[0]
     writer = recording_writer(unit, tmp_path / "run", "a test")
-    assert await record_blocks(Interrupted(unit, lose), writer, seconds=600.0) == "cable cut"
-    assert recording_of(tmp_path / "run").manifest.n_samples == 180
+    patience = None if patience_s is None else Patience(patience_s, stepped_clock)
+    source = Interrupted(unit, 2, lose_the_link)
+    assert await record_blocks(source, writer, 600.0, patience) == "cable cut"
+    # with patience it is asked once more, which is after the 0.2 s
+    assert recording_of(tmp_path / "run").manifest.n_samples == (100 if patience is None else 200)
+
+
+async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
+    plant: PlantFile, tmp_path: Path, stepped_clock: Any
+) -> None:
+    unit = plant.unit[0]
+    writer = recording_writer(unit, tmp_path / "run", "a test")
+    patience = Patience(10.0, stepped_clock)
+    assert await record_blocks(Interrupted(unit, 2, lose_the_link), writer, 1.0, patience) is None
+    first = [block.first_index for block in recording_of(tmp_path / "run").raw_blocks()]
+    assert first == [0, 50, 200, 250, 400, 450, 600]
 
 
 def test_no_source_leaves_no_recording(plant_path: Path, tmp_path: Path) -> None:

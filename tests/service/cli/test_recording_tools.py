@@ -1,9 +1,6 @@
 """`padwatch recording info|verify|export|import` as a user sees them."""
 
-import asyncio
 import json
-from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +9,13 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from acquisition.calibration import calibrate
-from acquisition.clock import SystemClock
-from acquisition.errors import LinkError
 from acquisition.raw import RawBlock
-from core.blocks import Rejection, SampleBlock
+from core.blocks import Rejection
 from service.cli import recording as commands
-from service.cli.record import Patience, record_blocks
 from service.conversion import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
 from service.wiring.recordings import recording_of, recording_writer
-from service.wiring.simulations import simulated_feed
 
 START_NS = 1_767_225_600_000_000_000
 
@@ -246,43 +239,3 @@ def test_nothing_that_exists_is_overwritten(folder: Path) -> None:
     result = padwatch_recording("export", folder, "--format", "csv", "--out", folder)
     assert result.exit_code == 1
     assert "is there already; nothing is overwritten" in result.stderr
-
-
-class LosingSource:
-    """A simulated unit whose link is lost after every other block; what passes then is missed."""
-
-    def __init__(self, unit: UnitSettings) -> None:
-        self._feed = simulated_feed(unit, SystemClock())
-        self._calibration = calibration_of(unit)
-
-    @asynccontextmanager
-    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        async with aclosing(self._blocks()) as blocks:
-            yield blocks
-
-    async def _blocks(self) -> AsyncGenerator[SampleBlock]:
-        for _ in range(2):
-            await asyncio.sleep(0)
-            yield calibrate(self._feed.advance(50), self._calibration)
-        self._feed.advance(100)
-        raise LinkError("cable cut")
-
-
-async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
-    unit: UnitSettings, tmp_path: Path, stepped_clock
-) -> None:
-    writer = recording_writer(unit, tmp_path / "run", "a test")
-    patience = Patience(10.0, stepped_clock)
-    assert await record_blocks(LosingSource(unit), writer, 1.0, patience) is None
-    first = [block.first_index for block in recording_of(tmp_path / "run").raw_blocks()]
-    assert first == [0, 50, 200, 250, 400, 450, 600]
-
-
-async def test_a_link_that_stays_lost_ends_the_recording_when_its_time_has_passed(
-    unit: UnitSettings, tmp_path: Path, stepped_clock
-) -> None:
-    source = LosingSource(unit)
-    writer = recording_writer(unit, tmp_path / "run", "a test")
-    found = await record_blocks(source, writer, 3600.0, Patience(0.2, stepped_clock))
-    assert found == "cable cut"
-    assert recording_of(tmp_path / "run").manifest.n_samples == 200

@@ -12,7 +12,7 @@ from service.settings.access import AccessSettings, TlsSettings
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
-from service.wiring.access import ClosedError, access_desk
+from service.wiring.access import access_desk
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 TLS = TlsSettings(certificate="a.crt", key="a.key")
@@ -49,17 +49,6 @@ def test_whoever_is_not_surely_on_this_computer_logs_in(
     store.access.accounts.add("anna", Role.ADMIN, "$argon2id$", 0)
 
     assert access_desk(plant, store.access, SystemClock()).asks_everybody is everybody
-
-
-@pytest.mark.parametrize(
-    ("service", "missing"),
-    [({"host": "192.0.2.10"}, "certificate"), ({"host": "0.0.0.0", "tls": TLS}, "account")],  # noqa: S104
-)
-def test_what_others_reach_does_not_start_unfit_for_that(
-    store: SqliteStore, service: dict[str, object], missing: str
-) -> None:
-    with pytest.raises(ClosedError, match=missing):
-        access_desk(plant_with(**service), store.access, SystemClock())
 
 
 async def test_a_token_for_setting_up_is_drawn_only_where_nobody_could_log_in(
