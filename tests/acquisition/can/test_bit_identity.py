@@ -12,6 +12,14 @@ from acquisition.daq.can_slcan import SlcanTcpServer
 from acquisition.delivery import Delivery
 from acquisition.raw import FeedEndedError
 
+LONG_IDS = {"extended": True, "base_id": 0x18FF0100}
+KINDS = {
+    "classic": {},
+    "fd": {"fd": True},
+    "classic, long ids": LONG_IDS,
+    "fd, long ids": {"fd": True, **LONG_IDS},
+}
+
 
 def fingerprint(blocks) -> list[str]:
     """A hash of everything in a block but how the host's clock stands."""
@@ -58,14 +66,14 @@ async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
     assert source.refused_frames == {}
 
 
-@pytest.mark.parametrize(("n_samples", "fd"), covering([1, 3, 48, 51], [False, True]))
+@pytest.mark.parametrize(("n_samples", "kind"), covering([1, 3, 48, 51], list(KINDS)))
 async def test_blocks_of_any_length_come_through(
-    fd, n_samples, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
+    kind, n_samples, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
 ):
     """Also where they end within a frame of five samples."""
     feeds = [eventful_feed(n_blocks=200) for _ in range(2)]
     direct = straight(feeds[0], counts_calibration(n_channels=4), n_samples)
-    shape = shape_of(fd=fd)
+    shape = shape_of(**KINDS[kind])
     device = CanDevice(feeds[1], shape, block_samples=n_samples)
     async with SlcanTcpServer(device, on_demand=True) as server:
         source = source_of(shape, server.endpoint, when_full="wait")
