@@ -1,8 +1,13 @@
 """Disks that are full or slow: nothing promised is lost, and alarms go on meanwhile."""
 
+import ctypes
+import ctypes.util
+import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -10,12 +15,12 @@ from harness.bench import STORE_ALARM, Bench
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import RefusedError, ServiceRig, until
-from harness.small_disk import SmallDisk, small_disk
 
 N_CYCLES, N_FEW = 20, 1
 DISK_MIB = 32.0
 RESUMED_WITHIN_S = 5.0
 NOT_STORED = "results_not_stored"
+CHUNK = b"\0" * 65_536
 
 SLOW_US = 2_000_000
 FROM_SYNC = 60
@@ -25,6 +30,52 @@ STRACE = (
     *("strace", "-D", "-f", "--seccomp-bpf", "-qq", "-o", "/dev/null", "-e", "trace=fdatasync"),
     *("-e", f"inject=fdatasync:delay_enter={SLOW_US}:when={FROM_SYNC}+"),
 )
+
+
+@dataclass(frozen=True)
+class SmallDisk:
+    """A file system of its own."""
+
+    folder: Path
+
+    @property
+    def _ballast(self) -> Path:
+        return self.folder / "ballast"
+
+    def fill(self) -> None:
+        """Leave nothing to others."""
+        handle = os.open(self._ballast, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        try:
+            for size in (len(CHUNK), 512):
+                while _written(handle, CHUNK[:size]):
+                    pass
+        finally:
+            os.close(handle)
+
+    def free(self) -> None:
+        """Give back what was taken."""
+        self._ballast.unlink()
+
+
+@contextmanager
+def small_disk(folder: Path, mib: float) -> Iterator[SmallDisk]:
+    """Mount one on a folder; skips the test where that is not permitted."""
+    folder.mkdir(parents=True, exist_ok=True)
+    libc = ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
+    size = f"size={round(mib * 2**20)}".encode()
+    if libc.mount(b"padwatch", os.fsencode(folder), b"tmpfs", 0, size) != 0:
+        pytest.skip(f"a disk cannot be mounted here: {os.strerror(ctypes.get_errno())}")
+    try:
+        yield SmallDisk(folder)
+    finally:
+        libc.umount2(os.fsencode(folder), 2)  # also if something is still open there
+
+
+def _written(handle: int, data: bytes) -> bool:
+    try:
+        return os.write(handle, data) > 0
+    except OSError:
+        return False
 
 
 @pytest.mark.timeout(3600)
