@@ -33,7 +33,6 @@ from service.settings.units import UnitSettings
 
 DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
 SPEED_RPM = 92.3
-DURATION_S = 1200
 SLOTS_PER_POLL = 40
 SAMPLES_PER_SLOT = 50
 
@@ -78,15 +77,15 @@ def noisy_machine(condition: int) -> Scenario:
     )
 
 
-async def twenty_minutes_over_modbus(
-    unit: UnitSettings, scenario: Scenario
+async def read_over_modbus(
+    unit: UnitSettings, scenario: Scenario, duration_s: int
 ) -> dict[str, Assessment]:
-    """The newest assessment of each bearing after 20 minutes, averaged over all of them."""
+    """The newest assessment of each bearing after some time, averaged over all of it."""
     machine, calibration = machine_of(unit), calibration_of(unit)
     feed = SimulatedUnit(machine, calibration, scenario, seed=4, start_ns=0)
     shape = RingDeviceSettings(samples_per_slot=SAMPLES_PER_SLOT, n_slots=2 * SLOTS_PER_POLL)
     device = RingDevice(feed, unit.id, shape)
-    n_hops = DURATION_S * 600 // AnalysisSettings().hop_samples
+    n_hops = duration_s * 600 // AnalysisSettings().hop_samples
     monitor = UnitMonitor(machine, AnalysisSettings(n_segments=n_hops))
     newest: dict[str, Assessment] = {}
     async with ModbusRingServer(device) as server:
@@ -95,25 +94,26 @@ async def twenty_minutes_over_modbus(
         async with source.connect() as blocks:
             async for block in blocks:
                 newest |= {a.bearing: a for a in monitor.ingest(block)}
-                if block.stop_index >= DURATION_S * 600:
+                if block.stop_index >= duration_s * 600:
                     break
     assert monitor.account.n_stored == monitor.account.n_offered
     return newest
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize(
+    ("condition", "duration_s"),
+    [(3, 120), *(pytest.param(n, 1200, marks=pytest.mark.long) for n in CONDITIONS)],
+)
 async def test_equation_5_finds_the_film_through_the_whole_chain(
-    unit: UnitSettings, condition: int
+    unit: UnitSettings, condition: int, duration_s: int
 ) -> None:
-    """Required: within 2 % of |k + iΩc|."""
+    """Required: within 2 % of |k + iΩc|; soft films need less than 20 minutes for that."""
     scenario = noisy_machine(condition)
-    newest = await twenty_minutes_over_modbus(unit, scenario)
+    newest = await read_over_modbus(unit, scenario, duration_s)
     for bearing in ("UJB", "LJB"):
         film = scenario.bearings[bearing].film
         true = film.effective_stiffness_n_per_m(rad_s_from_rpm(SPEED_RPM))
         for axis, name in enumerate(("order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m")):
             found = newest[bearing].readings[name].value
-            print(f"condition {condition} {bearing} {name}: {found / true[axis] - 1:+.3%}")
             # the bracket's inertia alone makes +0.4 %; the rest is noise at the line
             assert found == pytest.approx(true[axis], rel=0.02)
