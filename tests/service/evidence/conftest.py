@@ -69,6 +69,13 @@ class Rig:
     async def written(self, n: int) -> None:
         await self.until(lambda: self.keeper.n_written == n and self.keeper.n_pending == 0)
 
+    async def write(self, *raised: AlarmNews) -> None:
+        """Raise alarms while the keeper runs, and wait for the evidence of each."""
+        async with self.running():
+            for news in raised:
+                self.raise_(news)
+            await self.written(len(raised))
+
     @property
     def bundles(self) -> list[Path]:
         return sorted(path for path in self.folders.evidence.glob("*/*") if path.is_dir())

@@ -13,6 +13,7 @@ from service.capture.outcome import Outcome
 from service.evidence.capture_link import linked
 from service.evidence.snapshot import Camera
 
+Make = Callable[..., Any]
 NOBODY: frozenset[tuple[str, int]] = frozenset()
 SHAFT = "U1:UJB:order1_shaft_x"
 
@@ -30,9 +31,7 @@ def samples(rig: Any, capturing: frozenset[tuple[str, int]] = NOBODY) -> str:
     return str(rig.archive.samples(found, capturing).value)
 
 
-async def test_a_finished_capture_is_linked_with_its_hash(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_a_finished_capture_is_linked_with_its_hash(rig_of: Make, news: Make) -> None:
     rig, raised = await rig_of(), news()
     capture = recorded(rig.folders.captures / "U1-20260101T000000.000Z-x", raised.events[0])
     async with rig.running():
@@ -52,9 +51,7 @@ async def test_a_finished_capture_is_linked_with_its_hash(
     assert samples(rig) == "removed"
 
 
-async def test_samples_that_could_not_be_kept_are_said_to_be_lost(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig_of: Make, news: Make) -> None:
     rig, raised = await rig_of(), news()
     async with rig.running():
         rig.raise_(raised)
@@ -68,12 +65,10 @@ async def test_samples_that_could_not_be_kept_are_said_to_be_lost(
 
 
 async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_it(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
+    rig_of: Make, news: Make
 ) -> None:
     rig, raised = await rig_of(), news()
-    async with rig.running():
-        rig.raise_(raised)
-        await rig.written(1)
+    await rig.write(raised)
     recorded(rig.folders.captures / "U1-20260101T000000.000Z-x", raised.events[0])
 
     again = await rig_of()
@@ -82,26 +77,18 @@ async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_i
     assert samples(again) == "complete"
 
 
-async def test_samples_that_were_expected_and_never_came_are_lost(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_samples_that_were_expected_and_never_came_are_lost(rig_of: Make, news: Make) -> None:
     rig, raised = await rig_of(), news()
     rig.keeper._camera = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
-    async with rig.running():
-        rig.raise_(raised)
-        await rig.written(1)
+    await rig.write(raised)
 
     assert samples(rig, frozenset({(SHAFT, 1)})) == "being_made"
     assert samples(rig) == "lost"
 
 
-async def test_an_alarm_whose_samples_are_not_kept_has_lost_none(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_an_alarm_whose_samples_are_not_kept_has_lost_none(rig_of: Make, news: Make) -> None:
     rig = await rig_of()
-    async with rig.running():
-        rig.raise_(news())
-        await rig.written(1)
+    await rig.write(news())
     assert samples(rig) == "none"
 
 

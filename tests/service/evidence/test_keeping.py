@@ -14,6 +14,7 @@ from service.evidence.archive import DamagedEvidenceError, EvidenceState
 from service.evidence.document import Evidence
 from service.evidence.folders import INCOMPLETE, place_of
 
+Make = Callable[..., Any]
 NOBODY: frozenset[tuple[str, int]] = frozenset()
 SHAFT = "U1:UJB:order1_shaft_x"
 
@@ -27,13 +28,9 @@ def states(rig: Any, alarm: str = SHAFT) -> list[tuple[int, str]]:
     return [(each.event.occurrence, each.state.value) for each in found]
 
 
-async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig_of: Make, news: Make) -> None:
     rig = await rig_of()
-    async with rig.running():
-        rig.raise_(news(12.5))
-        await rig.written(1)
+    await rig.write(news(12.5))
 
     [folder] = rig.bundles
     assert folder.parent.name == "U1"
@@ -52,7 +49,7 @@ async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(
 
 
 async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
-    rig_of: Callable[..., Any], news: Callable[..., Any], assessment: Callable[..., Any]
+    rig_of: Make, news: Make, assessment: Make
 ) -> None:
     rig = await rig_of()
     rig.raise_(news())
@@ -65,13 +62,13 @@ async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
 
 
 async def test_the_service_itself_and_lost_links_have_evidence_too(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
+    rig_of: Make, news: Make
 ) -> None:
     rig = await rig_of()
-    async with rig.running():
-        rig.raise_(news(kind=AlarmKind.LINK_LOST, subject="link", unit="U2"))
-        rig.raise_(news(kind=AlarmKind.RESULTS_LOST, subject="store", unit="plant"))
-        await rig.written(2)
+    await rig.write(
+        news(kind=AlarmKind.LINK_LOST, subject="link", unit="U2"),
+        news(kind=AlarmKind.RESULTS_LOST, subject="store", unit="plant"),
+    )
 
     link, own = (document(folder) for folder in rig.bundles)
     assert link.unit is not None
@@ -79,13 +76,9 @@ async def test_the_service_itself_and_lost_links_have_evidence_too(
     assert own.unit is None
 
 
-async def test_a_bundle_that_somebody_has_changed_is_no_evidence(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig_of: Make, news: Make) -> None:
     rig = await rig_of()
-    async with rig.running():
-        rig.raise_(news())
-        await rig.written(1)
+    await rig.write(news())
     [found] = rig.archive.occurrences(SHAFT, NOBODY, 9)
     path = rig.bundles[0] / "evidence.json"
     assert rig.archive.document(found.place).alarm.value == 160.0
@@ -95,9 +88,7 @@ async def test_a_bundle_that_somebody_has_changed_is_no_evidence(
         rig.archive.document(found.place)
 
 
-async def test_a_full_disk_delays_evidence_and_loses_none(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_a_full_disk_delays_evidence_and_loses_none(rig_of: Make, news: Make) -> None:
     rig, raised = await rig_of(), news()
     folder = place_of(rig.folders.evidence, raised.events[0]).folder
     aside = folder.with_name(folder.name + INCOMPLETE)
@@ -117,7 +108,7 @@ async def test_a_full_disk_delays_evidence_and_loses_none(
 
 
 async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
+    rig_of: Make, news: Make
 ) -> None:
     rig = await rig_of()
     rig.folders.evidence.parent.mkdir(parents=True)
@@ -133,12 +124,10 @@ async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(
 
 
 async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
+    rig_of: Make, news: Make
 ) -> None:
     first = await rig_of()
-    async with first.running():
-        first.raise_(news(1.0))
-        await first.written(1)
+    await first.write(news(1.0))
     cut = news(2.0, occurrence=2)
     first.store.append([], [], [cut])  # the service is killed while it writes
     left = place_of(first.folders.evidence, cut.events[0]).folder
@@ -154,19 +143,17 @@ async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
 
 
 async def test_an_alarm_from_before_evidence_was_kept_has_not_lost_any(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
+    rig_of: Make, news: Make
 ) -> None:
     rig = await rig_of()
     rig.store.append([], [], [news(-3600.0)])
-    async with rig.running():
-        rig.raise_(news(0.0, occurrence=2))
-        await rig.written(1)
+    await rig.write(news(0.0, occurrence=2))
 
     assert states(rig) == [(2, "complete"), (1, "not_kept")]
 
 
 async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(
-    rig_of: Callable[..., Any], news: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    rig_of: Make, news: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "MAX_PENDING", 3)
     rig = await rig_of()
@@ -179,7 +166,7 @@ async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(
 
 
 async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
-    rig_of: Callable[..., Any], news: Callable[..., Any], plant: Any
+    rig_of: Make, news: Make, plant: Any
 ) -> None:
     evidence = plant.evidence.model_copy(update={"max_per_alarm": 3})
     rig = await rig_of(plant.model_copy(update={"evidence": evidence}))
@@ -196,13 +183,9 @@ async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
     assert states(rig, "U1:UJB:order1_shaft_y") == [(1, "complete")]
 
 
-async def test_the_configuration_can_be_looked_up_by_its_version(
-    rig_of: Callable[..., Any], news: Callable[..., Any]
-) -> None:
+async def test_the_configuration_can_be_looked_up_by_its_version(rig_of: Make, news: Make) -> None:
     rig = await rig_of()
-    async with rig.running():
-        rig.raise_(news())
-        await rig.written(1)
+    await rig.write(news())
 
     version = document(rig.bundles[0]).configuration
     stored = json.loads((rig.folders.configurations / f"{version}.json").read_bytes())

@@ -12,6 +12,7 @@ import pytest
 from service.evidence.folders import Place, clear_leftovers, places, removed
 from service.evidence.room import SURVEY_S, EvidenceLimits, EvidenceRoom
 
+RoomOf = Callable[..., EvidenceRoom]
 KB = b"x" * 1000
 
 OLDEST, OLD, YOUNG, NEWEST = (
@@ -29,7 +30,7 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def room_of(root: Path, stepped_clock: Any) -> Callable[..., EvidenceRoom]:
+def room_of(root: Path, stepped_clock: Any) -> RoomOf:
     """Builds what makes room, at the beginning of 2026, by the limits it is given."""
 
     def build(soft: int, hard: int = 8000, most: int = 200) -> EvidenceRoom:
@@ -50,14 +51,12 @@ def left(root: Path) -> list[str]:
     return [each.folder.name for each in places(root)]
 
 
-def test_what_fits_stays(root: Path, room_of: Callable[..., EvidenceRoom]) -> None:
+def test_what_fits_stays(root: Path, room_of: RoomOf) -> None:
     assert room_of(4000).make() == []
     assert left(root) == [OLDEST, OLD, YOUNG, NEWEST]
 
 
-def test_the_oldest_goes_first_and_is_remembered(
-    root: Path, room_of: Callable[..., EvidenceRoom]
-) -> None:
+def test_the_oldest_goes_first_and_is_remembered(root: Path, room_of: RoomOf) -> None:
     assert room_of(3000).make() == [OLDEST]
     assert left(root) == [OLD, YOUNG, NEWEST]
     assert removed(root, "U1") == [OLDEST]
@@ -65,23 +64,19 @@ def test_the_oldest_goes_first_and_is_remembered(
 
 @pytest.mark.parametrize(("hard", "kept"), [(8000, [YOUNG, NEWEST]), (1, [NEWEST])])
 def test_what_is_young_stays_until_the_hard_limit(
-    root: Path, room_of: Callable[..., EvidenceRoom], hard: int, kept: list[str]
+    root: Path, room_of: RoomOf, hard: int, kept: list[str]
 ) -> None:
     room_of(1, hard).make()
     assert left(root) == kept
 
 
-def test_an_alarm_that_chatters_loses_its_own_oldest(
-    root: Path, room_of: Callable[..., EvidenceRoom]
-) -> None:
+def test_an_alarm_that_chatters_loses_its_own_oldest(root: Path, room_of: RoomOf) -> None:
     other = bundle(root, "20250101T000000.000Z-LJB-stiffness_x-1").folder.name
     assert room_of(8000, most=2).make() == [OLDEST, OLD]
     assert left(root) == [other, YOUNG, NEWEST]
 
 
-def test_a_bundle_that_was_written_makes_its_room(
-    root: Path, room_of: Callable[..., EvidenceRoom]
-) -> None:
+def test_a_bundle_that_was_written_makes_its_room(root: Path, room_of: RoomOf) -> None:
     room = room_of(4000)
     assert room.make() == []
     room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
@@ -90,7 +85,7 @@ def test_a_bundle_that_was_written_makes_its_room(
 
 
 def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(
-    root: Path, room_of: Callable[..., EvidenceRoom]
+    root: Path, room_of: RoomOf
 ) -> None:
     room = room_of(4500)
     room.make()
@@ -101,7 +96,7 @@ def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(
 
 
 def test_an_alarm_that_begins_to_chatter_is_noticed_without_a_look_at_all(
-    root: Path, room_of: Callable[..., EvidenceRoom]
+    root: Path, room_of: RoomOf
 ) -> None:
     room = room_of(8000, most=4)
     assert room.make() == []
@@ -110,7 +105,7 @@ def test_an_alarm_that_begins_to_chatter_is_noticed_without_a_look_at_all(
 
 
 def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
-    root: Path, room_of: Callable[..., EvidenceRoom], stepped_clock: Any
+    root: Path, room_of: RoomOf, stepped_clock: Any
 ) -> None:
     room = room_of(4000)
     room.make()
@@ -120,9 +115,7 @@ def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
     assert room.make() == []
 
 
-def test_what_cannot_be_removed_is_looked_for_again(
-    root: Path, room_of: Callable[..., EvidenceRoom]
-) -> None:
+def test_what_cannot_be_removed_is_looked_for_again(root: Path, room_of: RoomOf) -> None:
     room, in_the_way = room_of(8000, most=3), root / "U1" / (OLDEST + ".incomplete")
     in_the_way.write_bytes(b"not a folder")
     with pytest.raises(OSError, match=OLDEST):
@@ -134,7 +127,7 @@ def test_what_cannot_be_removed_is_looked_for_again(
 
 
 def test_all_that_is_taken_away_by_hand_meanwhile_is_no_longer_looked_for(
-    root: Path, room_of: Callable[..., EvidenceRoom]
+    root: Path, room_of: RoomOf
 ) -> None:
     room = room_of(8000, most=3)
     (root / "U1" / (OLDEST + ".incomplete")).write_bytes(b"not a folder")
@@ -144,9 +137,7 @@ def test_all_that_is_taken_away_by_hand_meanwhile_is_no_longer_looked_for(
     assert room.make() == []
 
 
-def test_what_is_none_of_ours_is_left_alone(
-    root: Path, room_of: Callable[..., EvidenceRoom]
-) -> None:
+def test_what_is_none_of_ours_is_left_alone(root: Path, room_of: RoomOf) -> None:
     notes = root / "U1" / "my notes"
     notes.mkdir()
     clear_leftovers(root)
@@ -155,7 +146,7 @@ def test_what_is_none_of_ours_is_left_alone(
 
 
 def test_names_of_what_was_removed_are_not_lost_where_there_is_no_room_to_write_them(
-    root: Path, room_of: Callable[..., EvidenceRoom], monkeypatch: pytest.MonkeyPatch
+    root: Path, room_of: RoomOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert room_of(3000).make() == [OLDEST]
     monkeypatch.setattr(os, "fsync", full)

@@ -137,7 +137,7 @@ def test_decisions_go_on_where_they_stood(
     assert store.films.decisions("U1", "LJB") == []
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def baseline(film_life: FilmLife) -> BearingBaseline:
     history = film_life(2, days=40)
     origin = Origin("U1", "UJB", "dynamic", 1, "Ada", 77, "overhaul")

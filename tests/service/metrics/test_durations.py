@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any
 
 import pytest
 
@@ -15,30 +16,8 @@ from service.metrics.polls import PollClock, TimedSource
 from service.metrics.timings import Timings
 
 
-class SetClock:
-    """Time that passes when a test says so, and when somebody waits."""
-
-    def __init__(self) -> None:
-        self.s = 100.0
-
-    def now_ns(self) -> int:
-        return 0
-
-    def monotonic_s(self) -> float:
-        return self.s
-
-    async def sleep(self, duration_s: float) -> None:
-        self.s += duration_s
-        await asyncio.sleep(0)
-
-
-@pytest.fixture
-def clock() -> SetClock:
-    return SetClock()
-
-
-def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(clock: SetClock) -> None:
-    durations = Durations((0.1, 0.2), clock)
+def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(stepped_clock: Any) -> None:
+    durations = Durations((0.1, 0.2), stepped_clock)
     for duration_s in (0.0, 0.1, 0.15, 0.2, 7.0):
         durations.observe(duration_s)
 
@@ -48,43 +27,43 @@ def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(clock: SetClock) 
     assert seen.sum_s == pytest.approx(7.45)
 
 
-def test_what_fails_is_not_timed(clock: SetClock) -> None:
-    durations = Durations((0.1,), clock)
+def test_what_fails_is_not_timed(stepped_clock: Any) -> None:
+    durations = Durations((0.1,), stepped_clock)
     with pytest.raises(OSError, match="full"), durations.timed():
         raise OSError("full")
     with durations.timed():
-        clock.s += 3.0
+        stepped_clock.step(3.0)
 
     assert durations.seen().n_up_to == (0, 1)
     assert durations.seen().sum_s == 3.0
 
 
 @pytest.mark.parametrize("bounds", [(), (0.2, 0.1), (0.1, 0.1)])
-def test_bounds_that_do_not_rise_are_refused(bounds: tuple[float, ...], clock: SetClock) -> None:
+def test_bounds_that_do_not_rise_are_refused(bounds: tuple[float, ...], stepped_clock: Any) -> None:
     with pytest.raises(ValueError, match="must rise"):
-        Durations(bounds, clock)
+        Durations(bounds, stepped_clock)
 
 
-def test_the_time_between_two_results_belongs_to_neither(clock: SetClock) -> None:
-    timings = Timings(["U1"], clock)
+def test_the_time_between_two_results_belongs_to_neither(stepped_clock: Any) -> None:
+    timings = Timings(["U1"], stepped_clock)
     for _ in range(3):
         began_s = timings.begin()
-        clock.s += 0.1
+        stepped_clock.step(0.1)
         timings.assessed("U1", began_s)
-        clock.s += 5.0
+        stepped_clock.step(5.0)
 
     seen = timings.assessments["U1"].seen()
     assert seen.n_up_to[-1] == 3
     assert seen.sum_s == pytest.approx(0.3)
 
 
-async def test_a_poll_is_what_lies_between_two_waits_of_one_task(clock: SetClock) -> None:
-    polls = PollClock(clock)
+async def test_a_poll_is_what_lies_between_two_waits_of_one_task(stepped_clock: Any) -> None:
+    polls = PollClock(stepped_clock)
 
     async def poll(n_times: int, duration_s: float) -> None:
         for _ in range(n_times):
             await polls.sleep(1.0)
-            clock.s += duration_s
+            stepped_clock.step(duration_s)
         await polls.sleep(1.0)
 
     await asyncio.create_task(poll(4, 0.25))
@@ -95,10 +74,10 @@ async def test_a_poll_is_what_lies_between_two_waits_of_one_task(clock: SetClock
     assert seen.sum_s == pytest.approx(4 * 0.25 + 2 * 0.5)
 
 
-async def test_the_time_without_a_link_is_no_poll(clock: SetClock) -> None:
-    polls = PollClock(clock)
+async def test_the_time_without_a_link_is_no_poll(stepped_clock: Any) -> None:
+    polls = PollClock(stepped_clock)
     await polls.sleep(1.0)
-    clock.s += 3600.0
+    stepped_clock.step(3600.0)
     polls.forget()
     await polls.sleep(1.0)
 
@@ -114,7 +93,7 @@ def test_however_many_reasons_there_are_labels_stay_few() -> None:
     assert sum(counts.values()) == 1005
 
 
-async def test_a_source_that_is_connected_again_begins_anew(clock: SetClock) -> None:
+async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) -> None:
     class Device:
         def __init__(self, own: Clock) -> None:
             self._own = own
@@ -126,21 +105,21 @@ async def test_a_source_that_is_connected_again_begins_anew(clock: SetClock) -> 
         async def _deliver(self) -> AsyncIterator[SampleBlock]:
             for _ in range(3):
                 await self._own.sleep(1.0)
-                clock.s += 0.25
+                stepped_clock.step(0.25)
             return
             yield
 
-    source = TimedSource(Device, clock)
+    source = TimedSource(Device, stepped_clock)
     for _ in range(2):
         async with source.connect() as blocks:
             assert [block async for block in blocks] == []
-        clock.s += 3600.0
+        stepped_clock.step(3600.0)
 
     assert source.polls.seen().n_up_to[-1] == 4
     assert source.polls.seen().sum_s == pytest.approx(4 * 0.25)
 
 
-async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(clock: SetClock) -> None:
+async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clock: Any) -> None:
     """As that of a CAN bus does; it says nothing of the task that reads the source."""
     heard: list[float] = []
 
@@ -148,9 +127,9 @@ async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(clock: SetC
         def beat(self, after_s: float = 0.0) -> None:
             heard.append(after_s)
 
-    polls = PollClock(clock)
+    polls = PollClock(stepped_clock)
     polls.listen(Heard())
-    assert await asyncio.to_thread(polls.monotonic_s) == clock.monotonic_s()
+    assert await asyncio.to_thread(polls.monotonic_s) == stepped_clock.monotonic_s()
     assert heard == []
     polls.monotonic_s()
     assert heard == [0.0]
