@@ -176,9 +176,6 @@ def test_the_table_has_a_row_for_each_operation_and_the_description_says_the_sam
     }
 
     assert roles == {name: row.role for name, row in TABLE.items()}
-
-
-def test_there_is_nothing_open_beside_it(access: Any) -> None:
     undescribed = {each.path for name, each in access.app.declared.items() if name not in TABLE}
 
     assert undescribed == {

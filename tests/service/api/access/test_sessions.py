@@ -43,33 +43,6 @@ async def test_what_a_proxy_passes_on_is_not_from_this_computer(read_only: Any) 
         assert answer.status_code == 401, header
 
 
-async def test_who_has_not_logged_in_sees_nothing_but_that(access: Any) -> None:
-    async with access.client() as client:
-        said = (await client.get(SESSION)).json()
-        refused = await client.get(UNITS)
-
-    assert said == {
-        "login_required": True,
-        "set_up_needed": True,
-        "name": None,
-        "role": None,
-        "permissions": [],
-    }
-    assert refused.status_code == 401
-    assert refused.headers["www-authenticate"].startswith("Bearer")
-
-
-async def test_who_logs_out_is_out(access: Any, anna: str) -> None:
-    async with access.client(**cookie(anna), Origin="http://padwatch") as client:
-        out = await client.delete(SESSION)
-        seen = await client.get(UNITS)
-        again = await client.delete(SESSION)
-
-    assert out.status_code == 204
-    assert "Max-Age=0" in out.headers["set-cookie"]
-    assert (seen.status_code, again.status_code) == (401, 204)
-
-
 async def test_a_login_never_takes_a_token_that_was_there_before(
     access: Any, anna: str, as_token: Token
 ) -> None:
@@ -185,7 +158,7 @@ async def test_with_a_cookie_only_the_dashboard_itself_acts_and_logs_in(
         assert (await client.post(SESSION, json=ANNA)).status_code == 403
 
 
-async def test_a_new_password_ends_all_other_logins(
+async def test_a_new_password_ends_all_other_logins_and_logging_out_this_one(
     access: Any, anna: str, as_token: Token
 ) -> None:
     new = "the river is low in august"
@@ -195,18 +168,25 @@ async def test_a_new_password_ends_all_other_logins(
         weak = await client.post(f"{SESSION}/password", json={**body, "new_password": "short"})
         changed = await client.post(f"{SESSION}/password", json=body)
         old = await client.get(UNITS)
-    async with access.client(**cookie(as_token(changed))) as client:
+    async with access.client(**cookie(as_token(changed)), Origin="http://padwatch") as client:
         seen = await client.get(UNITS)
+        out = await client.delete(SESSION)
+        after = await client.get(UNITS)
+        again = await client.delete(SESSION)
 
     assert (wrong.status_code, weak.status_code, changed.status_code) == (401, 422, 201)
     assert weak.json()["errors"][0]["parameter"] == "new_password"
     assert (old.status_code, seen.status_code) == (401, 200)
+    assert (out.status_code, after.status_code, again.status_code) == (204, 401, 204)
+    assert "Max-Age=0" in out.headers["set-cookie"]
 
 
 async def test_the_first_account_is_made_with_the_printed_token_and_once(access: Any) -> None:
     token = await access.desk.offer_set_up()
     body = {"token": token, **ANNA}
     async with access.client() as client:
+        before = (await client.get(SESSION)).json()
+        refused = await client.get(UNITS)
         forged = await client.post("/api/v1/set-up", json={**body, "token": "D" * 43})
         weak = await client.post("/api/v1/set-up", json={**body, "password": "short"})
         made = await client.post("/api/v1/set-up", json=body)
@@ -214,6 +194,15 @@ async def test_the_first_account_is_made_with_the_printed_token_and_once(access:
         after = (await client.get(SESSION)).json()
 
     assert [r.status_code for r in (forged, weak, made, again)] == [403, 422, 201, 403]
+    assert before == {
+        "login_required": True,
+        "set_up_needed": True,
+        "name": None,
+        "role": None,
+        "permissions": [],
+    }
+    assert refused.status_code == 401
+    assert refused.headers["www-authenticate"].startswith("Bearer")
     assert after["set_up_needed"] is False
     assert await access.session("anna")
     assert await access.desk.offer_set_up() is None

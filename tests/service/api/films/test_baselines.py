@@ -112,8 +112,7 @@ async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_aga
     assert service.films.baseline("U1", "UJB").origin.version == 1
     assert [s.actor for s in service.store.films.steps("U1", "UJB")][-2:] == ["A. Name"] * 2
 
-
-async def test_a_frozen_baseline_is_thawed_again(service: Any) -> None:
+    # it may be frozen, too, and thawed again
     frozen = (await post(service, f"{BASELINES}/freeze", ANNA)).json()
     thawed = (await post(service, f"{BASELINES}/thaw", ANNA)).json()
 

@@ -44,14 +44,6 @@ def _shared(answer: Any) -> Any:
     return answer
 
 
-async def test_ages_go_on_between_reports(pair: Any) -> None:
-    before = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
-    pair.service.clock.s += 3.0
-    after = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
-
-    assert after["age_s"] == pytest.approx(before["age_s"] + 3.0)
-
-
 async def test_a_process_that_has_died_is_not_shown_as_healthy(pair: Any) -> None:
     before = pair.replica.alarms.revision
     pair.service.clock.s += SILENT_AFTER_S + 0.1
@@ -110,7 +102,11 @@ async def test_a_lost_link_is_told(pair: Any) -> None:
     assert (unit["source"]["state"], unit["source"]["reason"]) == ("not_connected", "cut")
 
 
-async def test_live_samples_stay_where_they_are(pair: Any) -> None:
+async def test_ages_go_on_between_reports_and_live_samples_stay_where_they_are(pair: Any) -> None:
+    before = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+    pair.service.clock.s += 3.0
+    after = await pair.json("/api/v1/units/U1/bearings/UJB/latest")
+    assert after["age_s"] == pytest.approx(before["age_s"] + 3.0)
     for path in ("bearings/UJB/spectrum", "bearings/UJB/orbit", "bearings/UJB/motion", "waveform"):
         answer = await pair.client.get(f"/api/v1/units/U1/{path}")
 
@@ -118,7 +114,12 @@ async def test_live_samples_stay_where_they_are(pair: Any) -> None:
         assert "not available from this replica" in answer.json()["detail"]
 
 
-async def test_readiness_says_who_analyses(pair: Any) -> None:
+async def test_readiness_and_metrics_say_who_analyses(pair: Any) -> None:
+    text = (await pair.client.get("/metrics")).text
+    assert 'padwatch_unit_analysed{unit="U1"} 1.0' in text
+    assert 'padwatch_store_info{kind="' in text
+    assert 'padwatch_bearings{quality="good",unit="U1"}' in text
+
     alive = (await pair.client.get("/readyz")).json()["checks"]
     pair.service.clock.s += 60.0
     answer = await pair.client.get("/readyz")
@@ -126,14 +127,6 @@ async def test_readiness_says_who_analyses(pair: Any) -> None:
     assert alive["analysis of U1"] == "last sign of life 0.0 s ago"
     assert answer.status_code == 200  # others may go on; the replica does what it can
     assert answer.json()["checks"]["analysis of U1"] == "silent: last sign of life 60.0 s ago"
-
-
-async def test_metrics_say_who_analyses(pair: Any) -> None:
-    text = (await pair.client.get("/metrics")).text
-
-    assert 'padwatch_unit_analysed{unit="U1"} 1.0' in text
-    assert 'padwatch_store_info{kind="' in text
-    assert 'padwatch_bearings{quality="good",unit="U1"}' in text
 
 
 async def test_a_report_of_another_version_is_no_sign_of_life(
