@@ -40,7 +40,7 @@ def readings_of(points: list[tuple[int, float | None, Level]]) -> Summaries:
     ),
     st.sampled_from(NICE_WIDTHS_NS[:8]),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_buckets_lose_no_reading_no_extreme_and_no_doubt(
     points: list[tuple[int, float | None, Level]], width_ns: int
 ) -> None:
@@ -84,7 +84,7 @@ def test_buckets_lose_no_reading_no_extreme_and_no_doubt(
     st.floats(0.0, 1.0),
 )
 @example(999_999_999, 10_000_000_000, 10, 0.0, 1.0)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_a_range_never_takes_more_buckets_than_asked_for(
     start_ns: int, length_ns: int, max_points: int, first: float, last: float
 ) -> None:

@@ -7,6 +7,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from rigs.rolled_trends import n_rows
 from rigs.store_fixtures import At, Build
 
 from core.assessment import Assessment
@@ -37,11 +38,6 @@ def stored_of(store: SqliteStore, batches: list[list[Assessment]]) -> tuple[int,
     pytest.fail("nothing was refused")
 
 
-def n_readings(path: Path) -> int:
-    with closing(sqlite3.connect(path)) as connection:
-        return int(connection.execute("SELECT count(*) FROM assessment").fetchone()[0])
-
-
 def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(
     path: Path, assessment: Build, at: At
 ) -> None:
@@ -55,7 +51,7 @@ def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(
 
         assert store._writer is not first
         assert not store._file.marks.found
-    assert n_readings(path) == 10 * (n_stored + 1)
+    assert n_rows(path, "assessment") == 10 * (n_stored + 1)
 
 
 def test_a_full_disk_leaves_no_doubt_and_other_errors_do() -> None:

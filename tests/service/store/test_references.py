@@ -7,11 +7,14 @@ from pathlib import Path
 import pytest
 from rigs.store_fixtures import At, Build
 
+from core.alarms.vector_change import OrderVector, VectorReference
+from core.condition.operating_state import OperatingState
 from core.quality import Reading, Reason, missing, uncertain
 from service.store import sql_store
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
+from service.store.vector_reference_port import SetVectorReference
 
 T0 = 1_767_225_600_000_000_000
 
@@ -140,3 +143,43 @@ def test_only_the_newest_thousand_of_a_history_are_handed_out(store: SqliteStore
     history = store.reference_history("U1", "UJB")
 
     assert (len(history), history[0].set_ns, history[-1].set_ns) == (1000, T0 + 1000, T0 + 1)
+
+
+FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
+
+
+def vector_reference(set_ns: int, state: OperatingState, amplitude: float) -> SetVectorReference:
+    vectors = {"shaft_x": OrderVector(amplitude, 135.0), "bearing_y": OrderVector(20.0)}
+    found = VectorReference("U1", "UJB", state, vectors)
+    return SetVectorReference(found, set_ns, "E. Name", "after balancing")
+
+
+def test_the_newest_of_each_operating_state_rules_also_after_a_restart(path: Path) -> None:
+    first, other, newest = (
+        vector_reference(3, FULL, 60.0),
+        vector_reference(2, PART, 90.0),
+        vector_reference(1, FULL, 50),
+    )
+    store = SqliteStore(path)
+    for each in (first, other, newest):  # by order of setting: a clock may be put back
+        store.order1_references.add(each)
+    store.close()
+
+    again = SqliteStore(path)
+    assert again.order1_references.in_force() == [other, newest]
+    assert again.order1_references.history("U1", "UJB") == [newest, other, first]
+    assert again.order1_references.history("U1", "TJB") == []
+    again.close()
+
+
+@pytest.mark.parametrize("vectors", ['{"shaft_x": [-1.0, null]}', '{"shaft_x": 7}'])
+def test_a_reference_that_makes_no_sense_is_named(path: Path, vectors: str) -> None:
+    store = SqliteStore(path)
+    store._writer.execute(
+        "INSERT INTO vector_reference (unit, bearing, state, set_ns, author, note, vectors)"
+        " VALUES ('U1', 'UJB', 5, 1, 'x', '', ?)",
+        (vectors,),
+    )
+    with pytest.raises(StoreError, match="1× reference of unit U1 bearing UJB"):
+        store.order1_references.in_force()
+    store.close()

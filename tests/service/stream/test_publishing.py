@@ -51,6 +51,13 @@ async def running(publisher: Publisher) -> AsyncIterator[Publisher]:
         await asyncio.wait([task])
 
 
+async def published(out: Publisher, *blocks: SampleBlock) -> None:
+    """Publish blocks; returns when the server has confirmed them."""
+    for each in blocks:
+        await out.publish(each)
+    await drained(out)
+
+
 async def drained(publisher: Publisher) -> None:
     await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
 
@@ -103,9 +110,7 @@ async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_b
 ) -> None:
     anew = [replace(block(plant, n), start_ns=10**9 + n) for n in (0, 1)]
     async with running(publisher(plant, server.url)) as out:
-        for each in (block(plant, 0), block(plant, 1), *anew):
-            await out.publish(each)
-        await drained(out)
+        await published(out, block(plant, 0), block(plant, 1), *anew)
     assert numbers(await kept(plant, server)) == [0, 1, 0, 1]
 
 
@@ -113,13 +118,10 @@ async def test_a_block_that_is_published_twice_is_kept_once(
     plant: PlantFile, server: NatsServer
 ) -> None:
     async with running(publisher(plant, server.url)) as out:
-        for number in (0, 1, 0, 1, 2):
-            await out.publish(block(plant, number))
-        await drained(out)
+        await published(out, *(block(plant, number) for number in (0, 1, 0, 1, 2)))
         assert out.n_doubles == 2
     async with running(publisher(plant, server.url)) as again:
-        await again.publish(block(plant, 2))
-        await drained(again)
+        await published(again, block(plant, 2))
     assert numbers(await kept(plant, server)) == [0, 1, 2]
 
 
@@ -163,8 +165,7 @@ async def test_a_full_stream_refuses_aloud_and_drops_nothing(
 ) -> None:
     out = publisher(plant, server.url)
     async with running(out):
-        await out.publish(block(plant, 0))
-        await drained(out)
+        await published(out, block(plant, 0))
     tight = publisher(plant, server.url, max_gb=0.001)
     async with running(tight):
         await _publish_all(tight, plant, 8)
@@ -220,8 +221,7 @@ async def test_a_stream_of_another_plant_is_left_alone(
         update={"plant": plant.plant.model_copy(update={"name": "Another plant"})}
     )
     async with running(publisher(shared, server.url)) as out:
-        await out.publish(block(plant, 0))
-        await drained(out)
+        await published(out, block(plant, 0))
     async with running(publisher(other, server.url)) as out:
         await out.publish(block(plant, 1))
         await until(lambda: "belongs to another plant" in (out.trouble or ""))
@@ -237,8 +237,7 @@ async def test_a_server_that_lets_nobody_in_without_a_token_is_named_with_what_t
         async with running(publisher(plant, closed.url)) as out:
             await until(lambda: "token_file" in (out.trouble or ""))
         async with running(publisher(plant, closed.url, token_file=str(token))) as out:
-            await out.publish(block(plant, 0))
-            await drained(out)
+            await published(out, block(plant, 0))
 
 
 async def fail(error: Exception) -> None:
@@ -267,11 +266,9 @@ async def test_a_stream_that_is_deleted_meanwhile_is_made_again(
     plant: PlantFile, server: NatsServer
 ) -> None:
     async with running(publisher(plant, server.url)) as publishing:
-        await publishing.publish(block(plant, 0))
-        await drained(publishing)
+        await published(publishing, block(plant, 0))
         async with looking(server) as stream:
             await stream.delete_stream(stream_name(plant))
-        await publishing.publish(block(plant, 1))
-        await drained(publishing)
+        await published(publishing, block(plant, 1))
 
     assert [found.first_index for found in await kept(plant, server)] == [60]

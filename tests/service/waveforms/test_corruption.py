@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError
 from acquisition.recording.reader import open_recording
@@ -14,7 +15,6 @@ from acquisition.recording.summary import summary_of
 from service.recordings.shelf import Shelf
 from service.store.waveform_port import WaveformKind, WaveformState
 
-N_FEW, N_ALL = 300, 3000
 Damage = Callable[[bytearray, np.random.Generator], None]
 
 
@@ -70,12 +70,12 @@ def damaged(tmp_path: Path, make_recording: Any) -> Callable[[np.random.Generato
     return spoil
 
 
+@pytest.mark.parametrize("n_seeds", fast_and_long(200, 3000))
 def test_no_damage_gives_a_wrong_sample(
-    damaged: Callable[[np.random.Generator], Path], tmp_path: Path, pytestconfig: pytest.Config
+    damaged: Callable[[np.random.Generator], Path], tmp_path: Path, n_seeds: int
 ) -> None:
-    is_whole = bool(pytestconfig.getoption("--torture", False))
     truth, n_refused = content_of(tmp_path / "whole"), 0
-    for seed in range(N_ALL if is_whole else N_FEW):
+    for seed in range(n_seeds):
         folder = damaged(np.random.default_rng(seed))
         try:
             found = content_of(folder)
@@ -83,7 +83,7 @@ def test_no_damage_gives_a_wrong_sample(
             n_refused += 1
         else:
             assert found == truth, f"seed {seed}"
-    assert n_refused > 0.9 * (N_ALL if is_whole else N_FEW)
+    assert n_refused > 0.9 * n_seeds
 
 
 def test_nothing_of_a_recording_that_is_known_to_be_damaged_is_handed_out(rig: Any) -> None:

@@ -81,15 +81,6 @@ def test_what_cannot_be_read_is_not_the_oldest_for_that(rig: Any) -> None:
     assert [file.name for file in rig.files()] == [f"{broken.name}.damaged"]
 
 
-def test_a_clock_that_has_jumped_to_another_century_costs_nothing(rig: Any) -> None:
-    kept = rig.make_day(0)
-    rig.limit(continuous_days=1.0)
-    rig.clock.s = 80 * 366 * 86_400.0
-    rig.caretaker.look()
-
-    assert rig.names() == kept
-
-
 def test_a_clock_that_stamps_recordings_too_is_believed_after_a_day_of_them(rig: Any) -> None:
     kept = rig.make_day(0)
     rig.limit(continuous_days=1.0)

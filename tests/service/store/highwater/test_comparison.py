@@ -1,10 +1,12 @@
 """What is said of a database that is not the one that was here last."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from service.store.highwater.comparison import MAX_BEHIND, Kind, MarkFinding, compared
+from service.store.highwater.host import host_id
 from service.store.highwater.mark import Mark
 
 Build = Callable[..., Mark]
@@ -85,3 +87,21 @@ def test_a_time_that_is_none_stops_nobody(mark: Build) -> None:
     assert found.n_missing == 149
     found = only(compared(mark(), mark(n_commits=1, time_ns=-(2**70)), "host"))
     assert "an unknown time" in found.detail
+
+
+def test_machines_are_told_apart_without_giving_away_their_names(tmp_path: Path) -> None:
+    names = [tmp_path / "one", tmp_path / "other"]
+    for n, name in enumerate(names):
+        name.write_text(f"{n:032x}\n")
+    ids = [host_id(name) for name in names]
+
+    assert ids[0] != ids[1]
+    assert ids[0] == host_id(names[0])
+    assert f"{0:032x}" not in ids[0]
+
+
+@pytest.mark.parametrize("text", ["", "\n", "uninitialized\n"])
+def test_a_machine_without_a_name_has_none(tmp_path: Path, text: str) -> None:
+    (tmp_path / "machine-id").write_text(text)
+
+    assert host_id(tmp_path / "machine-id") == host_id(tmp_path / "none") == ""
