@@ -13,41 +13,23 @@ import pytest
 from rigs.can import CanFdRig, CanRig
 from rigs.modbus import ModbusRig, ModbusRtuRig
 from rigs.recording import RecordingRig, UnitsRecordingRig
-from rigs.registers import (
-    ChannelFifoTcpRig,
-    FifoRtuRig,
-    FifoTcpRig,
-    PolledRtuRig,
-    PolledTcpRig,
-    VectorRtuRig,
-    VectorTcpRig,
-)
+from rigs.registers import REGISTER_RIGS
 from rigs.simulated import SimulatedRig
 
-WIRED = [
-    CanRig,
-    CanFdRig,
-    ModbusRig,
-    ModbusRtuRig,
-    PolledTcpRig,
-    PolledRtuRig,
-    VectorTcpRig,
-    VectorRtuRig,
-    FifoTcpRig,
-    FifoRtuRig,
-    ChannelFifoTcpRig,
-]
+WIRED = [CanRig, CanFdRig, ModbusRig, ModbusRtuRig, *REGISTER_RIGS]
 ALL = [*WIRED, SimulatedRig, RecordingRig, UnitsRecordingRig]
 
 
-SAME_SOURCE_ON_A_LINE = (PolledRtuRig, VectorRtuRig, FifoRtuRig)
-"""Sources that are in `ALL` over TCP, too: in the fast tier a line is only lost and found again."""
-
-
 def rigs_of(kinds: list[type]) -> list:
-    """Parameters of a fixture that builds rigs."""
-    long = dict.fromkeys(SAME_SOURCE_ON_A_LINE, pytest.mark.long)
-    return [pytest.param(kind, id=kind.__name__, marks=long.get(kind, ())) for kind in kinds]
+    """Parameters of a fixture that builds rigs.
+
+    Sources of registers are here over TCP, too: their lines are long, but in `wired_rig`.
+    """
+    long = [kind for kind in REGISTER_RIGS if kind.__name__.endswith("RtuRig")]
+    return [
+        pytest.param(kind, id=kind.__name__, marks=pytest.mark.long if kind in long else ())
+        for kind in kinds
+    ]
 
 
 @pytest.fixture

@@ -41,33 +41,26 @@ def test_an_unknown_fault_is_refused_with_those_that_are_known(server):
 
 
 @pytest.mark.parametrize(
-    ("fault", "reason"),
+    ("fault", "n_slots", "reason"),
     [
-        ("tear", "torn_slot"),
-        ("damage", "damaged_slot"),
-        ("repeat", "inconsistent_index"),
-        ("wrong_sequence", "wrong_sequence"),
-        ("wrong_index", "inconsistent_index"),
+        ("drop", 3, None),
+        ("tear", 1, "torn_slot"),
+        ("damage", 1, "damaged_slot"),
+        ("repeat", 1, "inconsistent_index"),
+        ("wrong_sequence", 1, "wrong_sequence"),
+        ("wrong_index", 1, "inconsistent_index"),
     ],
 )
-async def test_a_spoilt_slot_is_refused_and_counted_and_the_next_is_not(
-    fault, reason, server, device, source
+async def test_a_spoilt_slot_is_refused_and_counted_a_dropped_one_is_a_gap_and_the_next_is_right(
+    fault, n_slots, reason, server, device, source
 ):
     async with source.connect() as stream:
         await anext(stream)
-        server.inject(fault)
-        device.produce(2)
+        server.inject(fault, n_slots)
+        device.produce(n_slots + 1)
         block = await anext(stream)
-    assert (block.first_index, block.rejected) == (100, (Rejection(reason, 50),))
-
-
-async def test_dropped_slots_are_a_gap_of_that_many(server, device, source):
-    async with source.connect() as stream:
-        await anext(stream)
-        server.inject("drop", 3)
-        device.produce(4)
-        block = await anext(stream)
-    assert (block.first_index, block.rejected) == (200, ())
+    assert block.first_index == 50 * (n_slots + 1)
+    assert block.rejected == ((Rejection(reason, 50),) if reason else ())
 
 
 async def test_a_wrong_stamp_is_flagged(server, device, source):

@@ -1,6 +1,5 @@
 """A simulated rack says of a known machine what a real one would, and equation (5) follows."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -66,22 +65,19 @@ def calibration() -> UnitCalibration:
 
 
 @pytest.fixture
-def rack(calibration) -> Callable[..., VectorDevice]:
-    def build() -> VectorDevice:
-        registers = load_map_file(RACK).register_map()
-        return VectorDevice(
-            Machine(), registers, rows_of(RACK), calibration, channels=IDS, speed_channel="speed"
-        )
-
-    return build
+def rack(calibration) -> VectorDevice:
+    registers = load_map_file(RACK).register_map()
+    device = VectorDevice(
+        Machine(), registers, rows_of(RACK), calibration, channels=IDS, speed_channel="speed"
+    )
+    device.produce(10)
+    return device
 
 
 def test_a_rack_states_amplitudes_phases_and_gaps_in_its_own_conventions(rack) -> None:
-    device = rack()
-    device.produce(10)
     decoder = MapDecoder(load_map_file(RACK).register_map())
     content = b"".join(
-        device.image.read_registers(r.function, r.start, r.count) for r in decoder.plan.requests
+        rack.image.read_registers(r.function, r.start, r.count) for r in decoder.plan.requests
     )
     found = dict(zip(decoder.map.ids, decoder.read(content).values, strict=True))
 
@@ -96,9 +92,8 @@ def test_a_rack_states_amplitudes_phases_and_gaps_in_its_own_conventions(rack) -
 async def test_equation_5_comes_out_of_a_rack_over_the_wire(
     rack, calibration, stepped_clock
 ) -> None:
-    device, rows, rate_hz = rack(), rows_of(RACK), 1.0
-    device.produce(10)
-    device.on_demand = True
+    rows, rate_hz = rows_of(RACK), 1.0
+    rack.on_demand = True
     channels = tuple(
         Channel(id_, m, 1)
         for id_, m in zip(IDS, [Measurand.GAP_UM] * 2 + [Measurand.VELOCITY_MM_S] * 2, strict=True)
@@ -106,7 +101,7 @@ async def test_equation_5_comes_out_of_a_rack_over_the_wire(
     bearing = Bearing("UJB", K_B, *IDS, 200.0, (2000.0, 2000.0))
     unit = Unit("U1", SPEED_RPM, rate_hz, channels, (bearing,), "speed")
     monitor = VectorMonitor(unit, rows, AnalysisSettings(), VectorSettings(24, 12, 4))
-    async with ModbusTcpServer(device) as server:
+    async with ModbusTcpServer(rack) as server:
         transport = TcpTransport(host="127.0.0.1", port=server.port)
         source = PolledSource(
             PolledSettings(transport=transport, timeout_s=5.0),

@@ -9,7 +9,7 @@ from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
-from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
+from acquisition.modbus.transport import ConnectionUse, TcpTransport
 from acquisition.registers.cells import Cell
 from acquisition.registers.register_map import Signature
 
@@ -75,10 +75,3 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
             device.image.put(Cell(address=1), 43)
         with pytest.raises(ConfigError, match=r"another device"):
             await anext(stream)
-
-
-def test_a_serial_line_is_always_kept():
-    with pytest.raises(ConfigError, match="serial line is kept"):
-        LinkSettings(
-            transport=SerialTransport(device="/dev/ttyUSB0"), connection=ConnectionUse.PER_REPLY
-        )

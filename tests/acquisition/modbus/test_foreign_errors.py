@@ -10,7 +10,6 @@ import serial.serialutil
 from pymodbus.client.base import ModbusBaseClient
 
 from acquisition.errors import AcquisitionError, ConfigError, LinkError
-from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 
 FOREIGN = [
     kind
@@ -92,40 +91,3 @@ async def test_a_closed_link_says_so_and_closing_again_is_harmless(server, link_
     link.close()
     with pytest.raises(LinkError, match="closed"):
         await link.read(0, 1)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "complaint"),
-    [
-        ({"device_id": 256}, "device_id is 256, allowed is 1 to 255"),
-        ({"max_registers": 126}, "max_registers is 126, allowed is 1 to 125"),
-        ({"timeout_s": 0.0}, "timeout_s is 0.0"),
-        ({"timeout_s": float("nan")}, "timeout_s is nan"),
-    ],
-)
-def test_settings_are_refused_with_value_and_limit(wrong, complaint):
-    with pytest.raises(ConfigError, match=complaint):
-        LinkSettings(transport=TcpTransport(host="127.0.0.1"), **wrong)
-
-
-@pytest.mark.parametrize(
-    ("kind", "wrong", "complaint"),
-    [
-        (TcpTransport, {"host": "daq", "port": 0}, "port is 0, allowed is 1 to 65535"),
-        (SerialTransport, {"device": "/dev/tty", "baudrate": 299}, "baudrate is 299, allowed is"),
-        (
-            SerialTransport,
-            {"device": "/dev/tty", "parity": "mark"},
-            "parity is 'mark', allowed are",
-        ),
-        (SerialTransport, {"device": "/dev/tty", "stop_bits": 3}, "stop_bits is 3, allowed is 1"),
-    ],
-)
-def test_transports_are_refused_with_value_and_limit(kind, wrong, complaint):
-    with pytest.raises(ConfigError, match=complaint):
-        kind(**wrong)
-
-
-def test_a_serial_line_has_no_device_beyond_247():
-    with pytest.raises(ConfigError, match="device_id is 248, allowed is 1 to 247"):
-        LinkSettings(transport=SerialTransport(device="/dev/ttyUSB0"), device_id=248)

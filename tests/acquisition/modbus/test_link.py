@@ -137,7 +137,7 @@ def test_pymodbus_has_more_requests_than_may_be_sent():
 
 @pytest.mark.parametrize("kind", requests_of_pymodbus(), ids=lambda kind: kind.__name__)
 async def test_nothing_but_reads_ever_reaches_the_wire(kind, linked, bench_server):
-    link = linked(timeout_s=0.02)
+    link = linked()
     await link.open()
     request = kind(**arguments_of(kind))
     if kind.__name__ in READS:

@@ -10,6 +10,8 @@ from acquisition.registers.device_time import EpochTime
 from acquisition.registers.register_map import Signature
 from core.quality import GOOD
 
+FLOAT = Cell(address=30, type=NumberType.FLOAT32)
+
 
 async def test_each_poll_is_a_sample_with_its_slow_values(plant) -> None:
     async with plant() as (source, *_):
@@ -118,25 +120,24 @@ async def test_a_device_that_samples_when_it_is_asked_has_no_drift(plant) -> Non
     assert {block.clock.drift_ppm for block in blocks} == {None}
 
 
-async def test_another_device_at_the_same_address_is_refused(plant) -> None:
-    registers = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))
-    other = map_of(signature=(Signature(cell=Cell(address=1), expected=43.0),))
-    async with plant(registers, read_as=other) as (source, *_):
-        with pytest.raises(ConfigError, match="register 1 is 42, expected 43"):
+@pytest.mark.parametrize(
+    ("cell", "held", "other", "said"),
+    [
+        (Cell(address=1), 42.0, 43.0, "register 1 is 42, expected 43"),
+        (FLOAT, 0.1, 0.2, r"register 30 is 0\.1, expected 0\.2"),
+    ],
+)
+async def test_another_device_at_the_same_address_is_refused(
+    plant, cell, held, other, said
+) -> None:
+    device, read_as = (
+        map_of(signature=(Signature(cell=cell, expected=expected),)) for expected in (held, other)
+    )
+    async with plant(device) as (source, *_):
+        assert len(await take(source, 1)) == 1
+    async with plant(device, read_as=read_as) as (source, *_):
+        with pytest.raises(ConfigError, match=said):
             await take(source, 1)
-
-
-@pytest.mark.parametrize(("expected", "is_right"), [(0.1, True), (0.2, False)])
-async def test_a_float_can_be_a_signature(plant, expected: float, is_right: bool) -> None:
-    cell = Cell(address=30, type=NumberType.FLOAT32)
-    registers = map_of(signature=(Signature(cell=cell, expected=0.1),))
-    read_as = map_of(signature=(Signature(cell=cell, expected=expected),))
-    async with plant(registers, read_as=read_as) as (source, *_):
-        if is_right:
-            assert len(await take(source, 1)) == 1
-        else:
-            with pytest.raises(ConfigError, match=r"register 30 is 0\.1, expected 0\.2"):
-                await take(source, 1)
 
 
 @pytest.mark.parametrize(

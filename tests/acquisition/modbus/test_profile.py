@@ -75,20 +75,6 @@ def equal_slots(a: Slot, b: Slot) -> bool:
     numbers=st.tuples(u32, u32, u32, u32, u32),
     trailer=u16,
     counts=arrays(np.int16, (3, 4)),
-)
-def test_a_slot_of_version_1_reads_back_as_it_was_written(numbers, trailer, counts):
-    slot = Slot(*numbers, counts=counts, trailer=trailer)
-    data = encode_slot(slot, V1)
-    assert len(data) == 2 * V1.slot_registers
-    read = decode_slot(data, V1)
-    np.testing.assert_array_equal(read.counts, counts)
-    assert equal_slots(read, slot)
-
-
-@given(
-    numbers=st.tuples(u32, u32, u32, u32, u32),
-    trailer=u16,
-    counts=arrays(np.int16, (3, 4)),
     epoch=u32,
     slow=st.tuples(*[st.floats(width=32, allow_nan=False)] * 2),
     damage=u32,

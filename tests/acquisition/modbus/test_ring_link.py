@@ -9,8 +9,6 @@ from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_pace import out_of_step_s
-from acquisition.modbus.ring_source import ModbusRingSettings
-from acquisition.modbus.transport import TcpTransport
 
 
 async def test_a_device_that_stands_still_is_not_connected(
@@ -83,20 +81,6 @@ async def test_input_registers_and_small_reads_bring_the_same_samples(
     samples = np.concatenate([block.samples[0] for block in blocks])
     np.testing.assert_array_equal(samples, np.arange(50, 150))
     assert set(server.function_codes) == {4}
-
-
-@pytest.mark.parametrize(
-    ("wrong", "complaint"),
-    [
-        ({"function": 6}, "function is 6, allowed are 3 and 4"),
-        ({"base_address": 65521}, "base_address is 65521, allowed is 0 to 65520"),
-        ({"poll_period_s": 0.0}, "poll_period_s is 0.0, must be above 0"),
-        ({"stale_after_s": float("inf")}, "stale_after_s is inf"),
-    ],
-)
-def test_ring_settings_are_refused_with_value_and_limit(wrong, complaint):
-    with pytest.raises(ConfigError, match=complaint):
-        ModbusRingSettings(transport=TcpTransport(host="127.0.0.1"), **wrong)
 
 
 async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(

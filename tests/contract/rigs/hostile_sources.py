@@ -10,15 +10,7 @@ from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import ConfigError, LinkError
 from rigs.hostile_modbus import HostileLine, HostileServer
 from rigs.modbus import ModbusRig, ModbusRtuRig
-from rigs.registers import (
-    ChannelFifoTcpRig,
-    FifoRtuRig,
-    FifoTcpRig,
-    PolledRtuRig,
-    PolledTcpRig,
-    VectorRtuRig,
-    VectorTcpRig,
-)
+from rigs.registers import REGISTER_RIGS
 from rigs.wrong_replies import (
     CONTENTS,
     FIFO,
@@ -61,19 +53,15 @@ def _ring(rig: type, version: int) -> type:
     return _kind(rig, shape=RingDeviceSettings(samples_per_slot=100, version=version))
 
 
+_REGISTERS = ["polled", "polled", "vector", "vector", "queue", "queue", "queue for each channel"]
 KINDS = {
-    ("tcp", "ring 1"): _ring(ModbusRig, 1),
-    ("rtu", "ring 1"): _ring(ModbusRtuRig, 1),
-    ("tcp", "ring 2"): _ring(ModbusRig, 2),
-    ("rtu", "ring 2"): _ring(ModbusRtuRig, 2),
-    ("tcp", "polled"): _kind(PolledTcpRig),
-    ("rtu", "polled"): _kind(PolledRtuRig),
-    ("tcp", "vector"): _kind(VectorTcpRig),
-    ("rtu", "vector"): _kind(VectorRtuRig),
-    ("tcp", "queue"): _kind(FifoTcpRig),
-    ("rtu", "queue"): _kind(FifoRtuRig),
-    ("tcp", "queue for each channel"): _kind(ChannelFifoTcpRig),
+    (kind.link, source): kind
+    for source, kind in [
+        *((f"ring {n}", _ring(rig, n)) for n in (1, 2) for rig in (ModbusRig, ModbusRtuRig)),
+        *zip(_REGISTERS, map(_kind, REGISTER_RIGS), strict=True),
+    ]
 }
+"""Kinds of lying devices, by link and source."""
 
 
 def lies_to(link: str, source: str) -> dict[str, Callable]:

@@ -194,3 +194,14 @@ class ChannelFifoTcpRig(OnTcp, _FifoRig):
     """A queue for each channel, over Modbus TCP."""
 
     layout = FifoLayout(addresses=(1000, 1100), n_channels=2, kind=FifoKind.PER_CHANNEL)
+
+
+REGISTER_RIGS = [
+    PolledTcpRig,
+    PolledRtuRig,
+    VectorTcpRig,
+    VectorRtuRig,
+    FifoTcpRig,
+    FifoRtuRig,
+    ChannelFifoTcpRig,
+]
