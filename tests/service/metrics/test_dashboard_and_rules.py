@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -32,115 +32,54 @@ OF_GAUGES = {"delta", "changes"}
 FUNCTIONS = {*OF_COUNTERS, *OF_GAUGES, "histogram_quantile", "absent", "vector"}
 AGGREGATIONS = {"sum", "max", "count"}
 BINARY = {"and", "or"}
-TOKEN = re.compile(
-    r"""\s*(?:(?P<string>"[^"\\]*")|(?P<duration>\d+[smhd]\b)|(?P<number>\d+(?:\.\d+)?\b)
-    |(?P<word>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>==|!=|=~|!~|[-+*/><=(){}\[\],]))""",
+WORDS = "|".join(sorted(FUNCTIONS | AGGREGATIONS | BINARY))
+GROUPING = re.compile(r"\b(by|on) ?\(([\w, ]*)\)")
+SELECTOR = re.compile(
+    rf"""(?:\b(?P<function>{"|".join(OF_COUNTERS | OF_GAUGES)})\()?
+    \b(?!(?:{WORDS})\b)(?P<name>[a-z_]\w*)
+    (?:\{{(?P<matchers>[^}}]*)\}})?(?P<range>\[\d+[smhd]\])?""",
     re.VERBOSE,
 )
+MATCHER = re.compile(r'(\w+)(=~|!~|!=|=)"([^"\\]*)",?\s*')
+REST = re.compile(rf"(?:\b(?:{WORDS})\b|[\s\d.()+*/><=,-])*")
+"""What an expression holds besides metrics and groupings."""
 
 Exposed = dict[str, tuple[str, set[frozenset[tuple[str, str]]]]]
 """Type and sets of labels, by the name of a sample."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Query:
     """What a PromQL expression asks for: metrics with matchers and function, labels that remain."""
 
-    uses: list[tuple[str, dict[str, tuple[str, str]], str | None]] = field(default_factory=list)
-    kept: set[str] = field(default_factory=set)
-    matched_on: set[str] = field(default_factory=set)
+    uses: list[tuple[str, dict[str, tuple[str, str]], str | None]]
+    kept: set[str]
+    matched_on: set[str]
 
 
-class Reader:
-    """Reads the part of PromQL that is used here, and nothing else."""
-
-    def __init__(self, expr: str) -> None:
-        self.tokens = list(tokens(expr.replace("$__rate_interval", "5m")))
-        self.at = 0
-        self.query = Query()
-
-    def read(self) -> Query:
-        depth, function = 0, None
-        while self.at < len(self.tokens):
-            kind, text = self.take()
-            if kind == "word" and text in FUNCTIONS | AGGREGATIONS:
-                function = self.called(text)
-            elif kind == "word" and text in BINARY:
-                if self.follows("on"):
-                    self.query.matched_on |= self.labels()
-            elif kind == "word":
-                self.metric(text, function)
-            elif text in ("(", ")"):
-                depth += 1 if text == "(" else -1
-                assert depth >= 0, "too many )"
-            else:
-                assert kind == "number" or text in "-+*/><==,", f"unexpected {text}"
-        assert depth == 0, "( without )"
-        return self.query
-
-    def called(self, name: str) -> str:
-        if name in AGGREGATIONS and self.follows("by"):
-            self.query.kept |= self.labels()
-        assert self.tokens[self.at][1] == "(", f"{name} without ("
-        return name
-
-    def metric(self, name: str, function: str | None) -> None:
-        matchers: dict[str, tuple[str, str]] = {}
-        while self.follows("{") or (matchers and self.follows(",")):
-            label, operator = self.take()[1], self.take()[1]
-            kind, value = self.take()
-            assert (operator in ("=", "=~", "!=", "!~"), kind) == (True, "string"), label
-            matchers[label] = (operator, value.strip('"'))
-        if matchers:
-            assert self.take()[1] == "}", f"{name}: }} is missing"
-        if self.follows("["):
-            assert self.take()[0] == "duration"
-            assert self.take()[1] == "]"
-            assert function in OF_COUNTERS | OF_GAUGES, f"{name}: a range for {function}"
-        else:
-            function = None if function in AGGREGATIONS else function
-            assert function not in OF_COUNTERS | OF_GAUGES or self.is_closed(), f"{name}: no range"
-            function = None
-        self.query.uses.append((name, matchers, function))
-
-    def is_closed(self) -> bool:
-        """Whether the call of the function that was read last has ended before this."""
-        before = [text for _, text in self.tokens[: self.at]]
-        start = max(n for n, text in enumerate(before) if text in OF_COUNTERS | OF_GAUGES)
-        return before[start:].count("(") == before[start:].count(")")
-
-    def labels(self) -> set[str]:
-        assert self.take()[1] == "("
-        found = set()
-        while (text := self.take()[1]) != ")":
-            if text != ",":
-                found.add(text)
-        return found
-
-    def take(self) -> tuple[str, str]:
-        self.at += 1
-        return self.tokens[self.at - 1]
-
-    def follows(self, text: str) -> bool:
-        if self.at < len(self.tokens) and self.tokens[self.at][1] == text:
-            self.at += 1
-            return True
-        return False
-
-
-def tokens(expr: str) -> Iterator[tuple[str, str]]:
-    at, expr = 0, expr.rstrip()
-    while at < len(expr):
-        found = TOKEN.match(expr, at)
-        assert found is not None, f"not understood: {expr[at:]}"
-        at = found.end()
-        assert found.lastgroup is not None
-        yield found.lastgroup, found[found.lastgroup]
+def read(expr: str) -> Query:
+    """Read the part of PromQL that is used here; all else is refused."""
+    expr = expr.replace("$__rate_interval", "5m")
+    groups: dict[str, set[str]] = {"by": set(), "on": set()}
+    for word, labels in GROUPING.findall(expr):
+        groups[word] |= set(re.findall(r"\w+", labels))
+    expr = GROUPING.sub("", expr)
+    uses = []
+    for found in SELECTOR.finditer(expr):
+        function, name, matchers = found["function"], found["name"], found["matchers"] or ""
+        assert (function is None) == (found["range"] is None), f"{name}: range and {function}"
+        assert not MATCHER.sub("", matchers), f"{name}: {matchers}"
+        wanted = {label: (sign, value) for label, sign, value in MATCHER.findall(matchers)}
+        uses.append((name, wanted, function))
+    assert expr.count("(") == expr.count(")"), f"{expr}: brackets do not match"
+    rest = SELECTOR.sub("", expr)
+    assert REST.fullmatch(rest), f"not understood: {rest}"
+    return Query(uses, groups["by"], groups["on"])
 
 
 def check(expr: str, exposed: Exposed) -> tuple[Query, set[str]]:
     """Compare an expression with what is told; return it with the labels of its result."""
-    query = Reader(expr).read()
+    query = read(expr)
     known = set(TARGET)
     assert query.uses, expr
     for name, matchers, function in query.uses:
