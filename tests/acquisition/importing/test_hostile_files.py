@@ -47,7 +47,9 @@ def test_wrong_text_is_refused_naming_the_line(
     tmp_path: Path, read: Read, csv_job: ImportJob, content: bytes, words: str
 ) -> None:
     (tmp_path / "run").write_bytes(content)
-    assert words in refusal(read, tmp_path / "run", csv_job)
+    says = refusal(read, tmp_path / "run", csv_job)
+    assert words in says
+    assert "not readable as" not in says
 
 
 def test_a_file_that_is_none_is_refused(tmp_path: Path, read: Read, csv_job: ImportJob) -> None:
