@@ -121,7 +121,8 @@ class Writer:
     def _outcome(self, number: str) -> str | None:
         """What has become of a transaction; None while that cannot be known."""
         try:
-            self._session = writing_session(self._address)
+            if self._session.closed:
+                self._session = writing_session(self._address)
             row = self._session.execute(OUTCOME, (number,)).fetchone()
         except (psycopg.OperationalError, StoreError):
             return None
