@@ -114,11 +114,11 @@ def days_of(history: StiffnessHistory, first: float, end: float) -> StiffnessHis
 async def test_a_baseline_is_learned_after_its_days_and_put_in_force(
     plant: Plant, film_life: FilmLife
 ) -> None:
-    keeper, history = await plant.start(learn_every_days=7), film_life(2, days=45)
+    keeper, history = await plant.start(learn_every_days=4), film_life(2, days=31)
 
     await plant.live(keeper, history, (0, 19))
     assert in_force(keeper) is None
-    await plant.live(keeper, history, (19, 42), judged=True)
+    await plant.live(keeper, history, (19, 31), judged=True)
 
     versions = plant.versions
     assert versions == sorted(versions, reverse=True)
@@ -144,8 +144,8 @@ async def test_a_film_that_creeps_away_is_not_learned_little_by_little(
         2, days=90, change=lambda h: np.log(1.0 - 0.2 * np.clip((h / 24 - 20) / 70, 0.0, 1.0))
     )
     keeper = await plant.start(learn_every_days=20)
-    await plant.live(keeper, creep, (0, 70), every=5)
-    await plant.live(keeper, creep, (70, 90), every=5, judged=True)
+    await plant.live(keeper, creep, (0, 80), every=5)
+    await plant.live(keeper, creep, (80, 90), every=5, judged=True)
 
     steps = plant.store.films.steps("U1", "UJB")
     doubted = {s.version for s in steps if s.step is BaselineStep.LEARNED and "%" in s.reason}
