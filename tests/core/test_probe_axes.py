@@ -180,9 +180,13 @@ def test_eccentricity_and_angle_stay_within_their_stated_uncertainty(lost: tuple
     assert np.std(off) == pytest.approx(np.sqrt(np.mean(np.square(widths))), rel=0.15)
 
 
-@pytest.mark.parametrize("value", [-1.0, math.inf, math.nan])
-def test_limits_and_clearances_that_cannot_be_are_refused(value: float) -> None:
+@pytest.mark.parametrize(
+    ("growth_um", "clearance_um"), [(-1.0, 0.0), (math.inf, -1.0), (math.nan, math.nan)]
+)
+def test_limits_and_clearances_that_cannot_be_are_refused(
+    growth_um: float, clearance_um: float
+) -> None:
     with pytest.raises(ValueError, match="growth_um must be a half-width"):
-        GapAccuracy(growth_um=value)
+        GapAccuracy(growth_um=growth_um)
     with pytest.raises(ValueError, match="clearance must be positive"):
-        locate_shaft(*gaps(0.0, 0.0), min(value, 0.0) if value < math.inf else math.nan)
+        locate_shaft(*gaps(0.0, 0.0), clearance_um)

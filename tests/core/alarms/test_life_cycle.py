@@ -77,7 +77,8 @@ def test_a_lost_probe_keeps_an_alarm_active_and_says_that_it_is_not_known(life: 
     assert alarm.find(LOST, 10**12) == []
     assert alarm.alarm.level is AlarmLevel.DANGER
     assert not alarm.alarm.condition.is_known
-    assert alarm.alarm.condition.value == 210.0  # the last that was known
+    last_known = alarm.alarm.condition
+    assert (last_known.level, last_known.value, last_known.limit) == (2, 210.0, 200.0)
     assert alarm.events[-1].reason == "sensor_failure"
     assert alarm.find(WITHIN, 10**12 + 1) == ["condition_known", "returned"]
 

@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -241,9 +242,15 @@ class LifeCycle(RuleBasedStateMachine):
             self.open.add(self.n_occurrences)
 
 
+N_SEQUENCES = int(os.environ.get("PADWATCH_SEQUENCES", "150"))
 LifeCycle.TestCase.settings = settings(
-    max_examples=int(os.environ.get("PADWATCH_SEQUENCES", "150")),
-    stateful_step_count=40,
-    deadline=None,
+    max_examples=N_SEQUENCES, stateful_step_count=40, deadline=None
 )
 TestLifeCycle = LifeCycle.TestCase
+
+
+@pytest.mark.long
+class TestLongLifeCycle(LifeCycle.TestCase):
+    """The same with more sequences."""
+
+    settings = settings(max_examples=3 * N_SEQUENCES, stateful_step_count=40, deadline=None)
