@@ -3,15 +3,15 @@
 import re
 import ssl
 import subprocess
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import httpx2
 import pytest
 from rigs.command_line import padwatch
 
-Start = Callable[..., Awaitable[Any]]
+from .conftest import PATIENCE_S, Start
+
 Write = Callable[..., Path]
 
 PASSWORD = "the river is high in may"  # noqa: S105
@@ -44,12 +44,14 @@ async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_wh
     url = await service.wait_for_url()
     [token] = TOKEN.findall("".join(service.said))
     trusted = ssl.create_default_context(cafile=certificate[0])
-    async with httpx2.AsyncClient(base_url=url, verify=trusted, trust_env=False) as client:
+    async with httpx2.AsyncClient(
+        base_url=url, verify=trusted, trust_env=False, timeout=PATIENCE_S
+    ) as client:
         closed = await client.get("/api/v1/units")
         made, login, cookie = await first_account(client, token)
         seen = await client.get("/api/v1/units", headers={"Cookie": cookie})
         open_ = await client.get("/livez")
-    async with httpx2.AsyncClient(trust_env=False) as plain:
+    async with httpx2.AsyncClient(trust_env=False, timeout=PATIENCE_S) as plain:
         with pytest.raises(httpx2.TransportError):
             await plain.get(url.replace("https", "http") + "/livez")
 
@@ -72,7 +74,7 @@ async def test_on_a_socket_everybody_logs_in_and_the_proxy_says_who_it_speaks_fo
     transport = httpx2.AsyncHTTPTransport(uds=str(path))
     headers = {"X-Forwarded-For": "127.0.0.1, 192.0.2.7", "X-Forwarded-Proto": "https"}
     async with httpx2.AsyncClient(
-        transport=transport, base_url="http://localhost", headers=headers
+        transport=transport, base_url="http://localhost", headers=headers, timeout=PATIENCE_S
     ) as client:
         closed = await client.get("/api/v1/units")
         made, login, cookie = await first_account(client, token, Origin="https://localhost")
