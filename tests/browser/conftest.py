@@ -14,8 +14,12 @@ from playwright.async_api import (
     ConsoleMessage,
     Page,
     async_playwright,
+    expect,
 )
 from real_plant import PASSWORD, Plant
+
+PATIENCE_MS = 60_000
+expect.set_options(timeout=PATIENCE_MS)  # pages are slow where workers share few cores
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
