@@ -222,8 +222,9 @@ async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_l
     ports = dict.fromkeys(LEDGER.units, 9)
     plant = LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream)
     async with analysing(load_plant_file(plant)) as (_, ground):
-        while ground.live.status(UNIT).state is LinkState.CONNECTING:
-            await asyncio.sleep(0.01)
+        async with asyncio.timeout(60.0):
+            while ground.live.status(UNIT).state is LinkState.CONNECTING:
+                await asyncio.sleep(0.01)
         status = ground.live.status(UNIT)
     assert status.state is LinkState.NOT_CONNECTED
     assert "127.0.0.1:9 is not reached" in str(status.reason)
