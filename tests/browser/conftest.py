@@ -1,8 +1,7 @@
 """A real browser: pages of real plants in Chromium."""
 
-import os
 import shutil
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from playwright.async_api import (
     async_playwright,
     expect,
 )
-from real_plant import PASSWORD, Plant
+from real_plant import Plant
 
 PATIENCE_MS = 60_000
 expect.set_options(timeout=PATIENCE_MS)  # pages are slow where workers share few cores
@@ -104,37 +103,14 @@ async def phone_page(phone: BrowserContext) -> AsyncIterator[Page]:
 
 
 @pytest.fixture
-def password() -> str:
-    """Of all accounts of the guarded plant."""
-    return PASSWORD
+def complaints(page: Page) -> list[str]:
+    """Complaints of the page's console."""
+    found: list[str] = []
 
+    def note(message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning"):
+            found.append(message.text)
 
-@pytest.fixture
-def complaints_of() -> Callable[[Page], list[str]]:
-    """Collects what a page's console complains of, from now on."""
-
-    def collect(page: Page) -> list[str]:
-        complaints: list[str] = []
-
-        def note(message: ConsoleMessage) -> None:
-            if message.type in ("error", "warning"):
-                complaints.append(message.text)
-
-        page.on("console", note)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        return complaints
-
-    return collect
-
-
-@pytest.fixture
-def picture_of(request: pytest.FixtureRequest) -> Callable[[Page, str], Awaitable[None]]:
-    """Saves a picture of a page in the folder PADWATCH_PICTURES, if there is one."""
-    folder = os.environ.get("PADWATCH_PICTURES")
-
-    async def save(page: Page, name: str) -> None:
-        if folder is not None:
-            path = Path(folder) / f"{request.node.originalname}-{name}.png"
-            await page.screenshot(path=path, full_page=True)
-
-    return save
+    page.on("console", note)
+    page.on("pageerror", lambda error: found.append(str(error)))
+    return found

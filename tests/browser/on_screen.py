@@ -4,6 +4,7 @@ import re
 
 import pytest
 from playwright.async_api import Locator, Page, expect
+from real_plant import PASSWORD
 
 A_NUMBER = re.compile(r"\d")
 DATA_MS = 60_000
@@ -31,6 +32,12 @@ AGE = """() => {
 
 N_TABS = 60
 WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
+
+
+async def log_in(page: Page, name: str, password: str = PASSWORD) -> None:
+    await page.get_by_label("Name", exact=True).fill(name)
+    await page.get_by_label("Password", exact=True).fill(password)
+    await page.keyboard.press("Enter")
 
 
 async def number_with(reading: Locator, unit: str) -> float:

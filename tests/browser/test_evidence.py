@@ -36,9 +36,8 @@ def alarmed_plant(new_plant, tmp_path: Path) -> Iterator[object]:
 
 @pytest.mark.long
 async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
-    alarmed_plant, page, complaints_of, picture_of
+    alarmed_plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(f"{alarmed_plant.url}#/alarms")
     row = page.locator(ROW)
     await expect(row).to_be_visible(timeout=DATA_MS)
@@ -59,7 +58,6 @@ async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
     await expect(report.locator("dl")).to_contain_text(HOSTILE)
     assert await report.locator("script").count() == 0
     assert await report.locator("figure").count() == 2
-    await picture_of(report, "report")
     printed = await report.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page\b(?!s)", printed)) == 1
 
@@ -78,5 +76,4 @@ async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
     await expect(reported).to_contain_text("kept")
     address = await reported.get_by_role("link", name="report").get_attribute("href")
     assert (await page.request.get(f"{alarmed_plant.url.rstrip('/')}{address}")).ok
-    await picture_of(page, "recordings")
     assert complaints == []

@@ -4,6 +4,9 @@ import { noteEdition } from "./edition.js";
 
 const TIMEOUT_MS = 8000;
 
+/** An action may be carried out even if its answer is late, so that it is given up on later than a question. */
+const ACTION_TIMEOUT_MS = 30_000;
+
 /** The service does not answer at all. */
 export class NotReachable extends Error {}
 
@@ -42,7 +45,8 @@ export async function ask(path, query = [], signal = undefined) {
 /** Ask `/api/v1` to do something; `body` is sent as JSON. Null where there is nothing to answer. */
 export async function tell(path, body, method = "POST") {
   const headers = body === undefined ? JSON_ONLY : { ...JSON_ONLY, "Content-Type": "application/json" };
-  const response = await answer(urlOf(path), undefined, { method, headers, body: JSON.stringify(body) });
+  const how = { method, headers, body: JSON.stringify(body) };
+  const response = await answer(urlOf(path), undefined, how, ACTION_TIMEOUT_MS);
   return response.status === 204 ? null : given(response);
 }
 
@@ -69,8 +73,8 @@ async function given(response) {
   return body;
 }
 
-async function answer(url, signal, how) {
-  const limit = AbortSignal.timeout(TIMEOUT_MS);
+async function answer(url, signal, how, timeoutMs = TIMEOUT_MS) {
+  const limit = AbortSignal.timeout(timeoutMs);
   const either = signal ? AbortSignal.any([signal, limit]) : limit;
   try {
     // no-store: the browser's own cache has no say, `answers` above has
@@ -79,7 +83,7 @@ async function answer(url, signal, how) {
     return response;
   } catch (failure) {
     if (signal?.aborted) throw failure;
-    throw new NotReachable(limit.aborted ? `No answer within ${TIMEOUT_MS / 1000} s.` : "No connection.");
+    throw new NotReachable(limit.aborted ? `No answer within ${timeoutMs / 1000} s.` : "No connection.");
   }
 }
 

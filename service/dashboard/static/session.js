@@ -1,13 +1,19 @@
 /** Who sits at this browser, as far as the service knows, and what he or she may do. */
 
-import { ask, forget, tell } from "./api.js";
+import { NotReachable, ask, forget, tell } from "./api.js";
 
 const CHANGED = "padwatch-session";
+
+const PASSWORD_DOUBT =
+  "The service has not confirmed the change of your password, so that it may or may not be changed. Try the new password first, then the old one.";
 
 /** The lowest role that has each permission, for sentences. */
 const ROLES = { act_on_alarms: "operator", change_measuring: "engineer", read_audit: "engineer", change_access: "admin" };
 
 let known = null;
+
+/** Whether a change of a password has not been answered, and nobody has logged in since. */
+let isPasswordUncertain = false;
 
 /** `{ login_required, set_up_needed, name, role, permissions }`; null until the service has said. */
 export const session = () => known;
@@ -24,6 +30,9 @@ export function limitSentence(permission, what) {
   return `You are logged in as ${known.name}, ${known.role}: to ${what} takes the role ${ROLES[permission]}.`;
 }
 
+/** Why it is not known which password is valid, or null if it is known. */
+export const passwordDoubt = () => (isPasswordUncertain ? PASSWORD_DOUBT : null);
+
 /** Find out; pages hear `padwatch-session` when it is somebody else or something else than before. */
 export async function askSession(signal) {
   settle(await ask(["session"], [], signal));
@@ -31,12 +40,22 @@ export async function askSession(signal) {
 
 /** Let somebody in, or throw why not. */
 export async function logIn(name, password) {
-  settle(await tell(["session"], { name, password }));
+  const found = await tell(["session"], { name, password });
+  isPasswordUncertain = false;
+  settle(found);
 }
 
-/** Set another password; all other sessions of the account end. */
+/** Set another password; all other sessions of the account end, and without an answer perhaps this one. */
 export async function changePassword(password, newPassword) {
-  settle(await tell(["session", "password"], { password, new_password: newPassword }));
+  isPasswordUncertain = true; // the page may find the session ended before the answer comes
+  try {
+    const found = await tell(["session", "password"], { password, new_password: newPassword });
+    isPasswordUncertain = false;
+    settle(found);
+  } catch (failure) {
+    isPasswordUncertain = failure instanceof NotReachable;
+    throw failure;
+  }
 }
 
 /** End the session here and on the service. */

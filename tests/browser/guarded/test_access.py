@@ -1,37 +1,39 @@
 """The page of accounts and keys: an admin lets people and machines in, and shuts them out again."""
 
+from collections.abc import AsyncIterator
+
 import pytest
-from on_screen import DATA_MS
-from playwright.async_api import Page, expect
+import pytest_asyncio
+from on_screen import DATA_MS, log_in
+from playwright.async_api import APIRequestContext, Page, Route, expect
+from real_plant import PASSWORD
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 ACCESS = "#/access"
+PAINTER = "painter"
 NEW = "[data-account=newcomer]"
 FIELDS = ("password", "new-password", "new-password-again")
 
 
-async def open_access(page: Page, url: str, password: str) -> None:
+async def open_access(page: Page, url: str) -> None:
     await page.goto(url + ACCESS)
-    await page.get_by_label("Name", exact=True).fill("admin")
-    await page.get_by_label("Password", exact=True).fill(password)
-    await page.keyboard.press("Enter")
+    await log_in(page, "admin")
     await expect(page.locator("[data-account=admin]")).to_be_visible(timeout=DATA_MS)
 
 
 async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refused(
-    plant, remote_page, password, complaints_of, picture_of
+    plant, remote_page, complaints
 ) -> None:
     page = remote_page
-    await open_access(page, plant.url, password)
-    complaints = complaints_of(page)
+    await open_access(page, plant.url)
     shown = await page.locator(".accounts tbody th").all_inner_texts()
     assert shown == ["admin", "engineer", "operator", "viewer"]
     await page.get_by_role("button", name="Add somebody…").press("Enter")
     form = page.locator(".accounts > form")
     await expect(form.get_by_label("Name")).to_be_focused()
     await page.keyboard.type("newcomer")
-    await form.get_by_label("Password").fill(password)
+    await form.get_by_label("Password").fill(PASSWORD)
     await page.keyboard.press("Enter")
     await expect(page.locator(NEW)).to_contain_text("viewer")
     await expect(page.get_by_role("button", name="Add somebody…")).to_be_focused()
@@ -40,7 +42,6 @@ async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refu
     await page.locator(".question:visible select").select_option("operator")
     await page.get_by_role("button", name="Set role").press("Enter")
     await expect(page.locator(NEW)).to_contain_text("operator")
-    await picture_of(page, "accounts")
 
     await page.get_by_role("button", name="Remove newcomer").press("Enter")
     await page.keyboard.press("Escape")
@@ -63,10 +64,10 @@ async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refu
 
 
 async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
-    plant, remote_page, password, browser, picture_of
+    plant, remote_page, browser
 ) -> None:
     page = remote_page
-    await open_access(page, plant.url, password)
+    await open_access(page, plant.url)
     await page.get_by_role("button", name="Create a key…").press("Enter")
     await page.get_by_label("What it is for").fill("historian")
     await page.keyboard.press("Enter")
@@ -77,7 +78,6 @@ async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
     row = page.locator("[data-key]", has_text="historian")
     await expect(row).to_contain_text("Valid")
     await expect(row).to_contain_text("never")
-    await picture_of(page, "key")
 
     headers = {"Authorization": f"Bearer {key}", "X-Forwarded-For": "192.0.2.7"}
     asked = await browser.new_context(extra_http_headers=headers)
@@ -92,27 +92,51 @@ async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
     await asked.close()
 
 
-async def test_whoever_is_logged_in_changes_his_own_password(
-    plant, remote_page, password, browser
+@pytest_asyncio.fixture(loop_scope="session")
+async def local(plant, browser) -> AsyncIterator[APIRequestContext]:
+    """Requests from the machine of the service itself, while a painter has an account."""
+    context = await browser.new_context()
+    accounts = f"{plant.url}api/v1/accounts"
+    painter = {"name": PAINTER, "role": "viewer", "password": PASSWORD}
+    assert (await context.request.post(accounts, data=painter)).status == 201
+    yield context.request
+    await context.clear_cookies()
+    await context.request.delete(f"{accounts}/{PAINTER}")
+    await context.close()
+
+
+async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_reported(
+    plant, remote_page, local
 ) -> None:
-    page, other = remote_page, f"{password} and cold"
-    await open_access(page, plant.url, password)
+    page, other, api = remote_page, f"{PASSWORD} and cold", f"{plant.url}api/v1"
+    await page.goto(plant.url)
+    await log_in(page, PAINTER)
     await page.locator(".person").get_by_role("link", name="Password").press("Enter")
     now, wanted, again = (page.locator(f".door input[name={name}]") for name in FIELDS)
-    await now.fill(password)
+    await now.fill(PASSWORD)
     await wanted.fill(other)
     await again.fill(other + "er")
     await page.keyboard.press("Enter")
     await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("not the same")
     await again.fill(other)
     await page.keyboard.press("Enter")
-    said = page.get_by_text("Your password is changed.")
-    await expect(said).to_be_visible(timeout=DATA_MS)
-    at = f"{plant.url}api/v1"
-    elsewhere = await browser.new_context()
-    found = await elsewhere.request.post(f"{at}/session", data={"name": "admin", "password": other})
-    assert found.status == 201
-    await elsewhere.clear_cookies()
-    back = await elsewhere.request.put(f"{at}/accounts/admin/password", data={"password": password})
-    assert back.ok
-    await elsewhere.close()
+    await expect(page.get_by_text("Your password is changed.")).to_be_visible(timeout=DATA_MS)
+
+    async def lose_answer(route: Route) -> None:
+        address = f"{api}/accounts/{PAINTER}/password"
+        assert (await local.put(address, data={"password": PASSWORD})).ok
+        await route.abort()
+
+    await page.route("**/session/password", lose_answer)
+    for field, text in ((now, other), (wanted, PASSWORD), (again, PASSWORD)):
+        await field.fill(text)
+    await page.keyboard.press("Enter")
+    doubt = page.get_by_text("has not confirmed the change of your password")
+    await expect(doubt).to_be_visible(timeout=DATA_MS)
+    await log_in(page, PAINTER, other)
+    await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("wrong")
+    await log_in(page, PAINTER)
+    await expect(page.get_by_role("heading", name="Your password")).to_be_visible(timeout=DATA_MS)
+    await page.get_by_role("button", name="Log out").click()
+    await expect(page.get_by_role("heading", name="Log in")).to_be_visible(timeout=DATA_MS)
+    await expect(doubt).to_be_hidden()

@@ -35,9 +35,8 @@ def is_nothing_new(response: Response) -> bool:
 
 
 async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
-    plant, page, picture_of, complaints_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(plant.url + LIST)
     row = page.locator(LINK)
     await expect(row).to_be_visible(timeout=DATA_MS)
@@ -72,7 +71,6 @@ async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
     await expect(row.get_by_role("button", name="Shelve…")).to_be_focused()
     await page.keyboard.press("Enter")
     await page.keyboard.type("the DAQ is being changed")
-    await picture_of(page, "shelving")
     await page.keyboard.press("Enter")
     shelved = page.get_by_role("table", name="Taken off the list").locator(LINK)
     await expect(shelved).to_contain_text("Shelved by A. Name until")
@@ -113,9 +111,7 @@ async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plan
     await expect(page.locator("#service")).to_contain_text("Service answered")
 
 
-async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(
-    plant, page, picture_of
-) -> None:
+async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant, page) -> None:
     await page.goto(plant.url)
     await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)
     await expect(page.locator("#upgrade")).to_be_hidden()
@@ -127,7 +123,6 @@ async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(
 
     await page.route("**/api/v1/overview", of_a_later_service)
     await expect(page.get_by_text("has been upgraded")).to_be_visible(timeout=DATA_MS)
-    await picture_of(page, "upgraded")
     await page.unroute("**/api/v1/overview")
     await page.get_by_role("button", name="Reload the page").click()
     await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)

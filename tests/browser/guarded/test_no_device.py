@@ -12,23 +12,19 @@ LOST = re.compile("not connected|No samples come")
 ORBITS = "#/units/U1/bearings/UJB/orbits"
 
 
-async def test_where_no_device_answers_every_page_says_so_and_what_to_do(
-    plant, page, picture_of
-) -> None:
+async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, page) -> None:
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
     await expect(page.locator(".state .mark")).to_have_text("Bad: not connected", timeout=DATA_MS)
     for chart in await page.locator("figure").all():
         await expect(chart.locator(".sentence")).to_contain_text(LOST, timeout=DATA_MS)
         await expect(chart.locator(".chart")).to_be_hidden()
     assert await page.evaluate(NO_NUMBER)
-    await picture_of(page, "bearing")
 
     await page.goto(plant.url + "#/sources")
     row = page.locator("[data-source=U1]")
     await expect(row.locator(".mark").first).to_have_text("Not connected", timeout=DATA_MS)
     await expect(page.get_by_text("0 of 1 connected. Something is wrong with 1")).to_be_visible()
     await expect(page.locator(".advice")).to_contain_text("nothing listens at that port")
-    await picture_of(page, "sources")
     await row.get_by_role("link").click()
     await expect(page.locator(".bearing-head .source")).to_contain_text("Not connected")
     table = page.get_by_role("table", name="side by side")
@@ -37,9 +33,8 @@ async def test_where_no_device_answers_every_page_says_so_and_what_to_do(
 
 
 async def test_a_recording_is_played_although_its_unit_is_not_connected(
-    plant, page, complaints_of, picture_of, recording
+    plant, page, complaints, recording
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(plant.url + ORBITS)
     await expect(page.locator(".player .sentence")).to_contain_text("No sample of this unit")
     await expect(page.locator("#orbit-source option")).to_have_count(2, timeout=DATA_MS)
@@ -49,7 +44,6 @@ async def test_a_recording_is_played_although_its_unit_is_not_connected(
     await page.locator("#orbit-at").fill("50")
     await expect(page.locator(".player .facts")).to_contain_text("00:00:5", timeout=DATA_MS)
     await expect(page.locator(".player .facts")).to_contain_text("92.3")
-    await picture_of(page, "recording")
 
     await page.reload()  # the address names the recording
     await await_orbit(page)

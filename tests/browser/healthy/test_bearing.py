@@ -29,9 +29,9 @@ def gn_per_m(value: float) -> str:
 
 
 async def test_every_chart_is_drawn_from_the_plant_alone_and_says_what_it_shows(
-    plant, page, complaints_of
+    plant, page, complaints
 ) -> None:
-    complaints, asked = complaints_of(page), []
+    asked = []
     page.on("request", lambda request: asked.append(request.url))
     await page.goto(plant.url + BEARING)
     await await_charts(page)
@@ -82,10 +82,7 @@ async def test_an_unknown_unit_or_bearing_is_named_and_leads_back(plant, page) -
         await expect(page.locator("[data-bearing=UJB]")).to_be_visible()
 
 
-async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(
-    plant, page, picture_of, complaints_of
-) -> None:
-    complaints = complaints_of(page)
+async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(plant, page, complaints) -> None:
     await open_bearing(page, plant.url)
     answer = await page.request.get(f"{plant.url}api/v1/units/U1/bearings/UJB/budgets/{PREFERRED}")
     budget = await answer.json()
@@ -106,7 +103,6 @@ async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(
         f"systematic {gn_per_m(budget['uncertainty']['systematic'])}"
     )
     await expect(page.locator(SPREAD)).to_have_attribute("aria-expanded", "true")
-    await picture_of(page, "budget")
     await tab_to(page, MATCHES, ".closing")
     await page.keyboard.press("Enter")
     await expect(shown).to_be_hidden()

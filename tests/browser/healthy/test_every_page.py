@@ -71,25 +71,22 @@ async def unfold(page: Page, address: str) -> None:
 
 
 async def test_every_page_opens_without_a_complaint_and_under_a_title_of_its_own(
-    plant, page, complaints_of, picture_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     titles = set()
     pages = await addresses(page, plant.url)
     for address in pages:
         await open_settled(page, plant.url + address)
         titles.add(await page.title())
-        await picture_of(page, "-".join(address.split("/")[1:]) or "overview")
         assert complaints == [], address
     assert len(titles) == len(pages)
 
 
-async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page, picture_of) -> None:
+async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page) -> None:
     for address in await addresses(phone_page, plant.url):
         await open_settled(phone_page, plant.url + address)
         await unfold(phone_page, address)
         await assert_fits(phone_page)
-        await picture_of(phone_page, "-".join(address.split("/")[1:]) or "overview")
 
 
 @pytest.mark.parametrize(
@@ -117,7 +114,7 @@ async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, scheme
 
 
 async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembered(
-    plant, page, picture_of
+    plant, page
 ) -> None:
     await page.emulate_media(color_scheme="dark")
     await page.goto(plant.url + BEARING)
@@ -134,7 +131,6 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.get_by_label("Look").select_option("system")
     assert await page.evaluate(BAND) == dark
     await page.wait_for_function(REDRAWN, arg=drawn)
-    await picture_of(page, "dark")
 
 
 async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, page) -> None:

@@ -31,9 +31,7 @@ async def twenty_of_one(route: Route) -> None:
     await route.fulfill(json=overview)
 
 
-async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
-    plant, page, picture_of
-) -> None:
+async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(plant, page) -> None:
     await page.route("**/api/v1/overview", twenty_of_one)
     await page.goto(plant.url)
     await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=DATA_MS)
@@ -46,9 +44,7 @@ async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(
     await expect(lost).to_have_attribute("data-look", "bad")
     well = page.locator("[data-unit=U8] .tile-head .mark").filter(visible=True)
     await expect(well).to_have_count(0)
-    await picture_of(page, "twenty")
     await page.set_viewport_size({"width": 360, "height": 780})
     await assert_fits(page)
-    await picture_of(page, "twenty-on-a-phone")
     await page.get_by_role("link", name="Unit 8").click()
     await expect(page.locator("h1")).to_contain_text("Unit 8")

@@ -19,9 +19,8 @@ ZOOMED_IN = """() => Plotly.relayout(
 
 
 async def test_spectra_over_time_are_a_map_or_lines_and_a_moment_is_chosen_by_key_or_click(
-    plant, page, complaints_of, picture_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(plant.url + SPECTRA)
     await await_spectra(page)
     moment = page.locator("[data-chart=moment] figcaption")
@@ -33,7 +32,6 @@ async def test_spectra_over_time_are_a_map_or_lines_and_a_moment_is_chosen_by_ke
     await page.get_by_role("slider", name="Moment").focus()
     await page.keyboard.press("Home")
     await expect(moment).not_to_have_text(newest)
-    await picture_of(page, "map")
 
     await page.get_by_role("button", name="Newest").click()
     await expect(page.get_by_role("button", name="Newest")).to_be_disabled()
@@ -54,14 +52,10 @@ async def test_spectra_over_time_are_a_map_or_lines_and_a_moment_is_chosen_by_ke
     await expect(chart.locator(".xtitle")).to_have_text("Multiple of the running speed")
     await expect(chart.locator(".heatmaplayer image")).to_have_count(0)
     await expect(chart.locator("path.js-line").first).to_be_attached()
-    await picture_of(page, "lines")
     assert complaints == []
 
 
-async def test_an_orbit_plays_pauses_and_steps_by_keyboard(
-    plant, page, complaints_of, picture_of
-) -> None:
-    complaints = complaints_of(page)
+async def test_an_orbit_plays_pauses_and_steps_by_keyboard(plant, page, complaints) -> None:
     await page.goto(plant.url + ORBITS)
     await await_orbit(page)
     play = page.locator(".player .play")
@@ -79,7 +73,6 @@ async def test_an_orbit_plays_pauses_and_steps_by_keyboard(
     await page.keyboard.press("ArrowRight")
     assert await page.evaluate(AT) - (at - turn_s) == pytest.approx(turn_s / 36.0, abs=0.002)
     await expect(page.locator(".player .facts")).to_contain_text(re.compile(r"µm pk, from x to y"))
-    await picture_of(page, "live")
     assert complaints == []
 
 

@@ -13,8 +13,7 @@ FILM = "#/units/U1/bearings/UJB/film"
 NOT_WATCHED = "This film is not watched: operating states need power_channel and rated_power_mw."
 
 
-async def test_pages_without_contents_say_why(plant, page, complaints_of) -> None:
-    complaints = complaints_of(page)
+async def test_pages_without_contents_say_why(plant, page, complaints) -> None:
     await page.goto(plant.url)
     link = page.locator("#alarms")
     await expect(link).to_contain_text("No alarms", timeout=DATA_MS)
@@ -37,9 +36,8 @@ async def test_pages_without_contents_say_why(plant, page, complaints_of) -> Non
 
 
 async def test_a_source_in_good_health_says_what_arrives_from_where(
-    plant, page, complaints_of, picture_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(plant.url + "#/sources")
     row = page.locator(ROW)
     await expect(row.locator(".mark").first).to_have_text("Connected", timeout=DATA_MS)
@@ -55,16 +53,14 @@ async def test_a_source_in_good_health_says_what_arrives_from_where(
     [source] = await (await page.request.get(f"{plant.url}api/v1/sources")).json()
     shown = await row.locator("[data-head=Received]").inner_text()
     assert 0 < int(re.sub(r"\D", "", shown)) <= source["n_stored"] + source["n_flagged"]
-    await picture_of(page, "sources")
     await row.get_by_role("link").click()
     await expect(page.locator("h1")).to_contain_text("Unit 1")
     assert complaints == []
 
 
 async def test_a_film_that_is_not_watched_says_why_in_place_of_every_chart(
-    plant, page, complaints_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(plant.url + FILM)
     await expect(page.locator(".film-verdict .sentence")).to_have_text(NOT_WATCHED)
     for name in ("baseline-map", "against-eccentricity_ratio", "against-oil_temperature_c"):

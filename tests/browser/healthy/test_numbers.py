@@ -92,9 +92,7 @@ async def await_stiffness(page: Page) -> None:
         await expect(number).to_have_text(A_NUMBER, timeout=DATA_MS)
 
 
-async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(
-    plant, page, picture_of
-) -> None:
+async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant, page) -> None:
     await page.goto(plant.url + BEARING)
     await await_stiffness(page)
     overview = await freeze(page, plant.url)
@@ -125,10 +123,9 @@ async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(
     for name in ("dynamic_k_xx_n_per_m", "dynamic_c_yy_n_s_per_m", "dynamic_n_lines"):
         number = page.locator(f".film [data-reading={name}] .number")
         await expect(number).to_have_text(A_NUMBER)
-    await picture_of(page, "bearing")
 
 
-async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page, picture_of) -> None:
+async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page) -> None:
     await page.goto(plant.url)
     await await_stiffness(page)
     overview = await freeze(page, plant.url)
@@ -147,7 +144,6 @@ async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page, pict
         named = [WORDS[name] for name in latest["estimators"].values()]
         origin = named[0] if len(set(named)) == 1 else f"xx {named[0]}, yy {named[1]}"
         await expect(page.locator(f"{row} .preferred .from")).to_have_text(origin)
-    await picture_of(page, "overview")
 
 
 async def test_a_number_without_value_says_why_instead_of_zero(plant, page) -> None:

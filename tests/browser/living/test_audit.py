@@ -10,9 +10,8 @@ AUDIT = "#/audit"
 
 
 async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_finds_it(
-    plant, page, complaints_of, picture_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     told = await (await page.request.get(f"{plant.url}api/v1/audit?limit=100")).json()
     await page.goto(plant.url + AUDIT)
     rows = page.locator("[data-entry]")
@@ -21,7 +20,6 @@ async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_fin
     await expect(accepted).to_contain_text("in force: none → 1")
     await expect(accepted).to_contain_text(", version 1")
     await expect(page.locator(".page-head .mark")).to_have_attribute("data-look", "good")
-    await picture_of(page, "audit")
 
     await page.get_by_label("To what").fill("service")
     await page.keyboard.press("Enter")

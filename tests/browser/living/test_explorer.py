@@ -31,10 +31,7 @@ def days(request: Request) -> float:
     return (end - start) / timedelta(days=1)
 
 
-async def test_two_bearings_are_compared_and_the_address_says_so(
-    plant, page, complaints_of, picture_of
-) -> None:
-    complaints = complaints_of(page)
+async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, complaints) -> None:
     await page.goto(plant.url + "#/trends")
     await expect(page.locator("summary").first).to_have_text("Bearings: 1", timeout=DATA_MS)
 
@@ -47,13 +44,10 @@ async def test_two_bearings_are_compared_and_the_address_says_so(
     await expect(legend.filter(has_text="U1 LJB: xx")).to_have_count(1)
     assert "b=U1%2FUJB&b=U1%2FLJB" in await page.evaluate("location.hash")
     assert "last=2592000" in await page.evaluate("location.hash")
-    await picture_of(page, "month")
     assert complaints == []
 
 
-async def test_quantities_are_found_by_words_coloured_and_taken_away(
-    plant, page, picture_of, tmp_path
-) -> None:
+async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page, tmp_path) -> None:
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
 
@@ -77,7 +71,6 @@ async def test_quantities_are_found_by_words_coloured_and_taken_away(
     assert fills > 5
     await expect(page.locator(f"{STIFFNESS} figcaption")).to_contain_text("Colour: oil temp")
     assert "colour=oil_temperature_c" in await page.evaluate("location.hash")
-    await picture_of(page, "coloured")
 
     async with page.expect_download() as started:
         await page.get_by_role("link", name="U1 LJB as CSV").click()

@@ -27,9 +27,8 @@ async def await_charts(page: Page) -> None:
 
 
 async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
-    plant, page, picture_of, complaints_of
+    plant, page, complaints
 ) -> None:
-    complaints = complaints_of(page)
     await page.goto(plant.url + FILM)
     await await_charts(page)
 
@@ -49,7 +48,6 @@ async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
     await expect(page.locator("[data-chart=baseline-map] figcaption")).to_contain_text(
         "direction y"
     )
-    await picture_of(page, "film")
     assert complaints == []
 
 
@@ -89,13 +87,10 @@ async def test_an_engineer_freezes_and_thaws_by_keys_and_reads_what_is_refused(p
     await expect(version).to_have_attribute("data-status", "in_force")
 
 
-async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(
-    plant, page, picture_of
-) -> None:
+async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(plant, page) -> None:
     await page.goto(plant.url)
     brief = page.locator("[data-bearing=UJB] .film-brief .mark").first
     await expect(brief).to_contain_text(WORDS, timeout=DATA_MS)
-    await picture_of(page, "overview")
     await page.locator("[data-bearing=UJB] a").click()
     await expect(page.locator(".film-verdict .mark").first).to_contain_text(WORDS)
     await page.get_by_role("radio", name="30 d", exact=True).check()

@@ -12,7 +12,7 @@ ROW = "[data-alarm='U1:link:link_lost']"
 
 
 async def test_a_silent_daq_takes_every_number_away_and_raises_an_alarm_until_it_answers(
-    plant, page, picture_of
+    plant, page
 ) -> None:
     motion = await page.context.new_page()
     await motion.goto(f"{plant.url}{BEARING}/orbits")
@@ -28,7 +28,6 @@ async def test_a_silent_daq_takes_every_number_away_and_raises_an_alarm_until_it
             await expect(quality).to_have_text("Bad: not connected")
         assert await page.evaluate(NO_NUMBER)
         await await_older(page, 2)
-        await picture_of(page, "overview")
 
         await page.goto(plant.url + BEARING)
         head = page.locator(".bearing-head .state .mark")
@@ -37,7 +36,6 @@ async def test_a_silent_daq_takes_every_number_away_and_raises_an_alarm_until_it
         for name in ("orbit", "spectrum", "stiffness-trend"):
             caption = page.locator(f"[data-chart={name}] figcaption")
             await expect(caption).to_contain_text("Not current: not connected.", timeout=DATA_MS)
-        await picture_of(page, "bearing")
         sentence = motion.locator(".player .sentence")
         await expect(sentence).to_contain_text("not the present", timeout=DATA_MS)
         await expect(motion.locator("canvas.orbit-canvas")).to_be_visible()

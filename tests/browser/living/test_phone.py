@@ -16,11 +16,10 @@ WIDEST = {
 }
 
 
-async def test_films_and_trends_fit_a_phone(plant, phone_page, picture_of) -> None:
+async def test_films_and_trends_fit_a_phone(plant, phone_page) -> None:
     for address, widest in WIDEST.items():
         await phone_page.goto(plant.url + address)
         await expect(phone_page.locator(widest).first).to_be_attached(timeout=DATA_MS)
         if address == BEARING:
             await await_charts(phone_page)
         await assert_fits(phone_page)
-        await picture_of(phone_page, address.rpartition("/")[2].partition("?")[0])

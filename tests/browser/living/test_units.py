@@ -26,9 +26,9 @@ def overviews_of(page: Page) -> list[Response]:
 
 
 async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
-    plant, page, complaints_of, picture_of
+    plant, page, complaints
 ) -> None:
-    complaints, heard = complaints_of(page), overviews_of(page)
+    heard = overviews_of(page)
     await page.goto(plant.url + UNIT)
     table = page.get_by_role("table", name="side by side")
     await expect(table.locator(OIL)).to_have_count(3)
@@ -50,5 +50,4 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     ways = await table.locator(".ways a").evaluate_all(HREFS)
     assert len(ways) == 15
     assert all(await page.evaluate(LEADS_SOMEWHERE, ways))
-    await picture_of(page, "unit")
     assert complaints == []

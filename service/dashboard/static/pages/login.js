@@ -2,7 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { entry, entryForm } from "../parts/entry.js";
-import { logIn } from "../session.js";
+import { logIn, passwordDoubt } from "../session.js";
 
 /** Returns `{ draw(view), close() }`. */
 export function loginPage(main) {
@@ -11,9 +11,10 @@ export function loginPage(main) {
   const form = entryForm("Log in", [name, password], () => logIn(name.value(), password.value()), (failure) => {
     if (failure.status === 401) password.empty();
   });
+  const doubt = element("p", { class: "sentence", role: "status" });
   const forgotten = element("p", { class: "help" });
   setText(forgotten, "Forgotten? An admin of padwatch can give you a new password.");
-  main.append(element("section", { class: "panel door" }, element("h1", {}, "Log in"), form.node, forgotten));
+  main.append(element("section", { class: "panel door" }, element("h1", {}, "Log in"), doubt, form.node, forgotten));
   name.focus();
-  return { draw() {}, close: form.close };
+  return { draw: () => setText(doubt, passwordDoubt() ?? ""), close: form.close };
 }
