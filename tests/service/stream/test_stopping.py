@@ -1,6 +1,8 @@
 """Who is told to stop while the library waits does stop, though the library does not hear it."""
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +11,10 @@ import pytest
 from acquisition.clock import SystemClock
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
+from service.stream import consumer as consuming
+from service.stream import publisher as publishing
 from service.stream.consumer import Consumer
+from service.stream.errors import StreamError
 from service.stream.identity import UnitIdentity
 from service.stream.outbound import Outgoing
 from service.stream.publisher import Publisher
@@ -64,18 +69,48 @@ def stream() -> Any:
     return DeafStream()
 
 
-async def test_a_consumer_that_waits_for_messages(plant: PlantFile, stream: Any) -> None:
-    consumer = Consumer(plant, SETTINGS, Any, Any, SystemClock())  # type: ignore[arg-type]
+@pytest.fixture
+def consumer(plant: PlantFile) -> Consumer:
+    return Consumer(plant, SETTINGS, Any, Any, SystemClock())  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def publisher(plant: PlantFile, identity: UnitIdentity) -> Publisher:
+    return Publisher(plant, SETTINGS, {"U1": identity}, SystemClock())
+
+
+async def test_a_consumer_that_waits_for_messages(consumer: Consumer, stream: Any) -> None:
     consumer._fetched["U1"] = 0
     await require_it_stops(asyncio.create_task(consumer._fetch_unit(stream, "U1")), stream)
 
 
-async def test_a_publisher_that_waits_for_the_servers(
-    plant: PlantFile, identity: UnitIdentity, stream: Any
-) -> None:
-    publisher = Publisher(plant, SETTINGS, {"U1": identity}, SystemClock())
+async def test_a_publisher_that_waits_for_the_servers(publisher: Publisher, stream: Any) -> None:
     publisher.waiting.add("U1", Outgoing("1", b"a block"))
     publisher.waiting.add("U1", Outgoing("2", b"another"))
     pulse = SimpleNamespace(beat=lambda *_: None, rest=lambda: None)
     task = asyncio.create_task(publisher._send_unit(stream, "U1", pulse))  # type: ignore[arg-type]
     await require_it_stops(task, stream)
+
+
+@pytest.mark.parametrize("is_refused", [True, False])
+async def test_both_while_they_wait_for_a_connection(
+    consumer: Consumer,
+    publisher: Publisher,
+    stream: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    is_refused: bool,
+) -> None:
+    @asynccontextmanager
+    async def session(*_: object) -> AsyncIterator[Any]:
+        await stream.wait()
+        if is_refused:
+            raise StreamError("NATS is not reached")
+        yield stream
+
+    async def nothing(*_: object) -> None: ...
+
+    monkeypatch.setattr(Consumer, "_know", nothing)
+    monkeypatch.setattr(publishing, "ensure", nothing)
+    for module, one in ((consuming, consumer), (publishing, publisher)):
+        monkeypatch.setattr(module, "session", session)
+        await require_it_stops(asyncio.create_task(one.run()), stream)
