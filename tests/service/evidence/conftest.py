@@ -15,6 +15,7 @@ from core.assessment import Assessment
 from core.quality import Reading
 from service.conversion import machine_of
 from service.evidence.archive import EvidenceArchive
+from service.evidence.capture_link import CapturePart, linked
 from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
 from service.live import LinkState, LiveView
@@ -68,6 +69,13 @@ class Rig:
 
     async def written(self, n: int) -> None:
         await self.until(lambda: self.keeper.n_written == n and self.keeper.n_pending == 0)
+
+    async def linked(self) -> CapturePart:
+        """Wait until the first bundle has its link."""
+        await self.until(lambda: bool(self.bundles) and linked(self.bundles[0]) is not None)
+        found = linked(self.bundles[0])
+        assert found is not None
+        return found
 
     async def write(self, *raised: AlarmNews) -> None:
         """Raise alarms while the keeper runs, and wait for the evidence of each."""
@@ -123,3 +131,10 @@ async def rig_of(
     yield build
     for store in opened:
         store.close()
+
+
+@pytest.fixture
+async def rig(rig_of: Callable[..., Any]) -> Rig:
+    """The service before any restart."""
+    found: Rig = await rig_of()
+    return found

@@ -1,5 +1,6 @@
 """A bundle leads to the samples around its alarm, or says what has become of them."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +11,12 @@ from core.alarms.event import AlarmEvent
 from service.capture.file import _write_alarms
 from service.capture.folders import ALARM
 from service.capture.outcome import Outcome
-from service.evidence.capture_link import linked
 from service.evidence.snapshot import Camera
 
 Make = Callable[..., Any]
 NOBODY: frozenset[tuple[str, int]] = frozenset()
 SHAFT = "U1:UJB:order1_shaft_x"
+CAPTURE = "U1-20260101T000000.000Z-x"
 
 
 def recorded(folder: Path, event: AlarmEvent) -> Path:
@@ -31,65 +32,52 @@ def samples(rig: Any, capturing: frozenset[tuple[str, int]] = NOBODY) -> str:
     return str(rig.archive.samples(found, capturing).value)
 
 
-async def test_a_finished_capture_is_linked_with_its_hash(rig_of: Make, news: Make) -> None:
-    rig, raised = await rig_of(), news()
-    capture = recorded(rig.folders.captures / "U1-20260101T000000.000Z-x", raised.events[0])
+async def test_a_finished_capture_is_linked_with_its_hash(rig: Any, news: Make) -> None:
+    raised = news()
+    capture = recorded(rig.folders.captures / CAPTURE, raised.events[0])
     async with rig.running():
         rig.raise_(raised)
         rig.keeper.captured(Outcome(raised.events, capture))
-        await rig.until(lambda: bool(rig.bundles) and linked(rig.bundles[0]) is not None)
+        found = await rig.linked()
 
-    found = linked(rig.bundles[0])
-    assert found is not None
-    assert (rig.bundles[0] / str(found.folder)).resolve() == capture.resolve()
-    assert found.manifest is not None
+    assert (rig.bundles[0] / found.folder).resolve() == capture.resolve()
     assert found.manifest.size == 2
     assert samples(rig) == "complete"
-    for path in capture.iterdir():
-        path.unlink()
-    capture.rmdir()
+    shutil.rmtree(capture)
     assert samples(rig) == "removed"
 
 
-async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig_of: Make, news: Make) -> None:
-    rig, raised = await rig_of(), news()
+async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig: Any, news: Make) -> None:
+    raised = news()
     async with rig.running():
         rig.raise_(raised)
         rig.keeper.captured(Outcome(raised.events, None, "the disk is too slow for them"))
-        await rig.until(lambda: bool(rig.bundles) and linked(rig.bundles[0]) is not None)
+        found = await rig.linked()
 
-    found = linked(rig.bundles[0])
-    assert found is not None
     assert (found.state, found.reason) == ("lost", "the disk is too slow for them")
     assert samples(rig) == "lost"
 
 
 async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_it(
-    rig_of: Make, news: Make
+    rig_of: Make, rig: Any, news: Make
 ) -> None:
-    rig, raised = await rig_of(), news()
+    raised = news()
     await rig.write(raised)
-    recorded(rig.folders.captures / "U1-20260101T000000.000Z-x", raised.events[0])
+    assert samples(rig) == "none"  # this service has not kept any
+    recorded(rig.folders.captures / CAPTURE, raised.events[0])
 
     again = await rig_of()
     async with again.running():
-        await again.until(lambda: linked(again.bundles[0]) is not None)
+        await again.linked()
     assert samples(again) == "complete"
 
 
-async def test_samples_that_were_expected_and_never_came_are_lost(rig_of: Make, news: Make) -> None:
-    rig, raised = await rig_of(), news()
+async def test_samples_that_were_expected_and_never_came_are_lost(rig: Any, news: Make) -> None:
     rig.keeper._camera = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
-    await rig.write(raised)
+    await rig.write(news())
 
     assert samples(rig, frozenset({(SHAFT, 1)})) == "being_made"
     assert samples(rig) == "lost"
-
-
-async def test_an_alarm_whose_samples_are_not_kept_has_lost_none(rig_of: Make, news: Make) -> None:
-    rig = await rig_of()
-    await rig.write(news())
-    assert samples(rig) == "none"
 
 
 class Expecting(Camera):

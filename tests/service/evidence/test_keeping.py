@@ -10,7 +10,7 @@ import pytest
 from core.alarms.alarm import AlarmKind
 from core.quality import Reading
 from service.evidence import keeper as module
-from service.evidence.archive import DamagedEvidenceError, EvidenceState
+from service.evidence.archive import DamagedEvidenceError
 from service.evidence.document import Evidence
 from service.evidence.folders import INCOMPLETE, place_of
 
@@ -28,8 +28,7 @@ def states(rig: Any, alarm: str = SHAFT) -> list[tuple[int, str]]:
     return [(each.event.occurrence, each.state.value) for each in found]
 
 
-async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig_of: Make, news: Make) -> None:
-    rig = await rig_of()
+async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig: Any, news: Make) -> None:
     await rig.write(news(12.5))
 
     [folder] = rig.bundles
@@ -46,12 +45,13 @@ async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig_of: Make, n
     assert found.missing == ["bearing TJB had no result yet"]
     assert set(found.files) == {"spectra.parquet"}
     assert states(rig) == [(1, "complete")]
+    stored = rig.folders.configurations / f"{found.configuration}.json"
+    assert json.loads(stored.read_bytes())["settings"]["unit"][0]["id"] == "U1"
 
 
 async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
-    rig_of: Make, news: Make, assessment: Make
+    rig: Any, news: Make, assessment: Make
 ) -> None:
-    rig = await rig_of()
     rig.raise_(news())
     rig.live.set_assessment(assessment(order1_shaft_x_um_pk=Reading(20.0)))
     async with rig.running():
@@ -61,10 +61,7 @@ async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
     assert reading.value == 160.0
 
 
-async def test_the_service_itself_and_lost_links_have_evidence_too(
-    rig_of: Make, news: Make
-) -> None:
-    rig = await rig_of()
+async def test_the_service_itself_and_lost_links_have_evidence_too(rig: Any, news: Make) -> None:
     await rig.write(
         news(kind=AlarmKind.LINK_LOST, subject="link", unit="U2"),
         news(kind=AlarmKind.RESULTS_LOST, subject="store", unit="plant"),
@@ -76,8 +73,7 @@ async def test_the_service_itself_and_lost_links_have_evidence_too(
     assert own.unit is None
 
 
-async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig_of: Make, news: Make) -> None:
-    rig = await rig_of()
+async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig: Any, news: Make) -> None:
     await rig.write(news())
     [found] = rig.archive.occurrences(SHAFT, NOBODY, 9)
     path = rig.bundles[0] / "evidence.json"
@@ -88,8 +84,8 @@ async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig_of: Make, n
         rig.archive.document(found.place)
 
 
-async def test_a_full_disk_delays_evidence_and_loses_none(rig_of: Make, news: Make) -> None:
-    rig, raised = await rig_of(), news()
+async def test_a_full_disk_delays_evidence_and_loses_none(rig: Any, news: Make) -> None:
+    raised = news()
     folder = place_of(rig.folders.evidence, raised.events[0]).folder
     aside = folder.with_name(folder.name + INCOMPLETE)
     aside.mkdir(parents=True)
@@ -107,10 +103,7 @@ async def test_a_full_disk_delays_evidence_and_loses_none(rig_of: Make, news: Ma
     assert (rig.keeper.error, states(rig)) == (None, [(1, "complete")])
 
 
-async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(
-    rig_of: Make, news: Make
-) -> None:
-    rig = await rig_of()
+async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(rig: Any, news: Make) -> None:
     rig.folders.evidence.parent.mkdir(parents=True)
     rig.folders.evidence.write_text("in the way")
     async with rig.running():
@@ -124,13 +117,12 @@ async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(
 
 
 async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
-    rig_of: Make, news: Make
+    rig_of: Make, rig: Any, news: Make
 ) -> None:
-    first = await rig_of()
-    await first.write(news(1.0))
+    await rig.write(news(1.0))
     cut = news(2.0, occurrence=2)
-    first.store.append([], [], [cut])  # the service is killed while it writes
-    left = place_of(first.folders.evidence, cut.events[0]).folder
+    rig.store.append([], [], [cut])  # the service is killed while it writes
+    left = place_of(rig.folders.evidence, cut.events[0]).folder
     left = left.with_name(left.name + INCOMPLETE)
     left.mkdir()
     (left / "evidence.json").write_text("{")
@@ -143,9 +135,8 @@ async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
 
 
 async def test_an_alarm_from_before_evidence_was_kept_has_not_lost_any(
-    rig_of: Make, news: Make
+    rig: Any, news: Make
 ) -> None:
-    rig = await rig_of()
     rig.store.append([], [], [news(-3600.0)])
     await rig.write(news(0.0, occurrence=2))
 
@@ -153,10 +144,9 @@ async def test_an_alarm_from_before_evidence_was_kept_has_not_lost_any(
 
 
 async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(
-    rig_of: Make, news: Make, monkeypatch: pytest.MonkeyPatch
+    rig: Any, news: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "MAX_PENDING", 3)
-    rig = await rig_of()
     for number in range(1, 6):
         rig.raise_(news(float(number), occurrence=number))
 
@@ -181,13 +171,3 @@ async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
         *((2, "removed"), (1, "removed")),
     ]
     assert states(rig, "U1:UJB:order1_shaft_y") == [(1, "complete")]
-
-
-async def test_the_configuration_can_be_looked_up_by_its_version(rig_of: Make, news: Make) -> None:
-    rig = await rig_of()
-    await rig.write(news())
-
-    version = document(rig.bundles[0]).configuration
-    stored = json.loads((rig.folders.configurations / f"{version}.json").read_bytes())
-    assert stored["settings"]["unit"][0]["id"] == "U1"
-    assert EvidenceState.COMPLETE in {s.state for s in rig.archive.occurrences(SHAFT, NOBODY, 1)}

@@ -24,21 +24,14 @@ def plot(x_label: str = "Time, UTC", **changes: object) -> Plot:
     return Plot(**{**arguments, **changes})  # type: ignore[arg-type]
 
 
-def test_points_are_where_their_values_are() -> None:
+def test_points_are_where_their_values_are_and_error_bars_as_long_as_the_error() -> None:
     drawn = plot()
     drawn.points([0.0, 10.0, None], [0.0, 2e9, 1e9], "today")
-
-    circles = re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawn.svg())
-    assert [(float(x), float(y)) for x, y in circles] == [
-        (LEFT, TOP + 100.0),
-        (LEFT + 200.0, TOP),
-    ]
-
-
-def test_an_error_bar_is_as_long_as_the_error() -> None:
-    drawn = plot()
     drawn.points([5.0], [1e9], "today", errors=[0.5e9])
 
+    circles = re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawn.svg())
+    places = [(LEFT, TOP + 100.0), (LEFT + 200.0, TOP), (LEFT + 100.0, TOP + 50.0)]
+    assert [(float(x), float(y)) for x, y in circles] == places
     assert f'd="M{LEFT + 100.0:.1f} {TOP + 75.0:.1f}V{TOP + 25.0:.1f}"' in drawn.svg()
 
 

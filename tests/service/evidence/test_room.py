@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -19,6 +20,7 @@ OLDEST, OLD, YOUNG, NEWEST = (
     f"{moment}T000000.000Z-UJB-stiffness_x-{number}"
     for number, moment in enumerate(("20251001", "20251101", "20251228", "20251231"), 1)
 )
+FIFTH = "20251231T120000.000Z-UJB-stiffness_x-5"
 
 
 @pytest.fixture
@@ -51,12 +53,9 @@ def left(root: Path) -> list[str]:
     return [each.folder.name for each in places(root)]
 
 
-def test_what_fits_stays(root: Path, room_of: RoomOf) -> None:
+def test_the_oldest_goes_first_and_is_remembered(root: Path, room_of: RoomOf) -> None:
     assert room_of(4000).make() == []
     assert left(root) == [OLDEST, OLD, YOUNG, NEWEST]
-
-
-def test_the_oldest_goes_first_and_is_remembered(root: Path, room_of: RoomOf) -> None:
     assert room_of(3000).make() == [OLDEST]
     assert left(root) == [OLD, YOUNG, NEWEST]
     assert removed(root, "U1") == [OLDEST]
@@ -76,10 +75,13 @@ def test_an_alarm_that_chatters_loses_its_own_oldest(root: Path, room_of: RoomOf
     assert left(root) == [other, YOUNG, NEWEST]
 
 
-def test_a_bundle_that_was_written_makes_its_room(root: Path, room_of: RoomOf) -> None:
-    room = room_of(4000)
+@pytest.mark.parametrize("limits", [{"soft": 4000}, {"soft": 8000, "most": 4}])
+def test_a_bundle_that_was_written_makes_its_room(
+    root: Path, room_of: RoomOf, limits: dict[str, int]
+) -> None:
+    room = room_of(**limits)
     assert room.make() == []
-    room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
+    room.note(bundle(root, FIFTH))
     assert room.make() == [OLDEST]
     assert room.make() == []
 
@@ -95,15 +97,6 @@ def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(
     assert room.make() == [OLDEST]
 
 
-def test_an_alarm_that_begins_to_chatter_is_noticed_without_a_look_at_all(
-    root: Path, room_of: RoomOf
-) -> None:
-    room = room_of(8000, most=4)
-    assert room.make() == []
-    room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
-    assert room.make() == [OLDEST]
-
-
 def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
     root: Path, room_of: RoomOf, stepped_clock: Any
 ) -> None:
@@ -111,30 +104,26 @@ def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
     room.make()
     shutil.rmtree(root / "U1" / OLDEST)
     stepped_clock.step(SURVEY_S + 1.0)
-    room.note(bundle(root, "20251231T120000.000Z-UJB-stiffness_x-5"))
+    room.note(bundle(root, FIFTH))
     assert room.make() == []
 
 
-def test_what_cannot_be_removed_is_looked_for_again(root: Path, room_of: RoomOf) -> None:
+@pytest.mark.parametrize("all_are_gone", [False, True])
+def test_what_cannot_be_removed_is_looked_for_again_while_it_is_there(
+    root: Path, room_of: RoomOf, all_are_gone: bool
+) -> None:
     room, in_the_way = room_of(8000, most=3), root / "U1" / (OLDEST + ".incomplete")
     in_the_way.write_bytes(b"not a folder")
     with pytest.raises(OSError, match=OLDEST):
         room.make()
     assert OLDEST in left(root)
-    in_the_way.unlink()
-    assert room.make() == [OLDEST]
-    assert removed(root, "U1") == [OLDEST]
-
-
-def test_all_that_is_taken_away_by_hand_meanwhile_is_no_longer_looked_for(
-    root: Path, room_of: RoomOf
-) -> None:
-    room = room_of(8000, most=3)
-    (root / "U1" / (OLDEST + ".incomplete")).write_bytes(b"not a folder")
-    with pytest.raises(OSError, match=OLDEST):
-        room.make()
-    shutil.rmtree(root / "U1")
-    assert room.make() == []
+    if all_are_gone:
+        shutil.rmtree(root / "U1")
+    else:
+        in_the_way.unlink()
+    found = [] if all_are_gone else [OLDEST]
+    assert room.make() == found
+    assert removed(root, "U1") == found
 
 
 def test_what_is_none_of_ours_is_left_alone(root: Path, room_of: RoomOf) -> None:
@@ -149,13 +138,10 @@ def test_names_of_what_was_removed_are_not_lost_where_there_is_no_room_to_write_
     root: Path, room_of: RoomOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert room_of(3000).make() == [OLDEST]
+    full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
         room_of(2000).make()
 
     assert removed(root, "U1") == [OLDEST]
     assert left(root) == [OLD, YOUNG, NEWEST]
-
-
-def full(_: int) -> None:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
