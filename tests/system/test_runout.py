@@ -137,28 +137,29 @@ def with_channels(unit: Unit, **changes: object) -> Unit:
     return replace(unit, channels=channels)
 
 
-def test_equation_5_reads_the_film_when_runout_is_taken_off(
+def test_equation_5_reads_the_film_only_when_runout_of_this_probe_is_taken_off(
     unit: Unit, blocks: list[SampleBlock]
 ) -> None:
     found = upper(unit, blocks)
-    assert found.runout == {
-        "shaft_x": RunoutVerdict.APPLIED,
-        "shaft_y": RunoutVerdict.APPLIED,
-    }
-    for axes in ("xx", "yy"):
-        k_eff = found.readings[f"order1_k_eff_{axes}_n_per_m"].value
-        assert k_eff == pytest.approx(K_EFF_N_PER_M, rel=0.04), axes
+    bare = upper(with_channels(unit, slow_roll=None), blocks)
+    replaced = upper(with_channels(unit, probe="another"), blocks)
 
-
-def test_equation_5_takes_runout_for_shaft_motion_without_a_vector(
-    unit: Unit, blocks: list[SampleBlock]
-) -> None:
-    found = upper(with_channels(unit, slow_roll=None), blocks)
-    assert set(found.runout.values()) == {RunoutVerdict.NO_VECTOR}
+    verdicts = [set(each.runout.values()) for each in (found, bare, replaced)]
+    assert verdicts == [
+        {RunoutVerdict.APPLIED},
+        {RunoutVerdict.NO_VECTOR},
+        {RunoutVerdict.OTHER_PROBE},
+    ]
     for axes in ("xx", "yy"):
-        k_eff = found.readings[f"order1_k_eff_{axes}_n_per_m"].value
-        assert k_eff is not None
-        assert k_eff < 0.55 * K_EFF_N_PER_M
+        name = f"order1_k_eff_{axes}_n_per_m"
+        assert found.readings[name].value == pytest.approx(K_EFF_N_PER_M, rel=0.04), axes
+        mistaken = bare.readings[name].value
+        assert mistaken is not None
+        assert mistaken < 0.55 * K_EFF_N_PER_M
+    assert replaced.readings == bare.readings
+    assert found.speed_source is SpeedSource.KEY_PHASE
+    speed_rpm = found.readings["speed_rpm"].value
+    assert speed_rpm == pytest.approx(blocks[-7].slow["speed"].value, rel=2e-4)
 
 
 def test_runout_that_is_taken_off_no_longer_silences_the_line(
@@ -173,22 +174,6 @@ def test_runout_that_is_taken_off_no_longer_silences_the_line(
         assert speaking.readings[name].value == pytest.approx(0.5e9, rel=0.05)
         runout = [line for line in speaking.budgets[name].lines if line.name == "runout"]
         assert all(line.contribution == 0.0 for line in runout)
-
-
-def test_a_new_probe_is_not_given_the_surface_of_the_old_one(
-    unit: Unit, blocks: list[SampleBlock]
-) -> None:
-    bare = upper(with_channels(unit, slow_roll=None), blocks)
-    found = upper(with_channels(unit, probe="another"), blocks)
-    assert set(found.runout.values()) == {RunoutVerdict.OTHER_PROBE}
-    assert found.readings == bare.readings
-
-
-def test_the_key_phase_gives_the_speed(unit: Unit, blocks: list[SampleBlock]) -> None:
-    found = upper(unit, blocks)
-    assert found.speed_source is SpeedSource.KEY_PHASE
-    speed_rpm = found.readings["speed_rpm"].value
-    assert speed_rpm == pytest.approx(blocks[-7].slow["speed"].value, rel=2e-4)
 
 
 @pytest.mark.parametrize("kind", [FaultKind.STUCK, FaultKind.DEAD])
