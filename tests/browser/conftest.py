@@ -15,10 +15,13 @@ from playwright.async_api import (
     async_playwright,
     expect,
 )
+from pytest_asyncio import is_async_test
 from real_plant import Plant
 
-PATIENCE_MS = 60_000
-expect.set_options(timeout=PATIENCE_MS)  # pages are slow where workers share few cores
+PATIENCE_MS = 90_000
+"""Until a number that has to be measured first is there, on a busy machine."""
+
+expect.set_options(timeout=PATIENCE_MS)
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -33,6 +36,14 @@ QUIET = [
     "--disable-component-update",
     "--disable-sync",
 ]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run all tests here in the event loop of the browser that they share."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents and is_async_test(item):
+            item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)
 
 
 @pytest.fixture(scope="session")
@@ -73,6 +84,7 @@ async def phone(browser: Browser) -> BrowserContext:
 @asynccontextmanager
 async def fresh_page(context: BrowserContext) -> AsyncIterator[Page]:
     """A page that finds nothing of the pages before it: no login, no choices."""
+    context.set_default_timeout(PATIENCE_MS)
     yield await context.new_page()
     for opened in context.pages:
         if opened.url.startswith("http"):

@@ -7,9 +7,6 @@ from playwright.async_api import Locator, Page, expect
 from real_plant import PASSWORD
 
 A_NUMBER = re.compile(r"\d")
-DATA_MS = 60_000
-"""Until a number that has to be measured first is there, on a busy machine."""
-
 CHARTS = ("stiffness-trend", "amplitude-trend", "orbit", "centre", "spectrum")
 """Of the page of a bearing."""
 
@@ -43,26 +40,26 @@ async def log_in(page: Page, name: str, password: str = PASSWORD) -> None:
 async def number_with(reading: Locator, unit: str) -> float:
     """The number of a reading once it is there, and not only the unit that it will have."""
     number = reading.locator(".number")
-    await expect(reading.locator(".suffix")).to_have_text(unit, timeout=DATA_MS)
-    await expect(number).to_have_text(A_NUMBER, timeout=DATA_MS)
+    await expect(reading.locator(".suffix")).to_have_text(unit)
+    await expect(number).to_have_text(A_NUMBER)
     return float(await number.inner_text())
 
 
 async def await_charts(page: Page) -> None:
     for name in CHARTS:
         curve = page.locator(f"[data-chart={name}] .chart path.js-line").first
-        await expect(curve).to_be_attached(timeout=DATA_MS)
+        await expect(curve).to_be_attached()
 
 
 async def await_spectra(page: Page) -> None:
     chart = page.locator("[data-chart=waterfall] .chart")
-    await expect(chart.locator(".heatmaplayer image").first).to_be_attached(timeout=DATA_MS)
-    await page.wait_for_function(SECOND_SPECTRUM, timeout=DATA_MS)
+    await expect(chart.locator(".heatmaplayer image").first).to_be_attached()
+    await page.wait_for_function(SECOND_SPECTRUM)
 
 
 async def await_orbit(page: Page) -> None:
-    await expect(page.locator("canvas.orbit-canvas")).to_be_visible(timeout=DATA_MS)
-    await page.wait_for_function(HAS_ORBIT, timeout=DATA_MS)
+    await expect(page.locator("canvas.orbit-canvas")).to_be_visible()
+    await page.wait_for_function(HAS_ORBIT)
 
 
 async def await_older(page: Page, by_s: int) -> None:

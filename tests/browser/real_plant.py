@@ -67,9 +67,6 @@ class Plant:
         self._daq = self._start("daq", str(self._plant_file()), "--control")
         self._daq_port = json.loads(read_line(self._daq))["U1"]["port"]
 
-    def stop_daq(self) -> None:
-        stop(self._daq)
-
     def start_service(self) -> None:
         """The first time on a free port, then on the same one."""
         port = self.url.rstrip("/").rpartition(":")[2] or "0"

@@ -1,12 +1,9 @@
 """A plant that is started and stopped by the test, and its first account."""
 
 import pytest
-from on_screen import DATA_MS
 from playwright.async_api import expect
 from real_plant import PASSWORD
 from rigs.tiers import fast_and_long
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 ALARMS = "#/alarms"
 
@@ -27,7 +24,7 @@ async def test_the_first_account_is_made_with_the_token_and_lasts_over_a_restart
     await expect(page.get_by_role("alert")).to_contain_text("are not the same")
     await page.get_by_label("Password again").fill(PASSWORD)
     await page.keyboard.press("Enter")
-    await expect(page.locator(".person")).to_contain_text("anna, admin", timeout=DATA_MS)
+    await expect(page.locator(".person")).to_contain_text("anna, admin")
     await expect(page.get_by_role("heading", name="Alarms", exact=True)).to_be_visible()
     assert complaints == []
 
@@ -35,6 +32,6 @@ async def test_the_first_account_is_made_with_the_token_and_lasts_over_a_restart
         new_plant.stop_service()
         await expect(page.locator("#failure")).to_contain_text("Service not reachable")
         new_plant.start_service()
-        await expect(page.locator("#banner")).to_be_hidden(timeout=DATA_MS)
+        await expect(page.locator("#banner")).to_be_hidden()
         await expect(page.locator(".person")).to_contain_text("anna, admin")
         await expect(page.get_by_role("heading", name="Alarms", exact=True)).to_be_visible()

@@ -2,13 +2,10 @@
 
 from collections.abc import AsyncIterator
 
-import pytest
 import pytest_asyncio
-from on_screen import DATA_MS, log_in
+from on_screen import log_in
 from playwright.async_api import APIRequestContext, Page, Route, expect
 from real_plant import PASSWORD
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 ACCESS = "#/access"
 PAINTER = "painter"
@@ -19,7 +16,7 @@ FIELDS = ("password", "new-password", "new-password-again")
 async def open_access(page: Page, url: str) -> None:
     await page.goto(url + ACCESS)
     await log_in(page, "admin")
-    await expect(page.locator("[data-account=admin]")).to_be_visible(timeout=DATA_MS)
+    await expect(page.locator("[data-account=admin]")).to_be_visible()
 
 
 async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refused(
@@ -120,7 +117,7 @@ async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_repo
     await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("not the same")
     await again.fill(other)
     await page.keyboard.press("Enter")
-    await expect(page.get_by_text("Your password is changed.")).to_be_visible(timeout=DATA_MS)
+    await expect(page.get_by_text("Your password is changed.")).to_be_visible()
 
     async def lose_answer(route: Route) -> None:
         address = f"{api}/accounts/{PAINTER}/password"
@@ -132,11 +129,11 @@ async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_repo
         await field.fill(text)
     await page.keyboard.press("Enter")
     doubt = page.get_by_text("has not confirmed the change of your password")
-    await expect(doubt).to_be_visible(timeout=DATA_MS)
+    await expect(doubt).to_be_visible()
     await log_in(page, PAINTER, other)
     await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("wrong")
     await log_in(page, PAINTER)
-    await expect(page.get_by_role("heading", name="Your password")).to_be_visible(timeout=DATA_MS)
+    await expect(page.get_by_role("heading", name="Your password")).to_be_visible()
     await page.get_by_role("button", name="Log out").click()
-    await expect(page.get_by_role("heading", name="Log in")).to_be_visible(timeout=DATA_MS)
+    await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
     await expect(doubt).to_be_hidden()

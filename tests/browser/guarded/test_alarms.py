@@ -2,11 +2,8 @@
 
 import asyncio
 
-import pytest
-from on_screen import DATA_MS, tab_to
+from on_screen import tab_to
 from playwright.async_api import Page, Response, Route, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 LIST = "#/alarms"
 LINK = "[data-alarm='U1:link:link_lost']"
@@ -39,11 +36,11 @@ async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
 ) -> None:
     await page.goto(plant.url + LIST)
     row = page.locator(LINK)
-    await expect(row).to_be_visible(timeout=DATA_MS)
+    await expect(row).to_be_visible()
     await expect(row).to_contain_text("Link lost")
     await expect(row.locator(".mark")).to_have_text("Alert")
     head = page.locator("#alarms .mark")
-    await expect(head).to_contain_text("1 alarm, 1 not acknowledged", timeout=DATA_MS)
+    await expect(head).to_contain_text("1 alarm, 1 not acknowledged")
     await expect(head).to_have_attribute("data-look", "uncertain")
     await expect(page.locator(".unjudged summary")).to_contain_text("cannot be judged now")
     await page.keyboard.press("Tab")
@@ -94,18 +91,18 @@ async def test_a_receiver_that_is_away_is_named_until_it_has_taken_what_waits(
 ) -> None:
     await page.goto(plant.url + LIST)
     line = page.locator(".delivery li")
-    await expect(line).to_contain_text("desk: not delivered since", timeout=DATA_MS)
+    await expect(line).to_contain_text("desk: not delivered since")
     await expect(line).to_contain_text("since")
     await expect(line.locator(".mark")).to_have_attribute("data-look", "bad")
 
     async with await asyncio.start_server(take, "127.0.0.1", receiver_port):
-        await expect(page.locator(".delivery")).to_be_hidden(timeout=DATA_MS)
+        await expect(page.locator(".delivery")).to_be_hidden()
 
 
 async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plant, page) -> None:
-    async with page.expect_response(is_nothing_new, timeout=DATA_MS):
+    async with page.expect_response(is_nothing_new):
         await page.goto(plant.url + LIST)
-    async with page.expect_response(is_nothing_new, timeout=DATA_MS):
+    async with page.expect_response(is_nothing_new):
         await expect(page.locator(LINK)).to_be_visible()
     await expect(page.locator(".alarms-head .mark")).to_be_hidden()
     await expect(page.locator("#service")).to_contain_text("Service answered")
@@ -113,7 +110,7 @@ async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plan
 
 async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant, page) -> None:
     await page.goto(plant.url)
-    await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)
+    await expect(page.locator("#service")).to_contain_text("Service answered")
     await expect(page.locator("#upgrade")).to_be_hidden()
 
     async def of_a_later_service(route: Route) -> None:
@@ -122,8 +119,8 @@ async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant
         await route.fulfill(response=answer, headers={**answer.headers, "padwatch-edition": "9"})
 
     await page.route("**/api/v1/overview", of_a_later_service)
-    await expect(page.get_by_text("has been upgraded")).to_be_visible(timeout=DATA_MS)
+    await expect(page.get_by_text("has been upgraded")).to_be_visible()
     await page.unroute("**/api/v1/overview")
     await page.get_by_role("button", name="Reload the page").click()
-    await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)
+    await expect(page.locator("#service")).to_contain_text("Service answered")
     await expect(page.locator("#upgrade")).to_be_hidden()

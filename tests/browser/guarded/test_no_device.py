@@ -2,11 +2,8 @@
 
 import re
 
-import pytest
-from on_screen import DATA_MS, NO_NUMBER, await_orbit
+from on_screen import NO_NUMBER, await_orbit
 from playwright.async_api import expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 LOST = re.compile("not connected|No samples come")
 ORBITS = "#/units/U1/bearings/UJB/orbits"
@@ -14,15 +11,15 @@ ORBITS = "#/units/U1/bearings/UJB/orbits"
 
 async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, page) -> None:
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
-    await expect(page.locator(".state .mark")).to_have_text("Bad: not connected", timeout=DATA_MS)
+    await expect(page.locator(".state .mark")).to_have_text("Bad: not connected")
     for chart in await page.locator("figure").all():
-        await expect(chart.locator(".sentence")).to_contain_text(LOST, timeout=DATA_MS)
+        await expect(chart.locator(".sentence")).to_contain_text(LOST)
         await expect(chart.locator(".chart")).to_be_hidden()
     assert await page.evaluate(NO_NUMBER)
 
     await page.goto(plant.url + "#/sources")
     row = page.locator("[data-source=U1]")
-    await expect(row.locator(".mark").first).to_have_text("Not connected", timeout=DATA_MS)
+    await expect(row.locator(".mark").first).to_have_text("Not connected")
     await expect(page.get_by_text("0 of 1 connected. Something is wrong with 1")).to_be_visible()
     await expect(page.locator(".advice")).to_contain_text("nothing listens at that port")
     await row.get_by_role("link").click()
@@ -37,12 +34,12 @@ async def test_a_recording_is_played_although_its_unit_is_not_connected(
 ) -> None:
     await page.goto(plant.url + ORBITS)
     await expect(page.locator(".player .sentence")).to_contain_text("No sample of this unit")
-    await expect(page.locator("#orbit-source option")).to_have_count(2, timeout=DATA_MS)
+    await expect(page.locator("#orbit-source option")).to_have_count(2)
     await page.locator("#orbit-source").select_option(recording)
     await await_orbit(page)
 
     await page.locator("#orbit-at").fill("50")
-    await expect(page.locator(".player .facts")).to_contain_text("00:00:5", timeout=DATA_MS)
+    await expect(page.locator(".player .facts")).to_contain_text("00:00:5")
     await expect(page.locator(".player .facts")).to_contain_text("92.3")
 
     await page.reload()  # the address names the recording

@@ -3,11 +3,8 @@
 import json
 import re
 
-import pytest
-from on_screen import CHARTS, DATA_MS, await_charts, tab_to
+from on_screen import CHARTS, await_charts, tab_to
 from playwright.async_api import Page, Request, Route, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 BEARING = "#/units/U1/bearings/UJB"
 SAYS = "wanted => (document.activeElement.value || document.activeElement.textContent) === wanted"
@@ -21,7 +18,7 @@ DRAWN = "node => node.querySelector('.js-plotly-plot, .chart').data.map(t => t.m
 
 async def open_bearing(page: Page, url: str) -> None:
     await page.goto(url + BEARING)
-    await expect(page.locator(SPREAD)).to_have_text(A_SPREAD, timeout=DATA_MS)
+    await expect(page.locator(SPREAD)).to_have_text(A_SPREAD)
 
 
 def gn_per_m(value: float) -> str:
@@ -44,7 +41,7 @@ async def test_every_chart_is_drawn_from_the_plant_alone_and_says_what_it_shows(
     trend = page.locator("[data-chart=stiffness-trend]")
     await expect(trend.get_by_role("radio", name="Preferred")).to_be_checked()
     caption = trend.locator("figcaption")
-    await expect(caption).to_contain_text("Dotted: random uncertainty", timeout=DATA_MS)
+    await expect(caption).to_contain_text("Dotted: random uncertainty")
     assert (await trend.evaluate(DRAWN)).count("random") == 2
     await trend.get_by_role("radio", name="Eq. (5), vortex").check()
     await expect(trend.locator(".sentence")).to_be_hidden()
@@ -157,5 +154,5 @@ async def test_one_budget_is_open_at_a_time_and_one_that_cannot_be_had_says_why(
 
     await page.route(SAVED_BUDGET, refuse)
     sentence = shown.locator(".sentence")
-    await expect(sentence).to_have_text("No budget now. No number just now.", timeout=DATA_MS)
+    await expect(sentence).to_have_text("No budget now. No number just now.")
     await expect(shown.locator("table")).to_be_hidden()

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from on_screen import (
     A_NUMBER,
-    DATA_MS,
     assert_fits,
     await_charts,
     await_orbit,
@@ -14,8 +13,7 @@ from on_screen import (
     number_with,
 )
 from playwright.async_api import Page, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
+from rigs.tiers import fast_and_long
 
 AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
 SEGMENTS = {":unit": "U1", ":bearing": "UJB"}
@@ -47,16 +45,16 @@ async def addresses(page: Page, url: str) -> list[str]:
 async def open_settled(page: Page, address: str) -> None:
     """Open a page and wait until it has had the answers that it opens with."""
     await page.goto(address)
-    await expect(page.locator("#service")).to_contain_text("Service answered", timeout=DATA_MS)
+    await expect(page.locator("#service")).to_contain_text("Service answered")
     await expect(page.locator("#main").get_by_role("heading").first).to_be_attached()
     waiting = page.locator("#main").get_by_text(WAITING).filter(visible=True)
-    await expect(waiting).to_have_count(0, timeout=DATA_MS)
+    await expect(waiting).to_have_count(0)
 
 
 async def unfold(page: Page, address: str) -> None:
     """Wait for the widest contents of a page, and open what is folded up."""
     if address in ("#/", "#/units/U1", BEARING):
-        await expect(page.locator(".number").first).to_have_text(A_NUMBER, timeout=DATA_MS)
+        await expect(page.locator(".number").first).to_have_text(A_NUMBER)
     if address == "#/sources":
         await expect(page.locator("[data-source=U1]")).to_contain_text("Connected")
         await page.get_by_role("button", name="Details").click()
@@ -89,16 +87,7 @@ async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page) -> None:
         await assert_fits(phone_page)
 
 
-@pytest.mark.parametrize(
-    "schemes",
-    [
-        pytest.param(("light", "dark"), id="one-for-each-page"),
-        *(
-            pytest.param((scheme,), id=scheme, marks=pytest.mark.long)
-            for scheme in ("light", "dark")
-        ),
-    ],
-)
+@pytest.mark.parametrize("schemes", fast_and_long(("light", "dark"), ("dark", "light")))
 async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, schemes) -> None:
     if not AXE.is_file():
         pytest.skip("needs npm")
@@ -125,7 +114,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.reload()
     assert await page.evaluate(BAND) == light
     grid = page.locator("[data-chart=spectrum] .chart path.xgrid").first
-    await expect(grid).to_be_attached(timeout=DATA_MS)
+    await expect(grid).to_be_attached()
     stroke = "node => node.style.stroke"
     drawn = await grid.evaluate(stroke)
     await page.get_by_label("Look").select_option("system")
@@ -141,6 +130,6 @@ async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, 
     after = await number_with(shaft, "µm pk-pk")
     assert after / before == pytest.approx(2.0, rel=0.1)  # the machine lives on in between
     chart = page.locator("[data-chart=amplitude-trend] .ytitle")
-    await expect(chart).to_have_text("µm pk-pk", timeout=DATA_MS)
+    await expect(chart).to_have_text("µm pk-pk")
     await page.reload()
-    await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk", timeout=DATA_MS)
+    await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk")

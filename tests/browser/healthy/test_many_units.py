@@ -3,11 +3,8 @@
 import copy
 from typing import Any
 
-import pytest
-from on_screen import DATA_MS, assert_fits
+from on_screen import assert_fits
 from playwright.async_api import Route, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 N_UNITS = 20
 LOST = 7
@@ -34,9 +31,9 @@ async def twenty_of_one(route: Route) -> None:
 async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(plant, page) -> None:
     await page.route("**/api/v1/overview", twenty_of_one)
     await page.goto(plant.url)
-    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS, timeout=DATA_MS)
+    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS)
     stiffness = page.locator("[data-unit=U20] [data-bearing=UJB] .number").first
-    await expect(stiffness).not_to_have_text("—", timeout=DATA_MS)
+    await expect(stiffness).not_to_have_text("—")
     width, height = await page.evaluate(SIZE)
     assert (width, height) == (1280, 800)
     lost = page.locator(f"[data-unit=U{LOST}] .tile-head .mark").filter(visible=True)

@@ -1,41 +1,12 @@
 """Single modules of the dashboard, run in the browser without a page of the plant."""
 
-import pytest
 from playwright.async_api import Page
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 EMPTY = "static/padwatch.svg"
 """A page of the plant that runs nothing by itself."""
 
-PLACES = """
-async (alarms) => {
-  const { alarmPlace } = await import("/static/alarm_place.js");
-  return alarms.map(alarmPlace);
-}
-"""
-
-WORDS = """
-async (entry) => {
-  const { changeLines, objectWords } = await import("/static/audit_words.js");
-  return [objectWords(entry), changeLines(entry)];
-}
-"""
-
-CHAIN = """
-async (entries) => {
-  const { chainWords } = await import("/static/audit_words.js");
-  return chainWords(entries).look;
-}
-"""
-
-JUDGE = """
-async ([changes, alarms, lost]) => {
-  const { troubleOf } = await import("/static/source_words.js");
-  const source = { state: "connected", reason: null, data_age_s: 0.2, ...changes };
-  const { rank, look, words, advice } = troubleOf(source, alarms, lost);
-  return { rank, look, words, advice };
-}
+CALL = """
+async ([module, name, ...given]) => (await import(`/static/${module}.js`))[name](...given)
 """
 
 DRAWN_WITHOUT_A_SIZE = """async () => {
@@ -48,6 +19,7 @@ DRAWN_WITHOUT_A_SIZE = """async () => {
   orbitPicture().draw(clip, 2, { turns: 1, whole: true, alone: false, inClearance: true });
 }"""
 
+CONNECTED = {"state": "connected", "reason": None, "data_age_s": 0.2}
 DRIFT = {"kind": "clock_drift", "level": "alert", "is_active": True, "value": 300.0}
 DRIFT |= {"limit": 200.0, "value_unit": "ppm"}
 SILENT = {"state": "not_connected", "reason": "daq:502: no answer within 0.5 s"}
@@ -62,7 +34,7 @@ async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page: Page) 
     alarms = [("stiffness_x", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
     alarms += [(kind, "UJB") for kind in bearing]
     told = [{"unit": "U1", "subject": subject, "kind": kind} for kind, subject in alarms]
-    found = await page.evaluate(PLACES, told)
+    found = [await page.evaluate(CALL, ["alarm_place", "alarmPlace", alarm]) for alarm in told]
     place = "#/units/U1/bearings/UJB"
     assert found == [f"{place}/film", "#/units/U1", "#/sources", *([place] * len(bearing))]
 
@@ -75,18 +47,19 @@ async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(pla
         "before": {"state": "unacknowledged", "level": "alert"},
         "after": {"state": "shelved", "level": "alert", "until_ns": None},
     }
-    where, changes = await page.evaluate(WORDS, shelved)
+    where = await page.evaluate(CALL, ["audit_words", "objectWords", shelved])
     assert where == "U1 UJB: Shaft vibration 1×, x"
+    changes = await page.evaluate(CALL, ["audit_words", "changeLines", shelved])
     assert changes == ["state: unacknowledged → shelved"]
     chain = [
         {"number": 3, "hash": "c", "previous_hash": "b"},
         {"number": 2, "hash": "b", "previous_hash": "a"},
         {"number": 1, "hash": "a", "previous_hash": "0"},
     ]
-    assert await page.evaluate(CHAIN, chain) == "good"
-    assert await page.evaluate(CHAIN, [chain[0], chain[2]]) == "absent"
-    chain[1]["hash"] = "x"
-    assert await page.evaluate(CHAIN, chain) == "bad"
+    broken = [chain[0], chain[1] | {"hash": "x"}, chain[2]]
+    for entries, look in ((chain, "good"), ([chain[0], chain[2]], "absent"), (broken, "bad")):
+        found = await page.evaluate(CALL, ["audit_words", "chainWords", entries])
+        assert found["look"] == look
 
 
 async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> None:
@@ -104,7 +77,9 @@ async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> 
         ({"state": "ended"}, [], 0, 5, "absent", ""),
         ({}, [], 0, 9, "good", ""),
     ]:
-        found = await page.evaluate(JUDGE, [changes, alarms, lost])
+        found = await page.evaluate(
+            CALL, ["source_words", "troubleOf", CONNECTED | changes, alarms, lost]
+        )
         assert (found["rank"], found["look"]) == (rank, look), found
         assert said in found["advice"]
 

@@ -6,8 +6,6 @@ import pytest
 from on_screen import await_orbit, await_spectra
 from playwright.async_api import expect
 
-pytestmark = pytest.mark.asyncio(loop_scope="session")
-
 SPECTRA = "#/units/U1/bearings/UJB/waterfall"
 ORBITS = "#/units/U1/bearings/UJB/orbits"
 TWO_FRAMES = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"

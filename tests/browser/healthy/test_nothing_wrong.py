@@ -2,11 +2,7 @@
 
 import re
 
-import pytest
-from on_screen import DATA_MS
 from playwright.async_api import expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 ROW = "[data-source=U1]"
 FILM = "#/units/U1/bearings/UJB/film"
@@ -16,13 +12,13 @@ NOT_WATCHED = "This film is not watched: operating states need power_channel and
 async def test_pages_without_contents_say_why(plant, page, complaints) -> None:
     await page.goto(plant.url)
     link = page.locator("#alarms")
-    await expect(link).to_contain_text("No alarms", timeout=DATA_MS)
+    await expect(link).to_contain_text("No alarms")
     await link.click()
     await expect(page.locator("h1")).to_have_text("Alarms")
     await expect(page.get_by_text("Nothing is on the list.")).to_be_visible()
     await expect(link).to_have_attribute("aria-current", "page")
     line = page.locator(".alarm-rates")
-    await expect(line).to_contain_text("Seven days: ", timeout=DATA_MS)
+    await expect(line).to_contain_text("Seven days: ")
     for words in ("a day", "in ten minutes, at most", "chattering", "standing for more than a day"):
         await expect(line).to_contain_text(words)
 
@@ -30,7 +26,7 @@ async def test_pages_without_contents_say_why(plant, page, complaints) -> None:
     await expect(page.locator(".recordings")).to_contain_text("None yet. When an alarm is raised")
     await expect(page.locator(".reports")).to_contain_text("None yet: no alarm has been raised.")
     await page.goto(plant.url + "#/access")
-    await expect(page.locator(".accounts")).to_contain_text("No account yet", timeout=DATA_MS)
+    await expect(page.locator(".accounts")).to_contain_text("No account yet")
     await expect(page.locator(".keys")).to_contain_text("No key yet")
     assert complaints == []
 
@@ -40,7 +36,7 @@ async def test_a_source_in_good_health_says_what_arrives_from_where(
 ) -> None:
     await page.goto(plant.url + "#/sources")
     row = page.locator(ROW)
-    await expect(row.locator(".mark").first).to_have_text("Connected", timeout=DATA_MS)
+    await expect(row.locator(".mark").first).to_have_text("Connected")
     await expect(row.locator("[data-head=Missing]")).to_have_text("0")
     await expect(page.get_by_text("1 of 1 connected.")).to_be_visible()
     await row.get_by_role("button", name="Details").focus()

@@ -2,11 +2,8 @@
 
 import copy
 
-import pytest
-from on_screen import A_NUMBER, DATA_MS
+from on_screen import A_NUMBER
 from playwright.async_api import Page, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 BEARING = "#/units/U1/bearings/UJB"
 N_NUMBERS = 57
@@ -63,20 +60,13 @@ async def freeze(page: Page, url: str) -> dict:
     return copy.deepcopy(overview)
 
 
-async def numbers_in(page: Page, selector: str) -> dict[str, str]:
+async def texts_in(page: Page, place: str, of: str) -> dict[str, str]:
+    """Texts of one kind that can be seen, by the reading that they belong to."""
     return await page.eval_on_selector_all(
-        f"{selector} [data-reading]",
-        "nodes => Object.fromEntries(nodes.map("
-        "node => [node.dataset.reading, node.querySelector('.number').textContent]))",
-    )
-
-
-async def spreads_in(page: Page, selector: str) -> dict[str, str]:
-    """Everything that stands behind a ± and can be seen."""
-    return await page.eval_on_selector_all(
-        f"{selector} [data-reading]:has(.spread:not([hidden]))",
-        "nodes => Object.fromEntries(nodes.map("
-        "node => [node.dataset.reading, node.querySelector('.spread').textContent]))",
+        f"{place} [data-reading]:has({of}:not([hidden]))",
+        "(nodes, of) => Object.fromEntries(nodes.map("
+        "node => [node.dataset.reading, node.querySelector(of).textContent]))",
+        of,
     )
 
 
@@ -89,7 +79,7 @@ def spread(name: str, reading: dict) -> str:
 async def await_stiffness(page: Page) -> None:
     for name in ("stiffness_xx_n_per_m", "order1_k_eff_xx_n_per_m"):
         number = page.locator(f"[data-reading={name}] .number").first
-        await expect(number).to_have_text(A_NUMBER, timeout=DATA_MS)
+        await expect(number).to_have_text(A_NUMBER)
 
 
 async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant, page) -> None:
@@ -103,7 +93,7 @@ async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant,
     value = readings["order1_k_eff_xx_n_per_m"]["value"]
     assert value is not None
     await expect(stiffness).to_have_text(shown("order1_k_eff_xx_n_per_m", value))
-    numbers = await numbers_in(page, ".bearing")
+    numbers = await texts_in(page, ".bearing", ".number")
     assert numbers == {name: shown(name, readings[name]["value"]) for name in numbers}
     assert len(numbers) >= N_NUMBERS
 
@@ -113,7 +103,7 @@ async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant,
         low, high = (shown(name, readings[name]["uncertainty"][end]) for end in INTERVAL)
         await expect(tile.locator(".interval")).to_have_text(f"95 %: {low} to {high},")
         await expect(tile.locator(".estimator")).to_have_text(WORDS[latest["estimators"][axes]])
-    spreads = await spreads_in(page, ".bearing")
+    spreads = await texts_in(page, ".bearing", ".spread")
     assert spreads == {name: spread(name, readings[name]) for name in spreads}
     assert {"stiffness_xx_n_per_m", "order1_k_eff_yy_n_per_m"} <= spreads.keys()
 
@@ -135,10 +125,10 @@ async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page) -> N
         stiffness = latest["readings"]["order1_k_eff_yy_n_per_m"]["value"]
         number = page.locator(f"{row} [data-reading=order1_k_eff_yy_n_per_m] .number")
         await expect(number).to_have_text(shown("order1_k_eff_yy_n_per_m", stiffness))
-        for name, text in (await numbers_in(page, row)).items():
+        for name, text in (await texts_in(page, row, ".number")).items():
             assert text == shown(name, latest["readings"][name]["value"]), name
         preferred = [f"stiffness_{axes}_n_per_m" for axes in ("xx", "yy")]
-        assert await spreads_in(page, row) == {
+        assert await texts_in(page, row, ".spread") == {
             name: spread(name, latest["readings"][name]) for name in preferred
         }
         named = [WORDS[name] for name in latest["estimators"].values()]

@@ -1,10 +1,6 @@
 """The page of the audit trail: who did what to what, found again by keyboard."""
 
-import pytest
-from on_screen import DATA_MS
 from playwright.async_api import expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 AUDIT = "#/audit"
 
@@ -15,7 +11,7 @@ async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_fin
     told = await (await page.request.get(f"{plant.url}api/v1/audit?limit=100")).json()
     await page.goto(plant.url + AUDIT)
     rows = page.locator("[data-entry]")
-    await expect(rows).to_have_count(len(told["entries"]), timeout=DATA_MS)
+    await expect(rows).to_have_count(len(told["entries"]))
     accepted = page.locator("[data-entry]", has_text="baseline accepted").first
     await expect(accepted).to_contain_text("in force: none → 1")
     await expect(accepted).to_contain_text(", version 1")

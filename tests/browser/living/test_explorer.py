@@ -7,10 +7,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from on_screen import DATA_MS
 from playwright.async_api import Page, Request, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 STIFFNESS = "[data-chart=trend-film-stiffness-gn-m]"
 COMPARED = "#/trends?b=U1/UJB&b=U1/LJB&q=stiffness_xx_n_per_m"
@@ -18,7 +15,7 @@ CURVES = ".chart .scatterlayer .trace path.js-line"
 
 
 async def await_curve(page: Page, name: str = STIFFNESS) -> None:
-    await expect(page.locator(f"{name} {CURVES}").first).to_be_attached(timeout=DATA_MS)
+    await expect(page.locator(f"{name} {CURVES}").first).to_be_attached()
 
 
 def days(request: Request) -> float:
@@ -33,14 +30,14 @@ def days(request: Request) -> float:
 
 async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, complaints) -> None:
     await page.goto(plant.url + "#/trends")
-    await expect(page.locator("summary").first).to_have_text("Bearings: 1", timeout=DATA_MS)
+    await expect(page.locator("summary").first).to_have_text("Bearings: 1")
 
     await page.locator("summary").first.click()
     await page.get_by_role("checkbox", name="U1 LJB").check()
     await page.get_by_role("radio", name="Month").check()
 
     legend = page.locator(f"{STIFFNESS} .legendtext")
-    await expect(legend.filter(has_text="U1 UJB: xx")).to_have_count(1, timeout=DATA_MS)
+    await expect(legend.filter(has_text="U1 UJB: xx")).to_have_count(1)
     await expect(legend.filter(has_text="U1 LJB: xx")).to_have_count(1)
     assert "b=U1%2FUJB&b=U1%2FLJB" in await page.evaluate("location.hash")
     assert "last=2592000" in await page.evaluate("location.hash")
@@ -64,7 +61,7 @@ async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page
 
     await page.get_by_role("radio", name="Oil temperature").check()
 
-    await expect(page.locator(f"{STIFFNESS} .cbtitle")).to_contain_text("oil", timeout=DATA_MS)
+    await expect(page.locator(f"{STIFFNESS} .cbtitle")).to_contain_text("oil")
     fills = await page.locator(f"{STIFFNESS} .points path.point").evaluate_all(
         "points => new Set(points.map((point) => getComputedStyle(point).fill)).size"
     )
@@ -118,15 +115,15 @@ async def test_a_time_without_results_says_so(plant, page) -> None:
     empty = "&from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z"
     await page.goto(plant.url + COMPARED + empty)
     sentence = page.locator(f"{STIFFNESS} .sentence")
-    await expect(sentence).to_contain_text("Nothing was stored from 2001-01-01", timeout=DATA_MS)
+    await expect(sentence).to_contain_text("Nothing was stored from 2001-01-01")
 
     await page.get_by_label("While at").select_option("standstill")
-    await expect(sentence).to_contain_text("at standstill", timeout=DATA_MS)
+    await expect(sentence).to_contain_text("at standstill")
     await page.locator("summary").first.click()
     for bearing in ("U1 UJB", "U1 LJB"):
         await page.get_by_role("checkbox", name=bearing).uncheck()
     none = page.get_by_text("Choose at least one bearing.")
-    await expect(none).to_be_visible(timeout=DATA_MS)
+    await expect(none).to_be_visible()
 
 
 async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
@@ -138,7 +135,7 @@ async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
     )
     await page.goto(plant.url + address)
 
-    await expect(page.locator("[data-chart=trend-operation-r-min]")).to_be_visible(timeout=DATA_MS)
+    await expect(page.locator("[data-chart=trend-operation-r-min]")).to_be_visible()
     await expect(page.locator("[data-chart=trend-operation-mw]")).to_be_visible()
     await expect(page.get_by_role("radio", name="Week")).to_be_checked()
     await expect(page.get_by_role("radio", name="Eccentricity")).to_be_checked()
@@ -154,7 +151,7 @@ async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
 
 async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page) -> None:
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
-    await page.get_by_role("radio", name="1 y").check(timeout=DATA_MS)
+    await page.get_by_role("radio", name="1 y").check()
     await page.get_by_role("link", name="Compare in Trends").click()
 
     await await_curve(page)

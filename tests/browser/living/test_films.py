@@ -2,16 +2,12 @@
 
 import re
 
-import pytest
 from on_screen import await_spectra
 from playwright.async_api import Page, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 FILM = "#/units/U1/bearings/UJB/film"
 BEARING = "#/units/U1/bearings/UJB"
 PLOTS = ("against-eccentricity_ratio", "against-oil_temperature_c")
-DATA_MS = 90_000
 WORDS = re.compile(
     "Normal|Alert|Danger|Gathering evidence|No baseline|Not enough excitation|Reading doubted"
     "|Not settled"
@@ -20,10 +16,10 @@ WORDS = re.compile(
 
 async def await_charts(page: Page) -> None:
     tiles = page.locator("[data-chart=baseline-map] .heatmaplayer image").first
-    await expect(tiles).to_be_attached(timeout=DATA_MS)
+    await expect(tiles).to_be_attached()
     for name in PLOTS:
         point = page.locator(f"[data-chart={name}] .chart path.point").first
-        await expect(point).to_be_attached(timeout=DATA_MS)
+        await expect(point).to_be_attached()
 
 
 async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
@@ -34,7 +30,7 @@ async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
 
     for direction in ("x", "y"):
         row = page.locator(f".verdict[data-direction={direction}]")
-        await expect(row.locator(".mark")).to_contain_text(WORDS, timeout=DATA_MS)
+        await expect(row.locator(".mark")).to_contain_text(WORDS)
         await expect(row.locator("svg.shape")).to_be_visible()
     await expect(page.locator(".film-facts")).to_contain_text("cell: eccentricity")
     await expect(page.locator(".film-facts")).to_contain_text("compared with baseline version 1")
@@ -54,7 +50,7 @@ async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
 async def test_an_engineer_freezes_and_thaws_by_keys_and_reads_what_is_refused(plant, page) -> None:
     await page.goto(plant.url + FILM)
     version = page.locator("[data-version='1']")
-    await expect(version).to_have_attribute("data-status", "in_force", timeout=DATA_MS)
+    await expect(version).to_have_attribute("data-status", "in_force")
 
     await page.get_by_role("button", name="Freeze…").focus()
     await page.keyboard.press("Enter")
@@ -90,12 +86,12 @@ async def test_an_engineer_freezes_and_thaws_by_keys_and_reads_what_is_refused(p
 async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(plant, page) -> None:
     await page.goto(plant.url)
     brief = page.locator("[data-bearing=UJB] .film-brief .mark").first
-    await expect(brief).to_contain_text(WORDS, timeout=DATA_MS)
+    await expect(brief).to_contain_text(WORDS)
     await page.locator("[data-bearing=UJB] a").click()
     await expect(page.locator(".film-verdict .mark").first).to_contain_text(WORDS)
     await page.get_by_role("radio", name="30 d", exact=True).check()
     caption = page.locator("[data-chart=stiffness-trend] figcaption")
-    await expect(caption).to_contain_text("are simulated, not measured", timeout=DATA_MS)
+    await expect(caption).to_contain_text("are simulated, not measured")
     await page.get_by_role("link", name="Baseline, map and history").click()
     await expect(page.locator("h1")).to_contain_text("film against its baseline")
 
@@ -110,6 +106,6 @@ async def test_a_time_without_spectra_says_why_and_since_when_there_are_some(pla
     for _ in range(2):
         await page.get_by_role("button", name="Earlier").click()
 
-    await expect(sentence).to_contain_text("The oldest that is kept is of", timeout=DATA_MS)
+    await expect(sentence).to_contain_text("The oldest that is kept is of")
     await expect(sentence).to_contain_text("is simulated: readings without spectra")
     await expect(page.locator("[data-chart=waterfall] .chart")).to_be_hidden()

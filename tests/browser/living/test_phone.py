@@ -1,10 +1,7 @@
 """Pages with a long past on a phone."""
 
-import pytest
-from on_screen import DATA_MS, assert_fits, await_charts
+from on_screen import assert_fits, await_charts
 from playwright.async_api import expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 BEARING = "#/units/U1/bearings/UJB"
 WIDEST = {
@@ -19,7 +16,7 @@ WIDEST = {
 async def test_films_and_trends_fit_a_phone(plant, phone_page) -> None:
     for address, widest in WIDEST.items():
         await phone_page.goto(plant.url + address)
-        await expect(phone_page.locator(widest).first).to_be_attached(timeout=DATA_MS)
+        await expect(phone_page.locator(widest).first).to_be_attached()
         if address == BEARING:
             await await_charts(phone_page)
         await assert_fits(phone_page)

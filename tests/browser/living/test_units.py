@@ -1,10 +1,7 @@
 """The page of a unit: its bearings side by side, what is wrong with it, and the way on."""
 
-import pytest
-from on_screen import A_NUMBER, DATA_MS
+from on_screen import A_NUMBER
 from playwright.async_api import Page, Response, expect
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 UNIT = "#/units/U1"
 HREFS = "links => links.map(link => link.getAttribute('href'))"
@@ -32,7 +29,7 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     await page.goto(plant.url + UNIT)
     table = page.get_by_role("table", name="side by side")
     await expect(table.locator(OIL)).to_have_count(3)
-    await expect(table.locator(OIL).first).to_have_text(A_NUMBER, timeout=DATA_MS)
+    await expect(table.locator(OIL).first).to_have_text(A_NUMBER)
     shown = await table.locator(OIL).all_inner_texts()
     told = set()
     for answer in [one for one in heard if one.status == 200]:
