@@ -97,21 +97,3 @@ async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(
         assert {r["value"] for r in latest["readings"].values()} == {None}
     assert (await demo.get("/readyz"))["status"] == "ok"
     assert await demo.end(signal.SIGTERM) == 0
-
-
-@pytest.mark.long
-async def test_the_demo_begins_with_a_simulated_year_and_goes_on_from_it(
-    start: Start, tmp_path: Path
-) -> None:
-    demo = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
-    await demo.wait_for_url()
-    year = {"start": "2020-01-01T00:00:00Z", "end": "2100-01-01T00:00:00Z", "max_points": 50}
-
-    for unit in ("U1", "U2"):
-        bearing = f"/api/v1/units/{unit}/bearings/LJB"
-        found = await demo.get(f"{bearing}/film/readings", **year)
-        assert set(found["provenance"]) == {"simulated"}
-        baselines = await demo.get(f"{bearing}/baselines")
-        assert baselines["in_force"] == 1
-        film = await demo.until(f"{bearing}/film", lambda film: film["condition"] is not None)
-        assert film["condition"]["is_settled"]  # as it was before the start

@@ -8,17 +8,6 @@ from typing import Any
 
 import pytest
 
-LOOPS = {
-    "analyse",
-    "record",
-    "references",
-    "alarms",
-    "captures",
-    "evidence",
-    "learn",
-    "gather",
-    "serve",
-}
 STATUS = "STATUS=0 of 2 units connected"
 
 
@@ -67,6 +56,4 @@ async def test_the_service_manager_is_told_from_the_start_to_the_end(
     assert await program.end() == 0
     await manager.until(lambda told: told[-1] == "STOPPING=1\nSTATUS=stopping")
 
-    loops = {name.removeprefix("loop ") for name in checks if name.startswith("loop ")}
-    assert loops >= LOOPS
-    assert {checks[f"loop {name}"] for name in loops} == {"alive"}
+    assert {said for name, said in checks.items() if name.startswith("loop ")} == {"alive"}

@@ -44,23 +44,6 @@ async def test_what_was_repaired_while_the_service_was_down_returns_with_the_fir
     assert changes(plant, PROBE) == ["raised", "condition_unknown", "condition_known", "returned"]
 
 
-async def test_an_alarm_that_nothing_watches_any_more_is_closed_and_says_so(
-    plant: Any, scripted: Make, block: Make
-) -> None:
-    await play(plant, scripted, [lost(block(n)) for n in range(6)])
-    with plant.store.database.writing() as writer:  # as if the channel had been renamed since
-        writer.execute("UPDATE alarm SET id = 'U1:old:channel_not_ok', subject = 'old'")
-
-    plant.start_alarms()
-    await plant.recorder.flush()
-
-    [closed] = events(plant, alarm="U1:old:channel_not_ok")
-    assert (closed.change, closed.reason) == ("returned", "no_longer_watched")
-    alarm = plant.alarms.alarm("U1:old:channel_not_ok")
-    assert alarm.state is AlarmState.RETURNED_UNACKNOWLEDGED
-    plant.alarms.operate("U1:old:channel_not_ok", Acknowledge("A. Name", 1))
-
-
 async def test_a_link_that_is_lost_for_long_is_an_alarm_of_its_own(plant: Any) -> None:
     plant.alarms.link("U1", True)
     plant.alarms.link("U2", True)

@@ -144,14 +144,3 @@ async def test_a_reader_that_ends_without_an_error_is_dead_not_forgotten(
     assert plant.beats.troubles == {"acquire U1": "has ended"}
     assert manager_socket.received == [{"STATUS": "acquire U1 has ended"}]
     assert plant.live.status("U2").state is LinkState.CONNECTING
-
-
-async def test_a_bug_in_one_reader_ends_them_all_so_that_the_program_is_started_again(
-    plant: Plant,
-) -> None:
-    await plant.gates.pass_s(1.0)
-    plant.devices["U1"].clock = None
-    await plant.gates.pass_s(2.0)
-
-    assert plant.running.done()
-    assert "AttributeError" in repr(plant.running.exception())
