@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer, RtuRingServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.modbus.transport import SerialTransport, TcpTransport
 from core.blocks import Rejection
 from core.device_clock import StampFault
 
@@ -27,10 +27,8 @@ async def server(request, device, tmp_path):
 
 @pytest.fixture
 def source(server, counts_calibration) -> ModbusRingSource:
-    found = dict(server.endpoint)
-    transport = TcpTransport(**found) if "port" in found else SerialTransport(**found)
     settings = ModbusRingSettings(
-        transport=transport, poll_period_s=0.001, timeout_s=1.0, stale_after_s=0.3
+        transport=transport_of(server), poll_period_s=0.001, timeout_s=1.0, stale_after_s=0.3
     )
     return ModbusRingSource(settings, counts_calibration(), SystemClock())
 

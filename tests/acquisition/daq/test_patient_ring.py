@@ -54,13 +54,6 @@ def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read(device)
     assert device.newest == 7
 
 
-def test_a_look_at_the_newest_slot_does_not_make_the_older_ones_read(device) -> None:
-    device.produce(1000)
-    read(device, device.newest)
-    device.produce(1000)
-    assert device.newest == 3
-
-
 def test_a_restart_waits_until_the_last_slot_was_read(device) -> None:
     for sequences in (range(1, 4), range(7, 11)):
         device.produce(1000)

@@ -8,77 +8,39 @@ from acquisition.modbus.ring_layout import RingLayout
 N_SLOTS = 8
 
 
-class Seen:
-    """A watch over a ring of eight slots."""
-
-    def __init__(self) -> None:
-        self.layout = RingLayout(
-            n_channels=1,
-            samples_per_slot=10,
-            n_slots=N_SLOTS,
-            rate_mhz=600_000,
-            n_slow=0,
-            ring_address=100,
-            slot_stride=40,
-        )
-        self.watch = ReadingWatch(self.layout)
-
-    def write(self, *sequences: int) -> None:
-        for sequence in sequences:
-            self.watch.note_written(sequence)
-
-    def read(self, *places: int) -> None:
-        for place in places:
-            start = self.layout.slot_address(place)
-            self.watch.note_read(range(start, start + self.layout.slot_registers))
+LAYOUT = RingLayout(1, 10, N_SLOTS, 600_000, 0, ring_address=100, slot_stride=40)
+LOOK = ()
 
 
-@pytest.fixture
-def seen() -> Seen:
-    return Seen()
-
-
-def test_slots_that_are_read_in_order_are_read(seen: Seen) -> None:
-    seen.write(0, 1, 2)
-    seen.watch.note_look()
-    seen.read(0, 1)
-    assert seen.watch.n_unread == 1
-    seen.read(2)
-    seen.watch.note_look()
-    assert (seen.watch.n_unread, seen.watch.waiting) == (0, True)
-
-
-def test_who_reads_the_newest_that_it_was_told_of_leaves_out_the_older_ones(seen: Seen) -> None:
-    seen.write(0, 1, 2)
-    seen.watch.note_look()
-    seen.read(2)
-    seen.watch.note_look()
-    assert (seen.watch.n_unread, seen.watch.waiting) == (0, True)
-
-
-def test_a_place_that_is_read_for_an_older_slot_tells_nothing_of_the_newest(seen: Seen) -> None:
-    seen.write(0)
-    seen.watch.note_look()
-    seen.write(1, 2, 3, 4, 5, 6)
-    seen.read(6, 7, 0)  # where the two slots before the first one would be, and the first one
-    seen.watch.note_look()
-    assert (seen.watch.n_unread, seen.watch.waiting) == (6, False)
-
-
-def test_slots_that_came_after_the_look_are_still_to_be_read(seen: Seen) -> None:
-    seen.write(0, 1)
-    seen.watch.note_look()
-    seen.write(2, 3)
-    seen.read(1)
-    seen.watch.note_look()
-    assert seen.watch.n_unread == 2
-
-
-def test_an_empty_ring_has_nothing_that_anybody_was_told_of(seen: Seen) -> None:
-    seen.write(0, 1)
-    seen.watch.note_look()
-    seen.read(0, 1)
-    seen.watch.begin_anew()
-    seen.write(0)
-    seen.watch.note_look()
-    assert (seen.watch.n_unread, seen.watch.waiting) == (1, False)
+@pytest.mark.parametrize(
+    ("written_read_or_looked", "n_unread", "waiting"),
+    [
+        pytest.param([(0, 1, 2), LOOK, [0, 1]], 1, False, id="one is left"),
+        pytest.param([(0, 1, 2), LOOK, [0, 1], [2], LOOK], 0, True, id="read in order"),
+        pytest.param([(0, 1, 2), LOOK, [2], LOOK], 0, True, id="older ones are left out"),
+        pytest.param([(0,), LOOK, [0], (1, 2, 3), [3]], 3, False, id="the newest was not told of"),
+        pytest.param([(0, 1), LOOK, (2, 3), [1], LOOK], 2, False, id="those after the look"),
+        # read where the two slots before the first one would be, and the first one
+        pytest.param(
+            [(0,), LOOK, (1, 2, 3, 4, 5, 6), [6, 7, 0], LOOK], 6, False, id="places of older slots"
+        ),
+        pytest.param([(0, 1), LOOK, [0, 1], None, (0,), LOOK], 1, False, id="an empty ring"),
+    ],
+)
+def test_a_slot_is_read_when_a_reader_that_was_told_of_it_cannot_come_back_for_it(
+    written_read_or_looked, n_unread, waiting
+) -> None:
+    """Sequences in tuples are written, places in lists are read."""
+    watch = ReadingWatch(LAYOUT)
+    for done in written_read_or_looked:
+        if done is None:
+            watch.begin_anew()
+        elif done == LOOK:
+            watch.note_look()
+        for number in done or ():
+            if isinstance(done, tuple):
+                watch.note_written(number)
+            else:
+                start = LAYOUT.slot_address(number)
+                watch.note_read(range(start, start + LAYOUT.slot_registers))
+    assert (watch.n_unread, watch.waiting) == (n_unread, waiting)

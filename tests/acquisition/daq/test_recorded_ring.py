@@ -4,6 +4,7 @@ import asyncio
 
 import numpy as np
 import pytest
+from rigs.modbus import transport_of
 
 from acquisition.calibration import UnitCalibration
 from acquisition.clock import SystemClock
@@ -12,7 +13,6 @@ from acquisition.daq.ring_server import ModbusRingServer, RtuRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.modbus.transport import SerialTransport, TcpTransport
 from acquisition.raw import FeedEndedError, RawBlock
 from core.blocks import SampleBlock
 
@@ -45,15 +45,10 @@ class PiecewiseFeed:
         )
 
 
-def transport_of(server) -> TcpTransport | SerialTransport:
-    found = dict(server.endpoint)
-    return TcpTransport(**found) if "port" in found else SerialTransport(**found)
-
-
-def source_of(server, calibration: UnitCalibration) -> ModbusRingSource:
-    transport = transport_of(server)
-    timeout_s = 5.0 if isinstance(transport, TcpTransport) else 0.6
-    settings = ModbusRingSettings(transport=transport, poll_period_s=0.0001, timeout_s=timeout_s)
+def source_of(server, calibration: UnitCalibration, **settings: float) -> ModbusRingSource:
+    timeout_s = 5.0 if "port" in server.endpoint else 0.6
+    given = {"poll_period_s": 0.0001, "timeout_s": timeout_s} | settings
+    settings = ModbusRingSettings(transport=transport_of(server), **given)
     return ModbusRingSource(settings, calibration, SystemClock())
 
 
@@ -85,50 +80,35 @@ def serve(request):
     return lambda device: request.param(device, on_demand=True)
 
 
+PIECES = ((1, 0, 130), (1, 275, 1000), (1, 9000, 29_000), (2, 20, 400), (9, 5000, 5300))
+FOUND = {(1, 0): 2, (1, 300): 14, (1, 9000): 400, (2, 50): 7, (9, 5000): 6}
+"""First slots and their number: 100 to 130, 275 to 300 and 20 to 50 of epoch 2 fill none."""
+
+
+def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]) -> None:
+    """Blocks are these slots, with the samples and times of the recording."""
+    slots = [
+        (epoch, first + 50 * n) for (epoch, first), n_slots in found.items() for n in range(n_slots)
+    ]
+    assert [(block.epoch, block.first_index) for block in blocks] == slots
+    for block in blocks:
+        index = np.arange(block.first_index, block.stop_index)
+        np.testing.assert_array_equal(block.samples[0], index % 2**15)
+        passed_us = round(block.first_index * 1e9 / 600) // 1000
+        assert block.start_ns == START_NS + block.epoch * 10**12 + passed_us * 1000
+        assert (block.rejected, block.stamp_fault) == ((), None)
+
+
 async def test_a_replay_on_demand_loses_nothing_however_small_the_ring(
     settings, serve, counts_calibration
 ):
-    device = RingDevice(PiecewiseFeed((1, 0, 20_000)), settings=settings)
+    """Gaps are as long behind the wire, and epochs are those of the recording."""
+    device = RingDevice(PiecewiseFeed(*PIECES), settings=settings)
     async with serve(device) as server:
         blocks = await replayed(server, counts_calibration())
-    samples = np.concatenate([block.samples[0] for block in blocks])
-    np.testing.assert_array_equal(samples, np.arange(20_000))
-    assert not any(block.rejected for block in blocks)
-
-
-async def test_a_gap_of_the_recording_is_as_long_behind_the_wire(
-    settings, serve, counts_calibration
-):
-    # 130 to 275 is missing: what fills no slot of 50 is left out, 100 to 130 and 275 to 300
-    device = RingDevice(
-        PiecewiseFeed((1, 0, 130), (1, 275, 1000), (1, 9000, 9100)), settings=settings
-    )
-    async with serve(device) as server:
-        blocks = await replayed(server, counts_calibration())
-    starts = [block.first_index for block in blocks]
-    assert starts == [0, 50, *range(300, 1000, 50), 9000, 9050]
-    for block in blocks:
-        assert block.samples[0].tolist() == list(range(block.first_index, block.stop_index))
-        assert (
-            block.start_ns
-            == START_NS + 10**12 + round(block.first_index * 1e9 / 600) // 1000 * 1000
-        )
-        assert not block.rejected
-        assert block.stamp_fault is None
-
-
-async def test_slow_values_and_epochs_are_those_of_the_recording(serve, counts_calibration):
-    feed = PiecewiseFeed((1, 0, 500), (2, 20, 400), (9, 5000, 5300))
-    device = RingDevice(feed, settings=RingDeviceSettings(n_slots=8))
-    async with serve(device) as server:
-        blocks = await replayed(server, counts_calibration())
-    found = [(block.epoch, block.first_index) for block in blocks]
-    assert found == [
-        *((1, index) for index in range(0, 500, 50)),
-        *((2, index) for index in range(50, 400, 50)),
-        *((9, index) for index in range(5000, 5300, 50)),
-    ]
-    assert all(block.slow["slow0"].value == block.first_index // 50 for block in blocks)
+    assert_recorded(blocks, FOUND)
+    if settings.version == 2:  # in version 1 slow values are those of the newest slot
+        assert [b.slow["slow0"].value for b in blocks] == [b.first_index // 50 for b in blocks]
 
 
 async def test_a_paced_gap_takes_the_time_it_took(settings):
@@ -171,14 +151,9 @@ class Hurry(SystemClock):
 
 
 async def test_a_patient_server_loses_nothing_however_fast_its_clock(settings, counts_calibration):
-    device = RingDevice(PiecewiseFeed((1, 0, 5000), (2, 100, 3000)), settings=settings)
+    device = RingDevice(PiecewiseFeed(*PIECES), settings=settings)
     async with ModbusRingServer(device, Hurry(), patient=True) as server:
-        blocks = await replayed(server, counts_calibration())
-    found = [(block.epoch, block.first_index) for block in blocks]
-    assert found == [
-        *((1, index) for index in range(0, 5000, 50)),
-        *((2, index) for index in range(100, 3000, 50)),
-    ]
+        assert_recorded(await replayed(server, counts_calibration()), FOUND)
 
 
 async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(settings, counts_calibration):
@@ -187,12 +162,9 @@ async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(settings, 
         async with source_of(server, counts_calibration()).connect() as stream:
             before = await anext(stream)
         after = await replayed(server, counts_calibration())
-    assert before.stop_index <= after[0].first_index
-    assert after[-1].stop_index == 20_000
-    for block in after:
-        assert block.samples[0].tolist() == [
-            n % 2**15 for n in range(block.first_index, block.stop_index)
-        ]
+    start = after[0].first_index
+    assert before.stop_index <= start
+    assert_recorded(after, {(1, start): (20_000 - start) // 50})
 
 
 async def test_a_device_whose_recording_has_ended_stands_still(settings, counts_calibration):
@@ -202,10 +174,7 @@ async def test_a_device_whose_recording_has_ended_stands_still(settings, counts_
     assert (device.newest, device.ended) == (1, True)
     assert device.ledger.n_samples("U1") == 100
     async with ModbusRingServer(device) as server:
-        reader = ModbusRingSettings(
-            transport=transport_of(server), poll_period_s=0.001, stale_after_s=0.05
-        )
-        source = ModbusRingSource(reader, counts_calibration(), SystemClock())
+        source = source_of(server, counts_calibration(), poll_period_s=0.001, stale_after_s=0.05)
         async with source.connect() as stream:
             await anext(stream)
             with pytest.raises(LinkError, match="stand still"):

@@ -7,6 +7,7 @@ from functools import partial
 import pytest
 from rigs.bench import Bench
 from rigs.hostile_modbus import HostileLine, HostileServer
+from rigs.modbus import transport_of
 from rigs.polled import CALIBRATION, Follower, device_of, map_of
 from rigs.queues import queue_plant
 
@@ -156,12 +157,7 @@ def linked(bench_server):
     links = []
 
     def build(**settings) -> ModbusLink:
-        found = bench_server.endpoint
-        transport = (
-            TcpTransport(host=found["host"], port=found["port"])
-            if "port" in found
-            else SerialTransport(device=found["device"], parity=found["parity"])
-        )
+        transport = transport_of(bench_server)
         links.append(ModbusLink(LinkSettings(transport=transport, **{"timeout_s": 0.2} | settings)))
         return links[-1]
 

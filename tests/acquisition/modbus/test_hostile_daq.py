@@ -5,9 +5,9 @@ from contextlib import AsyncExitStack
 
 import pytest
 from rigs.hostile_sources import KINDS, Trial, lies_to
-from rigs.wrong_replies import COMMON, CONTENTS, WITHOUT_CONTENTS
+from rigs.wrong_replies import COMMON, CONTENTS
 
-FEW, SOME, MANY = 4, 20, 200
+FEW, MANY = 4, 100
 N_AT_ONCE = 20
 OF_RIGHT_FORM = [
     COMMON["fewer registers"],  # a queue may be that short
@@ -24,18 +24,12 @@ def cases() -> list:
         lies = {name: make for source in sources for name, make in lies_to(wire, source).items()}
         for n, (name, make) in enumerate(lies.items()):
             lied_to = [source for source in sources if name in lies_to(wire, source)]
-            n_contents = SOME if name in WITHOUT_CONTENTS else MANY
             for source in lied_to:
                 case, id_ = (KINDS[wire, source], make), f"{source} over {wire}: {name}"
-                long.append(pytest.param(*case, n_contents, marks=pytest.mark.long, id=id_))
+                long.append(pytest.param(*case, MANY, marks=pytest.mark.long, id=id_))
                 if source == lied_to[n % len(lied_to)]:
                     fast.append(pytest.param(*case, FEW, id=f"{id_}, a few"))
     return fast + long
-
-
-@pytest.mark.parametrize("of", KINDS, ids=" ".join)
-def test_there_are_more_than_two_dozen_kinds_of_wrong_reply_to_each_source(of):
-    assert len(lies_to(*of)) >= 24
 
 
 @pytest.mark.parametrize(("kind", "make", "n_contents"), cases())

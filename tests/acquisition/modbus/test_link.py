@@ -2,12 +2,6 @@
 
 import inspect
 
-import pymodbus.pdu.bit_message
-import pymodbus.pdu.diag_message
-import pymodbus.pdu.file_message
-import pymodbus.pdu.mei_message
-import pymodbus.pdu.other_message
-import pymodbus.pdu.register_message
 import pytest
 from pymodbus.pdu import ModbusPDU
 
@@ -98,20 +92,10 @@ async def test_a_half_open_link_is_noticed_by_the_time_out_and_says_so(linked, b
 
 def requests_of_pymodbus() -> list[type[ModbusPDU]]:
     """Every request that pymodbus can send."""
-    modules = (
-        pymodbus.pdu.bit_message,
-        pymodbus.pdu.diag_message,
-        pymodbus.pdu.file_message,
-        pymodbus.pdu.mei_message,
-        pymodbus.pdu.other_message,
-        pymodbus.pdu.register_message,
-    )
-    found = {
-        kind
-        for module in modules
-        for _, kind in inspect.getmembers(module, inspect.isclass)
-        if issubclass(kind, ModbusPDU) and kind.__name__.endswith("Request")
-    }
+    kinds: list[type[ModbusPDU]] = [ModbusPDU]
+    for kind in kinds:
+        kinds += kind.__subclasses__()
+    found = {kind for kind in kinds if kind.__name__.endswith("Request")}
     return sorted(found, key=lambda kind: kind.__name__)
 
 

@@ -58,6 +58,18 @@ class Waves:
             await asyncio.sleep(0)
 
 
+class PollingClock:
+    """Gives time to others while the poller waits, and lets so many seconds pass."""
+
+    def __init__(self, stepped_clock, step_s: float) -> None:
+        self._stepped, self._step_s = stepped_clock, step_s
+        self.now_ns, self.monotonic_s = stepped_clock.now_ns, stepped_clock.monotonic_s
+
+    async def sleep(self, duration_s: float) -> None:
+        self._stepped.step(min(duration_s, self._step_s))
+        await asyncio.sleep(0.001)
+
+
 @pytest.fixture
 def plant() -> Callable:
     @asynccontextmanager
@@ -86,30 +98,18 @@ async def until(stream, condition) -> SampleBlock:
     raise AssertionError
 
 
-async def test_the_first_block_already_has_the_values_of_the_other_device(plant) -> None:
-    async with plant() as (source, *_), source.connect() as stream:
-        block = await anext(stream)
-
-    assert block.slow == {"power": Reading(600.0), "oil": Reading(45.0)}
-
-
-async def test_a_new_value_reaches_the_blocks(plant) -> None:
+async def test_values_of_the_other_device_join_the_blocks_from_the_first_one_on(plant) -> None:
     async with plant() as (source, _, feed, device, _), source.connect() as stream:
-        await anext(stream)
-        feed.value = 55.0
-        device.produce(2)
-        block = await until(stream, lambda oil: oil.value == 55.0)
+        first = await anext(stream)
+        found = []
+        for value in (55.0, None):
+            feed.value = 500.0 if value is None else value
+            device.produce(2)
+            found.append(await until(stream, lambda oil, value=value: oil.value == value))
 
-    assert block.slow["power"].value == 600.0
-
-
-async def test_a_value_outside_its_limits_is_missing(plant) -> None:
-    async with plant() as (source, _, feed, device, _), source.connect() as stream:
-        feed.value = 500.0
-        device.produce(2)
-        block = await until(stream, lambda oil: oil.value is None)
-
-    assert block.slow["oil"].quality.reason is Reason.OUT_OF_RANGE
+    assert first.slow == {"power": Reading(600.0), "oil": Reading(45.0)}
+    assert [block.slow["power"].value for block in found] == [600.0] * 2
+    assert found[1].slow["oil"].quality.reason is Reason.OUT_OF_RANGE
 
 
 async def test_a_device_that_was_never_there_costs_no_waveform(plant) -> None:
@@ -154,16 +154,14 @@ async def test_while_there_are_no_waveforms_the_other_device_is_left_alone(plant
 
 
 async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, stepped_clock) -> None:
-    class Clock:
-        """Stands still for the poller while time is stepped."""
-
-        now_ns, monotonic_s = stepped_clock.now_ns, stepped_clock.monotonic_s
-
-        async def sleep(self, duration_s: float) -> None:
-            await asyncio.sleep(min(duration_s, 0.001))
-
     async with (
-        plant(Clock(), stale_after_s=5.0) as (source, _, feed, device, server),
+        plant(PollingClock(stepped_clock, 0.0), stale_after_s=5.0) as (
+            source,
+            _,
+            feed,
+            device,
+            server,
+        ),
         source.connect() as stream,
     ):
         await anext(stream)
@@ -182,15 +180,9 @@ async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, steppe
 
 
 async def test_a_device_whose_values_stand_still_has_none(plant, stepped_clock) -> None:
-    class Clock:
-        now_ns, monotonic_s = stepped_clock.now_ns, stepped_clock.monotonic_s
-
-        async def sleep(self, duration_s: float) -> None:
-            stepped_clock.step(min(duration_s, 1.0))
-            await asyncio.sleep(0.001)
-
+    clock = PollingClock(stepped_clock, 1.0)
     async with (
-        plant(Clock(), poll_period_s=1.0, stale_after_s=5.0) as (source, slow, *_),
+        plant(clock, poll_period_s=1.0, stale_after_s=5.0) as (source, slow, *_),
         source.connect() as stream,
     ):
         block = await until(stream, lambda oil: oil.value is None)

@@ -12,8 +12,10 @@ from acquisition.registers.cells import ByteOrder, Cell, NumberType
 from acquisition.registers.decoding import MapDecoder, ValueState
 from acquisition.registers.device_time import CalendarTime, EpochTime
 from acquisition.registers.register_map import (
+    FlagCheck,
     FullScale,
     MapValue,
+    Meaning,
     RegisterMap,
     ScaleRegister,
     Together,
@@ -42,14 +44,6 @@ def one(value: MapValue, content: bytes, **settings) -> tuple[float, ValueState]
     return reading.values[0], reading.states[0]
 
 
-def test_the_four_byte_orders_of_a_known_float_are_those_of_the_manuals() -> None:
-    assert struct.pack(">f", 123.456).hex() == "42f6e979"
-    assert registers_of(123.456, "float32", "ABCD").hex() == "42f6e979"
-    assert registers_of(123.456, "float32", "CDAB").hex() == "e97942f6"
-    assert registers_of(123.456, "float32", "BADC").hex() == "f64279e9"
-    assert registers_of(123.456, "float32", "DCBA").hex() == "79e9f642"
-
-
 @pytest.mark.parametrize("order", [order.value for order in ByteOrder])
 @pytest.mark.parametrize("type_", list(STRUCT))
 def test_every_type_comes_back_from_every_byte_order(type_: str, order: str) -> None:
@@ -59,6 +53,16 @@ def test_every_type_comes_back_from_every_byte_order(type_: str, order: str) -> 
     cell = Cell(address=7, type=NumberType(type_), byte_order=ByteOrder(order))
 
     assert one(MapValue(id="v", cell=cell), registers_of(number, type_, order)) == (number, 0)
+
+
+@pytest.mark.parametrize(
+    ("order", "content"),
+    [("ABCD", "42f6e979"), ("CDAB", "e97942f6"), ("BADC", "f64279e9"), ("DCBA", "79e9f642")],
+)
+def test_a_known_float_is_found_in_the_byte_orders_of_the_manuals(order, content) -> None:
+    cell = Cell(address=7, type=NumberType.FLOAT32, byte_order=ByteOrder(order))
+
+    assert one(MapValue(id="v", cell=cell), bytes.fromhex(content))[0] == pytest.approx(123.456)
 
 
 @given(
@@ -250,3 +254,61 @@ def test_content_of_another_length_is_refused() -> None:
 
     with pytest.raises(ValueError, match="4 bytes instead of 2"):
         decoder.read(words(1, 2))
+
+
+@pytest.mark.parametrize(
+    ("flag", "word", "state"),
+    [
+        ({"mask": 0x0020, "set_means": Meaning.BAD}, 0x0020, ValueState.FLAGGED),
+        ({"mask": 0x0060, "set_means": Meaning.BAD}, 0x0040, ValueState.FLAGGED),
+        ({"mask": 0x0020, "set_means": Meaning.BAD}, 0xFFDF, ValueState.OK),
+        ({"mask": 0x0021, "set_means": Meaning.OK}, 0x0021, ValueState.OK),
+        ({"mask": 0x0021, "set_means": Meaning.OK}, 0x0001, ValueState.FLAGGED),
+        ({"ok_values": (1,), "clipped_values": (2,)}, 1, ValueState.OK),
+        ({"ok_values": (1,), "clipped_values": (2,)}, 2, ValueState.CLIPPED),
+        ({"ok_values": (1,), "clipped_values": (2,)}, 0, ValueState.FLAGGED),
+        ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x02FF, ValueState.OK),
+        ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x0300, ValueState.FLAGGED),
+    ],
+)
+def test_a_status_register_is_read_with_the_polarity_of_its_maker(flag, word, state) -> None:
+    check = FlagCheck(cell=Cell(address=1), **flag)
+    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
+
+    assert one(value, words(5, word)) == (5.0, state)
+
+
+def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
+    """VM600: bit 5 set means the sensor is OK, bits 6 to 11 set mean an error."""
+    status = Cell(address=1)
+    checks = (
+        FlagCheck(cell=status, mask=0x0021, set_means=Meaning.OK),
+        FlagCheck(cell=status, mask=0x0FC0, set_means=Meaning.BAD),
+    )
+    value = MapValue(id="v", cell=Cell(address=0), flags=checks)
+
+    states = [one(value, words(5, word))[1] for word in (0x0021, 0x0001, 0x0121, 0x003F)]
+
+    flagged = ValueState.FLAGGED
+    assert states == [ValueState.OK, flagged, flagged, ValueState.OK]
+
+
+@pytest.mark.parametrize("cell", [{"function": 2}, {"bit": 7}])
+@pytest.mark.parametrize(
+    ("flag", "bit", "state"),
+    [
+        ({"set_means": Meaning.OK}, 1, ValueState.OK),
+        ({"set_means": Meaning.OK, "mask": 1}, 0, ValueState.FLAGGED),
+        ({"set_means": Meaning.BAD}, 0, ValueState.OK),
+        ({"set_means": Meaning.BAD}, 1, ValueState.FLAGGED),
+        ({"ok_values": (1,)}, 1, ValueState.OK),
+        ({"ok_values": (1,)}, 0, ValueState.FLAGGED),
+    ],
+)
+def test_a_single_bit_is_a_status_too(cell, flag, bit: int, state: ValueState) -> None:
+    check = FlagCheck(cell=Cell(address=1, type=NumberType.BIT, **cell), **flag)
+    value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
+
+    content = words(5, bit << 7) if "bit" in cell else bytes([bit]) + words(5)
+
+    assert one(value, content) == (5.0, state)

@@ -17,6 +17,7 @@ from acquisition.registers.register_map import (
     Together,
 )
 
+SCALE = ScaleRegister(cell=Cell(address=612))
 BIT_3 = Cell(address=0, type=NumberType.BIT, bit=3)
 
 
@@ -35,59 +36,50 @@ def requests(values, **settings) -> list[tuple[int, int, int]]:
     return [(r.function, r.start, r.count) for r in plan.requests]
 
 
-def test_neighbours_are_read_together_and_nothing_between_others() -> None:
-    assert requests([value(0), value(1, "float32"), value(4)]) == [(3, 0, 3), (3, 4, 1)]
+def at(function: int, address: int = 5, **settings) -> MapValue:
+    """A value of an address of a function: a bit of coils and discrete inputs, else a register."""
+    type_ = NumberType.BIT if function in (1, 2) or "bit" in settings else NumberType.UINT16
+    cell = Cell(address=address, function=function, type=type_, **settings)
+    return MapValue(id=f"f{function}{settings}", cell=cell)
 
 
-def test_a_gap_is_read_along_only_where_that_is_allowed() -> None:
-    assert requests([value(0), value(4)], max_gap=2) == [(3, 0, 1), (3, 4, 1)]
-    assert requests([value(0), value(4)], max_gap=3) == [(3, 0, 5)]
-
-
-def test_no_request_is_longer_than_the_device_allows() -> None:
-    assert requests([value(n) for n in range(130)]) == [(3, 0, 125), (3, 125, 5)]
-    assert requests([value(2 * n, "float32") for n in range(6)], max_registers=5) == [
-        (3, 0, 4),
-        (3, 4, 4),
-        (3, 8, 4),
-    ]
-
-
-def test_a_block_of_which_one_value_is_used_is_read_whole() -> None:
-    block = Together(address=609, count=14)
-    assert requests([value(612)], base=1, together=(block,)) == [(3, 608, 14)]
-
-
-def test_a_block_that_nothing_is_used_of_is_not_read() -> None:
-    assert requests([value(1)], together=(Together(address=609, count=14),)) == [(3, 1, 1)]
-
-
-def test_a_block_is_never_split() -> None:
-    values = [value(n) for n in range(20)]
-    blocks = (Together(address=8, count=4),)
-    assert requests(values, max_registers=10, together=blocks) == [
-        (3, 0, 8),
-        (3, 8, 10),
-        (3, 18, 2),
-    ]
-
-
-def test_coils_inputs_holding_and_input_registers_are_read_apart() -> None:
-    cells = [
-        Cell(address=5, function=1, type=NumberType.BIT),
-        Cell(address=5, function=2, type=NumberType.BIT),
-        Cell(address=5, function=3),
-        Cell(address=5, function=4),
-    ]
-    values = [MapValue(id=f"f{cell.function}", cell=cell) for cell in cells]
-    assert requests(values) == [(1, 5, 1), (2, 5, 1), (3, 5, 1), (4, 5, 1)]
+BLOCK = Together(address=609, count=14)
 
 
 @pytest.mark.parametrize(
-    ("base", "address"), [(0, 100), (1, 101), (40001, 40101), (400001, 400101)]
+    ("values", "settings", "expected"),
+    [
+        # neighbours are read together, a gap only where that is allowed
+        ([value(0), value(1, "float32"), value(4)], {}, [(3, 0, 3), (3, 4, 1)]),
+        ([value(0), value(4)], {"max_gap": 2}, [(3, 0, 1), (3, 4, 1)]),
+        ([value(0), value(4)], {"max_gap": 3}, [(3, 0, 5)]),
+        # no request is longer than the device allows
+        ([value(n) for n in range(130)], {}, [(3, 0, 125), (3, 125, 5)]),
+        (
+            [value(2 * n, "float32") for n in range(6)],
+            {"max_registers": 5},
+            [(3, 0, 4), (3, 4, 4), (3, 8, 4)],
+        ),
+        # a block is read whole if one value of it is used, not at all if none is, and never split
+        ([value(612)], {"base": 1, "together": (BLOCK,)}, [(3, 608, 14)]),
+        ([value(1)], {"together": (BLOCK,)}, [(3, 1, 1)]),
+        (
+            [value(n) for n in range(20)],
+            {"max_registers": 10, "together": (Together(address=8, count=4),)},
+            [(3, 0, 8), (3, 8, 10), (3, 18, 2)],
+        ),
+        # the same address of another function is another register, two bits of one are in one
+        ([at(n) for n in (1, 2, 3, 4)], {}, [(1, 5, 1), (2, 5, 1), (3, 5, 1), (4, 5, 1)]),
+        ([at(3, bit=3), at(3, bit=4)], {}, [(3, 5, 1)]),
+        # addresses are written as in the manual
+        ([value(100)], {"base": 0}, [(3, 100, 1)]),
+        ([value(101)], {"base": 1}, [(3, 100, 1)]),
+        ([value(40101)], {"base": 40001}, [(3, 100, 1)]),
+        ([value(400101)], {"base": 400001}, [(3, 100, 1)]),
+    ],
 )
-def test_addresses_are_written_as_in_the_manual(base: int, address: int) -> None:
-    assert requests([value(address)], base=base) == [(3, 100, 1)]
+def test_a_map_is_read_in_the_fewest_requests_that_are_allowed(values, settings, expected) -> None:
+    assert requests(values, **settings) == expected
 
 
 @given(
@@ -127,17 +119,6 @@ def test_two_values_on_one_register_are_refused(values, said: str) -> None:
     assert refusal.value.at[:2] == ("value", 1)
 
 
-def test_different_bits_of_one_register_are_two_values() -> None:
-    cells = [Cell(address=0, type=NumberType.BIT, bit=bit) for bit in (3, 4)]
-    values = [MapValue(id=f"b{cell.bit}", cell=cell) for cell in cells]
-    assert requests(values) == [(3, 0, 1)]
-
-
-def test_the_same_address_of_another_function_is_another_register() -> None:
-    values = [value(0), MapValue(id="other", cell=Cell(address=0, function=4))]
-    assert requests(values) == [(3, 0, 1), (4, 0, 1)]
-
-
 @pytest.mark.parametrize(
     ("build", "said"),
     [
@@ -174,27 +155,22 @@ def test_the_same_address_of_another_function_is_another_register() -> None:
             ),
             "max_registers, 10",
         ),
+        (
+            lambda: requests([value(9, "float32")], together=(Together(address=10, count=4),)),
+            "cuts the number at 9 in two",
+        ),
+        (
+            lambda: requests(
+                [value(10)], together=(Together(address=10, count=4), Together(address=13, count=4))
+            ),
+            "share register 13",
+        ),
+        (
+            lambda: MapDecoder(RegisterMap(values=(value(609, scale_register=SCALE),))),
+            "address = 609",
+        ),
     ],
 )
 def test_what_no_device_can_have_is_refused_with_what_is_allowed(build, said: str) -> None:
     with pytest.raises(MapError, match=said):
         build()
-
-
-def test_a_block_that_cuts_a_number_in_two_is_refused() -> None:
-    with pytest.raises(MapError, match="cuts the number at 9 in two"):
-        requests([value(9, "float32")], together=(Together(address=10, count=4),))
-
-
-def test_blocks_that_share_a_register_are_refused() -> None:
-    blocks = (Together(address=10, count=4), Together(address=13, count=4))
-    with pytest.raises(MapError, match="share register 13"):
-        requests([value(10)], together=blocks)
-
-
-def test_a_value_and_its_scale_register_must_be_read_together() -> None:
-    scale = ScaleRegister(cell=Cell(address=612))
-    registers = RegisterMap(values=(value(609, scale_register=scale),))
-
-    with pytest.raises(MapError, match="address = 609"):
-        MapDecoder(registers)

@@ -2,17 +2,17 @@
 
 import asyncio
 import os
-import tty
 from collections.abc import Callable
 from pathlib import Path
+from typing import Self
 
 from pymodbus.framer import FramerRTU
 
 from acquisition.daq.answers import ReadableDevice, answer
+from acquisition.daq.modbus_server import ModbusDevice
+from acquisition.daq.rtu_server import ModbusRtuServer
 
 _MBAP_HEAD_BYTES = 6
-_RTU_READ_BYTES = 8
-_RTU_FIFO_READ_BYTES = 6
 
 
 class Liar:
@@ -39,24 +39,15 @@ class Liar:
         await writer.drain()
 
 
-class HostileServer(Liar):
-    """A Modbus TCP device."""
+class LoopbackServer:
+    """Accepts connections on a free port; they end when it is left."""
 
     port = 0
 
-    def __init__(self, device: ReadableDevice) -> None:
-        super().__init__(device)
+    def __init__(self) -> None:
         self._tasks: set[asyncio.Task[None]] = set()
 
-    @property
-    def n_connected(self) -> int:
-        return len(self._tasks)
-
-    @property
-    def endpoint(self) -> dict[str, str | int]:
-        return {"host": "127.0.0.1", "port": self.port}
-
-    async def __aenter__(self) -> "HostileServer":
+    async def __aenter__(self) -> Self:
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
         self.port = self._server.sockets[0].getsockname()[1]
         return self
@@ -72,10 +63,7 @@ class HostileServer(Liar):
         task = asyncio.current_task()
         self._tasks.add(task)
         try:
-            while True:
-                head = await reader.readexactly(_MBAP_HEAD_BYTES)
-                request = head + await reader.readexactly(int.from_bytes(head[4:], "big"))
-                await self.respond(request, request[7:], tcp_frame, writer)
+            await self._serve(reader, writer)
         except (asyncio.IncompleteReadError, ConnectionError, asyncio.CancelledError):
             pass
         finally:
@@ -83,69 +71,64 @@ class HostileServer(Liar):
             writer.close()
 
 
-class HostileLine(Liar):
-    """A Modbus RTU device on a pseudo-terminal, always found at the same path."""
+class HostileServer(LoopbackServer, Liar):
+    """A Modbus TCP device."""
 
-    def __init__(self, device: ReadableDevice, path: Path) -> None:
-        super().__init__(device)
-        self.path = path
-        self._requests: asyncio.Queue[bytes] = asyncio.Queue()
-        self._received = b""
-        self._received_at_s = 0.0
+    def __init__(self, device: ReadableDevice) -> None:
+        LoopbackServer.__init__(self)
+        Liar.__init__(self, device)
+
+    @property
+    def n_connected(self) -> int:
+        return len(self._tasks)
 
     @property
     def endpoint(self) -> dict[str, str | int]:
-        return {"device": str(self.path), "parity": "none"}
+        return {"host": "127.0.0.1", "port": self.port}
 
-    async def __aenter__(self) -> "HostileLine":
-        self._open()
-        self._answering = asyncio.create_task(self._answer())
-        return self
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while True:
+            head = await reader.readexactly(_MBAP_HEAD_BYTES)
+            request = head + await reader.readexactly(int.from_bytes(head[4:], "big"))
+            await self.respond(request, request[7:], tcp_frame, writer)
 
-    async def __aexit__(self, *_: object) -> None:
+
+class HostileLine(ModbusRtuServer, Liar):
+    """A Modbus RTU device on a pseudo-terminal, always found at the same path."""
+
+    def __init__(self, device: ModbusDevice, path: Path) -> None:
+        ModbusRtuServer.__init__(self, device, link=path)
+        Liar.__init__(self, device)
+        self.path = path
+        self._frames: asyncio.Queue[bytes] = asyncio.Queue()
+
+    async def __aenter__(self) -> Self:
+        self._answering = asyncio.create_task(self._answer_frames())
+        return await super().__aenter__()
+
+    async def __aexit__(self, *error: object) -> None:
         self._answering.cancel()
         await asyncio.gather(self._answering, return_exceptions=True)
-        self._close()
+        await super().__aexit__(*error)
 
     def write(self, data: bytes) -> None:
         """Send bytes, asked or not."""
-        os.write(self._ours, data)
+        os.write(self._line[0], data)
 
     async def drain(self) -> None:
         pass
 
     def close(self) -> None:
         """Take the line away; another one comes in its place."""
-        self._close()
-        self._open()
+        self.cut()
 
-    async def _answer(self) -> None:
+    def _answer(self, frame: bytes, n_expected: int) -> None:  # noqa: ARG002
+        self._frames.put_nowait(frame)
+
+    async def _answer_frames(self) -> None:
         while True:
-            request = await self._requests.get()
+            request = await self._frames.get()
             await self.respond(request, request[1:-2], rtu_frame, self)
-
-    def _open(self) -> None:
-        self._ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
-        self.path.unlink(missing_ok=True)
-        self.path.symlink_to(os.ttyname(self._theirs))
-        asyncio.get_running_loop().add_reader(self._ours, self._take)
-
-    def _close(self) -> None:
-        asyncio.get_running_loop().remove_reader(self._ours)
-        os.close(self._ours)
-        os.close(self._theirs)
-
-    def _take(self) -> None:
-        now_s = asyncio.get_running_loop().time()
-        if now_s - self._received_at_s > 0.02:
-            self._received = b""  # what was left of a request that never became whole
-        self._received_at_s = now_s
-        self._received += os.read(self._ours, 4096)
-        is_fifo = self._received[1:2] == b"\x18"
-        if len(self._received) == (_RTU_FIFO_READ_BYTES if is_fifo else _RTU_READ_BYTES):
-            self._requests.put_nowait(self._received)
-            self._received = b""
 
 
 def tcp_frame(request: bytes, pdu: bytes) -> bytes:

@@ -15,6 +15,12 @@ from acquisition.modbus.transport import SerialTransport, TcpTransport, Transpor
 from acquisition.source import SampleSource
 
 
+def transport_of(server: ModbusServer) -> Transport:
+    """A way to a server."""
+    kind = TcpTransport if "port" in server.endpoint else SerialTransport
+    return kind(**server.endpoint)
+
+
 class Rig:
     """A device on a real link; pulling the plug takes the link away."""
 
@@ -45,7 +51,7 @@ class Rig:
         return ModbusTcpServer(device)
 
     def _transport(self) -> Transport:
-        return TcpTransport(**self._server.endpoint)
+        return transport_of(self._server)
 
 
 class OnTcp(Rig):

@@ -42,13 +42,23 @@ def life(build: Build, n: int = 600, seed: int = 1) -> list[Assessment]:
 
 
 def reading(build: Build, random: np.random.Generator, at: int) -> Assessment:
-    """One result."""
-    share = (at - T0) / (HOURS * HOUR_NS)
+    """One result of the nine hours."""
+    return result_at(build, random, at, (at - T0) / (HOURS * HOUR_NS))
+
+
+def result_at(
+    build: Build,
+    random: np.random.Generator,
+    at: int,
+    share: float,
+    speed_rpm: tuple[float, float] = (92.3, 1.0),
+) -> Assessment:
+    """One result after a share of all time; mean and standard deviation of the speed are given."""
     state = OperatingState.PART_LOAD if share < 0.3 else OperatingState.FULL_LOAD
     doubt = GOOD if random.random() < 0.9 else uncertain(Reason.LOW_COVERAGE)
     readings = {
         "stiffness_xx_n_per_m": Reading(float(random.normal(1e9, 1e7)), doubt, u_random=2e6),
-        "speed_rpm": Reading(float(random.normal(92.3, 1.0))),
+        "speed_rpm": Reading(float(random.normal(*speed_rpm))),
         "eccentricity_ratio": Reading(round(float(random.normal(0.35, 0.02)), 3)),
         "oil_temperature_c": Reading(round(45.0 + 3.0 * share + float(random.normal(0, 0.3)), 1)),
     }

@@ -8,8 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rigs.hostile_modbus import LoopbackServer
 
-class MaliciousProxy:
+
+class MaliciousProxy(LoopbackServer):
     """Stands between a reader and a device.
 
     Parameters
@@ -22,40 +24,14 @@ class MaliciousProxy:
     """
 
     def __init__(self, port: int, seed: int, **mischief: float) -> None:
-        self.port = 0
+        super().__init__()
         self.n_done: Counter[str] = Counter()
         self.mischief = mischief
         self._device_port = port
         self._random = np.random.default_rng(seed)
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._ends: list[asyncio.StreamWriter] = []
 
-    async def __aenter__(self) -> "MaliciousProxy":
-        self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        self.port = self._server.sockets[0].getsockname()[1]
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self._server.close()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self._server.wait_closed()
-        for end in self._ends:
-            end.close()
-        await asyncio.gather(*(end.wait_closed() for end in self._ends), return_exceptions=True)
-
-    def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.create_task(self._stand_between(reader, writer))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-        self._ends.append(writer)
-
-    async def _stand_between(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-    ) -> None:
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         device_reader, device_writer = await asyncio.open_connection("127.0.0.1", self._device_port)
-        self._ends.append(device_writer)
         ways = [
             asyncio.create_task(self._pump(reader, device_writer, self._request)),
             asyncio.create_task(self._pump(device_reader, writer, self._reply)),
@@ -66,8 +42,7 @@ class MaliciousProxy:
             for way in ways:
                 way.cancel()
             await asyncio.gather(*ways, return_exceptions=True)
-            for end in (writer, device_writer):
-                end.close()
+            device_writer.close()
 
     async def _pump(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, treat: Callable

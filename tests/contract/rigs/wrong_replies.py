@@ -195,25 +195,6 @@ RTU_CONTENTS = {
     "registers of another place": lambda w: [w.with_data(w.data[::-1])],
 }
 
-WITHOUT_CONTENTS = {
-    "the reply twice",
-    "the reply twice at once",
-    "its own request",
-    "its own request, then the reply",
-    "silence",
-    "the reply too late",
-    "hanging up",
-    "the reply backwards",
-    "an exception cut short",
-    "length zero",
-    "length with its bytes exchanged",
-    "checksum zero",
-    "checksum with its bytes exchanged",
-    "registers of another place",
-    "words exchanged",
-}
-"""Kinds that leave nothing but their place to chance: a few of each are all there are."""
-
 FORMS = {"tcp": TCP_FORMS, "rtu": RTU_FORMS}
 CONTENTS = {"tcp": TCP_CONTENTS, "rtu": RTU_CONTENTS}
 
