@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rigs.store_fixtures import BuildGap, Execute
+from rigs.store_fixtures import Execute, gap
 
 from core.alarms.alarm import (
     Alarm,
@@ -107,7 +107,7 @@ def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later
 
 
 def test_news_of_alarms_stands_or_falls_with_the_gap_it_came_with(
-    store: SqliteStore, execute: Execute, gap: BuildGap
+    store: SqliteStore, execute: Execute
 ) -> None:
     with pytest.raises(StoreError, match="NOT NULL"):
         store.append([], [gap(unit=None)], [raised()])

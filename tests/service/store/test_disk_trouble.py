@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from rigs.rolled_trends import n_rows
-from rigs.store_fixtures import At, Build
+from rigs.store_fixtures import Build, at
 
 from core.assessment import Assessment
 from service.store.port import StoreError
@@ -39,7 +39,7 @@ def stored_of(store: SqliteStore, batches: list[list[Assessment]]) -> tuple[int,
 
 
 def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(
-    path: Path, assessment: Build, at: At
+    path: Path, assessment: Build
 ) -> None:
     batch = [[assessment(at(10 * n + i), speed_rpm=1.0) for i in range(10)] for n in range(100)]
     with closing(SqliteStore(path)) as store:
@@ -78,7 +78,7 @@ def test_a_read_that_takes_too_long_is_ended(path: Path) -> None:
 
 
 def test_the_log_is_cut_after_a_long_read(
-    path: Path, assessment: Build, at: At, monkeypatch: pytest.MonkeyPatch
+    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limit = 2_000_000
     monkeypatch.setattr(writer, "MAX_LOG_BYTES", limit)
@@ -100,7 +100,7 @@ def test_the_log_is_cut_after_a_long_read(
 
 
 def test_room_that_becomes_free_is_given_back(
-    path: Path, assessment: Build, at: At, monkeypatch: pytest.MonkeyPatch
+    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "MIN_FREE_PAGES", 20)
     with closing(SqliteStore(path)) as store:

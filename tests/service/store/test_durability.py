@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from rigs.rolled_trends import n_rows
-from rigs.store_fixtures import Ask, At, Build, BuildGap, Execute
+from rigs.store_fixtures import Build, Execute, at, gap, query
 
 from service.origin import Origin
 from service.store.port import StoreError
@@ -61,12 +61,7 @@ time.sleep(60)
 
 
 def test_a_batch_is_stored_whole_or_not_at_all(
-    store: SqliteStore,
-    path: Path,
-    execute: Execute,
-    assessment: Build,
-    gap: BuildGap,
-    at: At,
+    store: SqliteStore, path: Path, execute: Execute, assessment: Build
 ) -> None:
     execute("CREATE TRIGGER refuse BEFORE INSERT ON gap BEGIN SELECT RAISE(ABORT, 'no gaps'); END;")
 
@@ -80,7 +75,7 @@ def test_a_batch_is_stored_whole_or_not_at_all(
 
 
 def test_a_full_disk_is_an_error_and_the_store_recovers_when_there_is_room(
-    store: SqliteStore, path: Path, assessment: Build, at: At
+    store: SqliteStore, path: Path, assessment: Build
 ) -> None:
     n_pages = store._writer.execute("PRAGMA page_count").fetchone()[0]
     store._writer.execute(f"PRAGMA max_page_count = {n_pages}")
@@ -111,9 +106,7 @@ def test_a_commit_that_is_refused_leaves_no_transaction_behind(
     assert n_rows(path, "assessment") == 1
 
 
-def test_trends_are_read_while_others_are_written(
-    store: SqliteStore, assessment: Build, query: Ask, at: At
-) -> None:
+def test_trends_are_read_while_others_are_written(store: SqliteStore, assessment: Build) -> None:
     n_batches, per_batch = 20, 20
     lengths: list[int] = []
     first_written = threading.Event()
@@ -139,7 +132,7 @@ def test_trends_are_read_while_others_are_written(
 
 
 def test_a_long_reader_does_not_hold_up_the_writer(
-    store: SqliteStore, path: Path, assessment: Build, at: At
+    store: SqliteStore, path: Path, assessment: Build
 ) -> None:
     store.append([assessment(at(0), speed_rpm=1.0)], [])
     reader = sqlite3.connect(path)

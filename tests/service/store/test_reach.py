@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from rigs.store_fixtures import At
+from rigs.store_fixtures import at
 
 from core.account import Gap
 from core.outage import Reach
@@ -16,7 +16,7 @@ def test_nothing_stored_reaches_nowhere(store: Any) -> None:
 
 
 def test_results_reach_as_far_as_the_newest_of_any_bearing(
-    store: Any, assessment: Callable[..., Any], at: At
+    store: Any, assessment: Callable[..., Any]
 ) -> None:
     found = [assessment(at(n), speed_rpm=90.0) for n in range(3)]
     windows = [replace(a.window, epoch=7, stop_index=1000 * n + 1000) for n, a in enumerate(found)]
@@ -29,7 +29,7 @@ def test_results_reach_as_far_as_the_newest_of_any_bearing(
 
 
 def test_gaps_behind_the_newest_result_are_known_as_they_were_recorded(
-    store: Any, assessment: Callable[..., Any], at: At
+    store: Any, assessment: Callable[..., Any]
 ) -> None:
     found = assessment(at(1), speed_rpm=90.0)
     store.append([replace(found, window=replace(found.window, epoch=7, stop_index=1000))], [])
@@ -48,7 +48,7 @@ def test_gaps_behind_the_newest_result_are_known_as_they_were_recorded(
     assert set(store.gaps("U1", 0, 2**62)) == {*behind, *others}
 
 
-def test_the_same_outage_recorded_by_two_starts_counts_once(store: Any, at: At) -> None:
+def test_the_same_outage_recorded_by_two_starts_counts_once(store: Any) -> None:
     outage = UnitGap("U1", Gap(7, 1000, 55, at(2), at(1), is_estimated=True))
 
     store.append([], [outage])

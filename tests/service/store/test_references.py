@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from rigs.store_fixtures import At, Build
+from rigs.store_fixtures import Build, at
 
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
@@ -114,7 +114,7 @@ def test_a_reference_that_makes_no_sense_is_an_error_of_the_store(store: SqliteS
 
 
 def test_the_newest_readings_come_with_their_qualities(
-    store: SqliteStore, assessment: Build, at: At
+    store: SqliteStore, assessment: Build
 ) -> None:
     doubtful = Reading(1998.5, uncertain(Reason.NON_STATIONARY))
     store.append([assessment(at(2), gap_x_um=doubtful, gap_y_um=2003.1)], [])

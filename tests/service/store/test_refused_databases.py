@@ -6,7 +6,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from rigs.store_fixtures import At, Build, Execute
+from rigs.store_fixtures import Build, Execute, at
 
 from service.origin import Origin
 from service.store.port import StoreError
@@ -54,7 +54,7 @@ def test_a_file_that_is_no_database_is_refused(path: Path) -> None:
         SqliteStore(path)
 
 
-def test_a_truncated_database_is_refused(path: Path, assessment: Build, at: At) -> None:
+def test_a_truncated_database_is_refused(path: Path, assessment: Build) -> None:
     store = SqliteStore(path)
     store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
     store.close()

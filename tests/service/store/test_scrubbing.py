@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs.store_fixtures import At, Build, Execute
+from rigs.store_fixtures import Build, Execute, at
 
 from service.background import LOOK_S
 from service.heartbeats import PATIENCE_S, Heartbeats
@@ -28,7 +28,7 @@ def _few_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _filled(path: Path, assessment: Build, at: At) -> None:
+def _filled(path: Path, assessment: Build) -> None:
     with closing(SqliteStore(path)) as store:
         store.append([assessment(at(n), speed_rpm=float(n)) for n in range(N)], [])
 
@@ -42,7 +42,7 @@ def once_around(store: SqliteStore) -> int:
 
 
 def test_altered_and_missing_rows_are_found_and_are_those_that_the_command_finds(
-    path: Path, at: At, execute: Execute
+    path: Path, execute: Execute
 ) -> None:
     execute("UPDATE assessment SET coverage = 0.5 WHERE time_ns = ?", (at(20),))
     execute("DELETE FROM assessment WHERE time_ns = ?", (at(33),))
@@ -117,7 +117,7 @@ def test_keys_that_are_no_text_stop_nothing(path: Path, execute: Execute) -> Non
 
 
 async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
-    path: Path, stepped_clock: Any, at: At, execute: Execute
+    path: Path, stepped_clock: Any, execute: Execute
 ) -> None:
     execute(f"DELETE FROM assessment WHERE time_ns = {at(3)}")  # noqa: S608
     with closing(SqliteStore(path)) as store:

@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from rigs.store_fixtures import Ask, At, Build, BuildGap, Execute
+from rigs.store_fixtures import Build, Execute, at, gap, query
 
 from service.security.roles import Role
 from service.store.gap_reference import GapReference, ReferenceSource
@@ -55,7 +55,7 @@ def test_equal_rows_have_equal_seals_wherever_their_values_come_from() -> None:
     ],
 )
 def test_a_reading_that_was_altered_is_not_shown(
-    store: SqliteStore, execute: Execute, assessment: Build, query: Ask, at: At, change: str
+    store: SqliteStore, execute: Execute, assessment: Build, change: str
 ) -> None:
     store.append([assessment(at(n), speed_rpm=float(n)) for n in range(5)], [])
 
@@ -67,7 +67,7 @@ def test_a_reading_that_was_altered_is_not_shown(
 
 
 def test_what_is_moved_to_another_time_or_bearing_is_not_shown(
-    store: SqliteStore, execute: Execute, assessment: Build, query: Ask, at: At
+    store: SqliteStore, execute: Execute, assessment: Build
 ) -> None:
     store.append([assessment(at(n), speed_rpm=float(n)) for n in range(3)], [])
     execute(f"UPDATE assessment SET time_ns = {at(7)} WHERE time_ns = {at(1)}")  # noqa: S608
@@ -77,7 +77,7 @@ def test_what_is_moved_to_another_time_or_bearing_is_not_shown(
 
 
 def test_a_bearing_whose_name_was_altered_is_neither(
-    store: SqliteStore, execute: Execute, assessment: Build, query: Ask
+    store: SqliteStore, execute: Execute, assessment: Build
 ) -> None:
     store.append([assessment(speed_rpm=92.3)], [])
     execute("UPDATE series SET bearing = 'LJB'")
@@ -89,7 +89,7 @@ def test_a_bearing_whose_name_was_altered_is_neither(
 
 
 def test_readings_of_a_layout_that_was_altered_are_an_error(
-    store: SqliteStore, execute: Execute, assessment: Build, query: Ask
+    store: SqliteStore, execute: Execute, assessment: Build
 ) -> None:
     store.append([assessment(speed_rpm=92.3)], [])
     execute("UPDATE layout SET quantities = replace(quantities, 'speed_rpm', 'power_mw')")
@@ -100,9 +100,7 @@ def test_readings_of_a_layout_that_was_altered_are_an_error(
     assert store.integrity.n_damaged == 1
 
 
-def test_text_that_is_none_stops_no_other_row(
-    store: SqliteStore, execute: Execute, gap: BuildGap, at: At
-) -> None:
+def test_text_that_is_none_stops_no_other_row(store: SqliteStore, execute: Execute) -> None:
     store.append([], [gap(at(n), first_index=100 * n) for n in range(3)])
     store.access.accounts.add("A. Name", Role.ADMIN, "hash", 1)
     store.access.accounts.add("B. Name", Role.VIEWER, "hash", 1)
@@ -135,7 +133,7 @@ def test_a_reference_that_was_altered_does_not_rule(store: SqliteStore, execute:
 
 
 def test_seals_hold_after_a_restart_and_go_with_their_rows(
-    path: Path, assessment: Build, query: Ask, at: At, execute: Execute
+    path: Path, assessment: Build, execute: Execute
 ) -> None:
     with closing(SqliteStore(path)) as store:
         store.append([assessment(at(n), speed_rpm=float(n)) for n in range(4)], [])
@@ -150,7 +148,7 @@ def test_seals_hold_after_a_restart_and_go_with_their_rows(
 
 
 def test_what_came_from_before_there_were_seals_is_sealed_at_the_upgrade(
-    path: Path, assessment: Build, query: Ask, execute: Execute
+    path: Path, assessment: Build, execute: Execute
 ) -> None:
     with closing(SqliteStore(path)) as store:
         store.append([assessment(speed_rpm=92.3)], [])

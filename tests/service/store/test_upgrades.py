@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from harness.places import SqlitePlace
-from rigs.store_fixtures import Ask, Build
+from rigs.store_fixtures import Build, query
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
 from core.alarms.event import AlarmNews
@@ -58,7 +58,7 @@ def test_an_older_database_keeps_its_data_and_gets_room_for_what_is_new(
 
 @pytest.mark.usefixtures("filled")
 def test_a_migration_that_fails_leaves_the_database_as_it_was(
-    path: Path, query: Ask, monkeypatch: pytest.MonkeyPatch
+    path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     broken = "CREATE TABLE more (x); DROP TABLE assessment; CREATE TABLE more (x);"
     with monkeypatch.context() as next_release:
@@ -72,7 +72,7 @@ def test_a_migration_that_fails_leaves_the_database_as_it_was(
 
 @pytest.mark.usefixtures("filled")
 def test_a_migration_keeps_the_data_and_is_done_once(
-    path: Path, query: Ask, monkeypatch: pytest.MonkeyPatch
+    path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(schema, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE more (x);"))
 

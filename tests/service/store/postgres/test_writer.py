@@ -7,7 +7,7 @@ import psycopg
 import pytest
 from harness.cutting_proxy import CuttingProxy
 from harness.places import PostgresPlace
-from rigs.store_fixtures import Ask, At, Build
+from rigs.store_fixtures import Build, at, query
 
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore
@@ -23,11 +23,7 @@ def stored(place: PostgresPlace) -> list[int]:
 
 
 def test_a_commit_whose_answer_is_lost_is_looked_up_and_counts_once(
-    cut_store: PostgresStore,
-    proxy: CuttingProxy,
-    postgres_place: PostgresPlace,
-    assessment: Build,
-    at: At,
+    cut_store: PostgresStore, proxy: CuttingProxy, postgres_place: PostgresPlace, assessment: Build
 ) -> None:
     for number in range(N_CUTS):
         proxy.cut_at(COMMIT, reaches=True)
@@ -38,11 +34,7 @@ def test_a_commit_whose_answer_is_lost_is_looked_up_and_counts_once(
 
 
 def test_a_commit_that_never_reached_the_server_is_an_error_and_the_next_write_works(
-    cut_store: PostgresStore,
-    proxy: CuttingProxy,
-    postgres_place: PostgresPlace,
-    assessment: Build,
-    at: At,
+    cut_store: PostgresStore, proxy: CuttingProxy, postgres_place: PostgresPlace, assessment: Build
 ) -> None:
     made = [assessment(at(number)) for number in range(N_CUTS)]
     for one in made:
@@ -58,7 +50,7 @@ def test_a_commit_that_never_reached_the_server_is_an_error_and_the_next_write_w
 
 
 def test_what_was_acknowledged_outlives_a_server_that_stops_dead(
-    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build, at: At
+    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build
 ) -> None:
     for number in range(2):
         own_store.append([assessment(at(number))], [])
@@ -68,7 +60,7 @@ def test_what_was_acknowledged_outlives_a_server_that_stops_dead(
 
 
 def test_a_store_goes_on_after_the_server_was_started_anew(
-    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build, at: At, query: Ask
+    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build
 ) -> None:
     own_store.append([assessment(at(0))], [])
     assert len(own_store.trend(query()).time_ns) == 1
@@ -89,7 +81,7 @@ def test_a_store_goes_on_after_the_server_was_started_anew(
 
 
 def test_a_stop_in_the_middle_of_a_transaction_leaves_nothing_of_it(
-    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build, at: At
+    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build
 ) -> None:
     with (  # noqa: PT012
         pytest.raises(StoreError, match="it is tried again"),
@@ -110,7 +102,7 @@ def test_every_commit_waits_for_the_disk(postgres_place: PostgresPlace) -> None:
 
 
 def test_what_an_error_has_undone_is_never_taken_for_written(
-    postgres_store: PostgresStore, postgres_place: PostgresPlace, assessment: Build, at: At
+    postgres_store: PostgresStore, postgres_place: PostgresPlace, assessment: Build
 ) -> None:
     with (
         pytest.raises(StoreError, match="undone by an error"),
