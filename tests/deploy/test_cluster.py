@@ -49,22 +49,20 @@ def test_a_container_may_do_little(one: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_container_among_others_is_limited_and_asked_how_it_is(name: str) -> None:
+def test_a_container_among_others_is_limited_and_only_one_reaches_anything_outside(
+    name: str,
+) -> None:
+    outside = ["devices"] if name == "acquire" else []  # which reads devices
+
     assert SERVICES[name]["mem_limit"]
     assert SERVICES[name]["pids_limit"]
     assert SERVICES[name]["healthcheck"]["test"][0] == "CMD"
+    assert SERVICES[name]["networks"] == ["inside", *outside]
+    assert composition()["networks"]["inside"] == {"internal": True}
 
 
 def test_a_container_alone_writes_temporary_files_only_to_memory() -> None:
     assert [mount.split(":")[0] for mount in ALONE["tmpfs"]] == ["/tmp"]  # noqa: S108  in the container
-
-
-@pytest.mark.parametrize("name", SERVICES)
-def test_only_what_reads_devices_reaches_anything_outside(name: str) -> None:
-    outside = ["devices"] if name == "acquire" else []
-
-    assert SERVICES[name]["networks"] == ["inside", *outside]
-    assert composition()["networks"]["inside"] == {"internal": True}
 
 
 def test_secrets_are_files() -> None:
@@ -86,6 +84,7 @@ def test_a_container_runs_a_command_that_there_is(name: str) -> None:
     assert helped.exit_code == 0
     assert all(option in helped.output for option in options if option.startswith("--"))
     assert any(volume.endswith(f"{plant_file}:ro") for volume in PADWATCH[name]["volumes"])
+    compile(PADWATCH[name]["healthcheck"]["test"][-1], name, "exec")  # its health, in Python
 
 
 def test_all_units_are_analysed_by_one_share_each() -> None:
@@ -111,13 +110,6 @@ def test_the_plant_file_names_what_the_composition_has() -> None:
     assert f":{plant.stream.acquire_port}/readyz" in PADWATCH["acquire"]["healthcheck"]["test"][-1]
     assert f":{plant.stream.analyse_port}/readyz" in PADWATCH["analyse1"]["healthcheck"]["test"][-1]
     assert f"'{plant.service.socket}'" in PADWATCH["serve1"]["healthcheck"]["test"][-1]
-
-
-@pytest.mark.parametrize("name", PADWATCH)
-def test_health_is_asked_in_python_that_can_be_read(name: str) -> None:
-    *_, program = PADWATCH[name]["healthcheck"]["test"]
-
-    compile(program, name, "exec")
 
 
 def test_a_block_that_is_acknowledged_is_on_the_disk() -> None:

@@ -78,12 +78,9 @@ def test_third_party_packages_are_pinned_by_their_hashes() -> None:
         assert len(pins) == len(re.findall(r"^[a-z0-9-]+==", text, flags=re.M | re.I)) > 0
 
 
-def test_the_container_does_not_run_as_root() -> None:
+def test_the_container_runs_the_service_as_process_one_and_not_as_root() -> None:
     assert re.fullmatch(r"[1-9]\d{3,}:[1-9]\d{3,}", last("USER"))
     assert compose()["services"]["padwatch"]["user"] == last("USER")
-
-
-def test_the_container_runs_the_service_as_process_one() -> None:
     assert json.loads(last("ENTRYPOINT")) == ["padwatch"]
     assert json.loads(last("CMD")) == ["run", "/etc/padwatch/plant.toml"]
 

@@ -10,6 +10,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from service.bus import Bus
 from service.live import LinkState
+from service.roles.acquiring import CONNECTS_PER_S
 
 Make = Callable[..., Any]
 
@@ -102,6 +103,16 @@ async def test_one_unit_without_link_does_not_hold_up_another(
 
     assert plant.live.status("U1").state is LinkState.NOT_CONNECTED
     assert plant.live.status("U2").state is LinkState.CONNECTED
+
+
+async def test_devices_of_a_plant_are_called_one_after_another(
+    plant: Any, scripted: Make, block: Make
+) -> None:
+    sources = {unit: scripted([block(0, unit)]) for unit in ("U1", "U2")}
+
+    await asyncio.wait_for(plant.runner(**sources).run(), 30)
+
+    assert plant.clock.slept_s == [1.0 / CONNECTS_PER_S]
 
 
 async def test_a_recording_that_ends_says_so(plant: Any, scripted: Make, block: Make) -> None:

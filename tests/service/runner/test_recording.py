@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx2
+from rigs.alarm_runs import Make, play
 
 from core.account import Gap
 from service.api.app import create_app
@@ -16,8 +17,6 @@ from service.delivery.deliveries import Deliveries
 from service.recorder import Findings
 from service.references import ReferencesInForce
 from service.store.port import TrendQuery, UnitGap
-
-Make = Callable[..., Any]
 
 K = "order1_k_eff_xx_n_per_m"
 
@@ -75,10 +74,7 @@ async def test_what_blocks_teach_is_shown_and_stored(
 async def test_a_gap_is_stored_with_its_exact_length(
     plant: Any, scripted: Make, block: Make
 ) -> None:
-    source = scripted([block(n) for n in range(30) if n not in (4, 5, 6)])
-
-    await asyncio.wait_for(plant.runner(U1=source).run(), 60)
-    await plant.recorder.flush()
+    await play(plant, scripted, [block(n) for n in range(30) if n not in (4, 5, 6)])
 
     assert plant.store.gaps("U1", 0, 2**62) == [Gap(1, 4 * 128, 3 * 128, block(7).start_ns)]
     assert plant.live.status("U1").account.n_gap == 3 * 128
@@ -128,9 +124,8 @@ async def test_what_does_not_fit_while_the_store_is_away_is_counted(
 ) -> None:
     plant = small_plant
     break_store(plant)
-    source = scripted([block(number) for number in range(36)])
 
-    await asyncio.wait_for(plant.runner(U1=source).run(), 60)
+    await play(plant, scripted, [block(number) for number in range(36)], flush=False)
     newest = plant.live.assessment("U1", "UJB").readings[K].value
     mend_store(plant)
     await plant.recorder.flush()

@@ -1,8 +1,10 @@
 """A service manager's end of the notification socket."""
 
+import asyncio
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -34,17 +36,41 @@ class ManagerSocket:
         self._socket.close()
 
 
-@pytest.fixture(params=["path", "abstract"])
-def either_socket(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ManagerSocket]:
-    """A manager that listens at a path, and one that listens at an abstract name."""
-    path = str(tmp_path / "notify")
-    opened = ManagerSocket(path if request.param == "path" else "\0" + path)
-    yield opened
-    opened.close()
+class Gates:
+    """A clock whose sleepers wake only when they are let."""
+
+    def __init__(self, clock: Any) -> None:
+        self.clock = clock
+        self.sleepers: list[asyncio.Future[None]] = []
+        self.asked_s: list[float] = []
+
+    def now_ns(self) -> int:
+        return int(self.clock.now_ns())
+
+    def monotonic_s(self) -> float:
+        return float(self.clock.monotonic_s())
+
+    async def sleep(self, duration_s: float) -> None:
+        self.asked_s.append(duration_s)
+        if duration_s > 0.0:
+            self.sleepers.append(asyncio.get_running_loop().create_future())
+            await self.sleepers[-1]
+
+    async def pass_s(self, seconds: float) -> None:
+        """Let time pass in steps, with everybody who waits looking at it."""
+        for _ in range(round(seconds)):
+            self.clock.step(1.0)
+            for sleeper in self.sleepers[:]:
+                if not sleeper.done():
+                    sleeper.set_result(None)
+            self.sleepers.clear()
+            for _ in range(10):
+                await asyncio.sleep(0)
 
 
 @pytest.fixture
-def manager_socket(tmp_path: Path) -> Iterator[ManagerSocket]:
-    opened = ManagerSocket(str(tmp_path / "notify"))
+def manager_socket(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ManagerSocket]:
+    r"""A manager that listens at a path; with "\0" as parameter, at an abstract name."""
+    opened = ManagerSocket(getattr(request, "param", "") + str(tmp_path / "notify"))
     yield opened
     opened.close()

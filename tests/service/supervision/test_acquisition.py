@@ -18,35 +18,7 @@ from service.roles.acquiring import Acquirer
 from service.roles.watched_unit import WatchedUnit
 from service.supervision import Supervision
 
-
-class Gates:
-    """A clock whose sleepers wake only when they are let."""
-
-    def __init__(self, clock: Any) -> None:
-        self.clock = clock
-        self.sleepers: list[asyncio.Future[None]] = []
-
-    def now_ns(self) -> int:
-        return int(self.clock.now_ns())
-
-    def monotonic_s(self) -> float:
-        return float(self.clock.monotonic_s())
-
-    async def sleep(self, duration_s: float) -> None:
-        if duration_s > 0.0:
-            self.sleepers.append(asyncio.get_running_loop().create_future())
-            await self.sleepers[-1]
-
-    async def pass_s(self, seconds: float) -> None:
-        """Let time pass in steps, with everybody who waits looking at it."""
-        for _ in range(round(seconds)):
-            self.clock.step(1.0)
-            for sleeper in self.sleepers[:]:
-                if not sleeper.done():
-                    sleeper.set_result(None)
-            self.sleepers.clear()
-            for _ in range(10):
-                await asyncio.sleep(0)
+from .conftest import Gates
 
 
 class Device:

@@ -10,6 +10,8 @@ from service.live import LinkState, LiveView
 from service.notify import ServiceManager
 from service.supervision import Supervision
 
+from .conftest import Gates
+
 
 class Loop:
     """A loop of the program that beats whenever it is let."""
@@ -150,29 +152,14 @@ async def test_a_loop_may_be_silent_for_as_long_as_it_has_said(stepped_clock: An
 
 
 async def test_a_blocked_event_loop_feeds_nothing(program: Any, manager_socket: Any) -> None:
-    waking: list[asyncio.Future[None]] = []
-
-    class Waiting:
-        """A clock whose sleepers wake when they are told to."""
-
-        def monotonic_s(self) -> float:
-            return float(program.clock.monotonic_s())
-
-        def now_ns(self) -> int:
-            return int(program.clock.now_ns())
-
-        async def sleep(self, duration_s: float) -> None:
-            assert duration_s == 5.0  # half of what the manager allows
-            waking.append(asyncio.get_running_loop().create_future())
-            await waking[-1]
-
-    manager = ServiceManager(manager_socket.environment)
-    supervision = Supervision(manager, program.beats, program.live, ["U1", "U2"], Waiting())
+    gates, manager = Gates(program.clock), ServiceManager(manager_socket.environment)
+    supervision = Supervision(manager, program.beats, program.live, ["U1", "U2"], gates)
     running = asyncio.create_task(supervision.run())
     await asyncio.sleep(0)
     assert len(manager_socket.received) == 1
+    assert gates.asked_s == [5.0]  # half of what the manager allows
 
-    waking[-1].set_result(None)
+    gates.sleepers[-1].set_result(None)
     program.clock.step(100.0)  # the event loop does not turn all this while
     assert manager_socket.received == []
 

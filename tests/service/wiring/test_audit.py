@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,25 +12,36 @@ from acquisition.clock import SystemClock
 from service.audit.entry import AuditEntry
 from service.origin import Origin
 from service.settings.loading import load_plant_file
+from service.settings.plant import PlantFile
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 from service.wiring.audit import ServiceTrail
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[SqliteStore]:
+    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as opened:
+        yield opened
+
+
+@pytest.fixture
+def plant(deploy: Path) -> PlantFile:
+    return load_plant_file(deploy / "demo.toml")
 
 
 def told(store: SqliteStore) -> list[AuditEntry]:
     return list(reversed(store.audit.entries(AuditQuery())))
 
 
-async def test_starts_stops_and_a_changed_plant_file_are_told(tmp_path: Path, deploy: Path) -> None:
-    store = SqliteStore(tmp_path / "padwatch.sqlite3")
-    plant = load_plant_file(deploy / "demo.toml")
+async def test_starts_stops_and_a_changed_plant_file_are_told(
+    store: SqliteStore, plant: PlantFile
+) -> None:
     renamed = plant.plant.model_copy(update={"name": "another name"})
     for found in (plant, plant, plant.model_copy(update={"plant": renamed})):
         trail = ServiceTrail(found, Origin.LIVE, store.audit, SystemClock())
         await trail.begin()
         await trail.end()
     entries = told(store)
-    store.close()
 
     start, stop = "service.started", "service.stopped"
     changed = "configuration.changed"
@@ -40,18 +53,14 @@ async def test_starts_stops_and_a_changed_plant_file_are_told(tmp_path: Path, de
 
 
 async def test_a_plant_is_watched_also_where_nothing_can_be_told(
-    tmp_path: Path, deploy: Path
+    store: SqliteStore, plant: PlantFile, tmp_path: Path
 ) -> None:
-    path = tmp_path / "padwatch.sqlite3"
-    store = SqliteStore(path)
-    plant = load_plant_file(deploy / "demo.toml")
     trail = ServiceTrail(plant, Origin.LIVE, store.audit, SystemClock())
     store.close()
     await trail.begin()
     await trail.end()
-    again = SqliteStore(path)
-    assert told(again) == []
-    again.close()
+    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as again:
+        assert told(again) == []
 
 
 class OverError(Exception):
@@ -79,16 +88,13 @@ class SetClock:
 
 
 async def test_a_clock_that_is_set_is_told_and_one_that_is_slewed_is_not(
-    tmp_path: Path, deploy: Path
+    store: SqliteStore, plant: PlantFile
 ) -> None:
-    store = SqliteStore(tmp_path / "padwatch.sqlite3")
     clock = SetClock(0.0, 7200.0, 0.01, 0.0, -3600.0, -0.3)
-    plant = load_plant_file(deploy / "demo.toml")
     trail = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
     with pytest.raises(OverError):
         await trail.watch_clock()
     entries = told(store)
-    store.close()
     assert {(e.action, e.object, e.actor) for e in entries} == {
         ("clock.stepped", "clock", "padwatch")
     }

@@ -49,10 +49,6 @@ def unit(settings: UnitSettings) -> Unit:
     return machine_of(settings)
 
 
-def feed_of(settings: UnitSettings, clock):
-    return simulated_feed(settings, clock)
-
-
 def address(n: int) -> dict[str, Any]:
     return {"address": 100 + 2 * n, "type": "float32"}
 
@@ -75,7 +71,7 @@ async def served(device) -> AsyncIterator[dict[str, Any]]:
 
 
 def by_waveforms(settings: UnitSettings, unit: Unit, clock) -> Iterator[Assessment]:
-    feed, delivery = feed_of(settings, clock), Delivery(calibration_of(settings))
+    feed, delivery = simulated_feed(settings, clock), Delivery(calibration_of(settings))
     monitor = UnitMonitor(unit, AnalysisSettings())
     for _ in range(8192 * N_SEGMENTS // 600):
         for block in delivery.take(feed.advance(600)):
@@ -87,7 +83,7 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock) -
     given = {"kind": "modbus_vector", "poll_period_s": 1.0, "map": vector_map(unit)}
     given |= {"n_polls": 60, "hop_polls": 60, "timeout_s": 5.0, "host": "127.0.0.1"}
     plan = ModbusVectorSettings.model_validate(given)
-    feed = feed_of(settings, stepped_clock)
+    feed = simulated_feed(settings, stepped_clock)
     device = vector_device(plan, unit, calibration_of(settings), feed, on_demand=True)
     device.produce(12)
     found = {}
@@ -112,7 +108,7 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock) -
 
 async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> None:
     plan = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=(7,), timeout_s=5.0)
-    feed = feed_of(settings, stepped_clock)
+    feed = simulated_feed(settings, stepped_clock)
     blocks: list[SampleBlock] = []
     async with served(fifo_device(plan, unit, feed, on_demand=True)) as endpoint:
         source = fifo_source(
@@ -122,7 +118,7 @@ async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> No
             while not blocks or blocks[-1].stop_index < 600:
                 blocks.append(await anext(stream))
 
-    twin, delivery = feed_of(settings, stepped_clock), Delivery(calibration_of(settings))
+    twin, delivery = simulated_feed(settings, stepped_clock), Delivery(calibration_of(settings))
     expected = [b for _ in range(14) for b in delivery.take(twin.advance(50))]
     for block, other in zip(blocks, expected, strict=False):
         np.testing.assert_array_equal(block.samples, other.samples)
@@ -134,7 +130,7 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
     given = {"kind": "modbus_polled", "poll_period_s": 0.01, "host": "127.0.0.1"}
     plan = ModbusPolledSettings.model_validate(given | {"map": {"value": values}})
     clock, calibration = stepped_clock, calibration_of(settings)
-    feed = feed_of(settings, clock)
+    feed = simulated_feed(settings, clock)
     device = polled_device(plan, unit, calibration, feed, on_demand=True)
     async with served(device) as endpoint:
         source = polled_source(plan.model_copy(update=endpoint), unit, calibration, clock)

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,6 @@ from service.wiring.simulations import scenario_of, simulated_feed
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 CLEARANCE_UM = {"UJB": 500.0, "LJB": 615.0, "TJB": 425.0}
 UNKNOWN = BearingCondition(OperatingState.UNKNOWN, False, None)
-NOW_NS = 1_794_657_615 * NS_PER_S
 LIFE = """
 [unit.simulation]
 life_seed = 2
@@ -39,17 +39,6 @@ ramp_s = 60.0
 """
 
 
-class StoppedClock:
-    def now_ns(self) -> int:
-        return NOW_NS
-
-    def monotonic_s(self) -> float:
-        return 0.0
-
-    async def sleep(self, duration_s: float) -> None:
-        raise RuntimeError(f"nobody sleeps for {duration_s} s here")
-
-
 def plant_with(life: str, folder: Path) -> PlantFile:
     """The demo plant, its units living."""
     fixed = re.compile(r"\n\[unit\.simulation\]\n.*?(?=\n\[\[unit\]\]\n|\Z)", re.DOTALL)
@@ -62,10 +51,13 @@ def plant_with(life: str, folder: Path) -> PlantFile:
     return load_plant_file(path)
 
 
-def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path: Path) -> None:
+def test_the_films_of_a_living_unit_are_read_as_its_past_says(
+    tmp_path: Path, stepped_clock: Any
+) -> None:
+    now_ns = stepped_clock.now_ns()
     plant = plant_with(LIFE.split("[[")[0], tmp_path)
     unit = plant.unit[0]
-    feed, calibration = simulated_feed(unit, StoppedClock()), calibration_of(unit)
+    feed, calibration = simulated_feed(unit, stepped_clock), calibration_of(unit)
     delivery = Delivery(calibration)
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
     newest: list[Assessment] = []
@@ -73,7 +65,7 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path: Path) ->
         for block in delivery.take(feed.advance(600)):
             newest = monitor.ingest(block) or newest
 
-    history = simulated_history(unit, NOW_NS + 300 * NS_PER_S)
+    history = simulated_history(unit, now_ns + 300 * NS_PER_S)
     assert history.keys() == {"UJB", "LJB", "TJB"}
     for assessment in newest:
         past = history[assessment.bearing]
@@ -86,19 +78,19 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path: Path) ->
         assert film.power_mw == pytest.approx(665.0, abs=10.0)
 
 
-def test_a_unit_with_fixed_films_has_no_past() -> None:
-    assert simulated_history(load_plant_file(DEMO).unit[0], NOW_NS) == {}
+def test_a_unit_with_fixed_films_has_no_past(stepped_clock: Any) -> None:
+    assert simulated_history(load_plant_file(DEMO).unit[0], stepped_clock.now_ns()) == {}
 
 
-def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path) -> None:
+def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path, stepped_clock: Any) -> None:
     odd = plant_with(LIFE.replace("life_seed = 2", "life_seed = 3"), tmp_path).unit[0]
     with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but its life is of 90\.9"):
-        simulated_feed(odd, StoppedClock())
+        simulated_feed(odd, stepped_clock)
     living = plant_with(LIFE, tmp_path).unit[0]
     narrow = living.bearing[0].model_copy(update={"clearance_um": 200.0})
     unit = living.model_copy(update={"bearing": (narrow, *living.bearing[1:])})
     with pytest.raises(ConfigError, match="UJB clearance_um = 200, but its life is of 500"):
-        simulated_history(unit, NOW_NS)
+        simulated_history(unit, stepped_clock.now_ns())
 
 
 def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
