@@ -7,11 +7,8 @@ import pytest
 from harness import summary
 from harness.ledger_daq import LedgerDaq, ledger_daq
 from harness.ledger_plant import LedgerPlant
-from harness.watch import PERIOD_S
+from harness.summary import Torture
 from rigs.memory_folder import memory_folder
-
-N_SHORT = 25
-"""By how much the short torture of every test run is less than the whole one."""
 
 SHORT_SOAK_S = 3.0
 """A soak of every test run; nothing can be said of what grows, but the accounts must close."""
@@ -56,13 +53,6 @@ def soak_s(pytestconfig: pytest.Config, is_whole: bool) -> float:
 
 
 @pytest.fixture(scope="session")
-def times(pytestconfig: pytest.Config) -> Callable[[int], int]:
-    """Number of repetitions, of the number that the whole torture takes."""
-    whole = bool(pytestconfig.getoption("--torture", False))
-    return lambda number: number if whole else max(1, number // N_SHORT)
-
-
-@pytest.fixture(scope="session")
 def is_whole(pytestconfig: pytest.Config) -> bool:
     """Whether this is the whole torture."""
     return bool(pytestconfig.getoption("--torture", False))
@@ -92,12 +82,8 @@ def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
 
 
 @pytest.fixture
-def period_s(is_whole: bool) -> float:
-    """Time between two questions of a client, which cost most of the short torture."""
-    return PERIOD_S if is_whole else 3.0 * PERIOD_S
-
-
-@pytest.fixture
-def figure(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
-    """Adds a row to the table at the end of the torture."""
-    return lambda row: record_property(summary.FIGURE, row)
+def torture(
+    torture_seed: int, is_whole: bool, record_property: Callable[[str, object], None]
+) -> Torture:
+    """How much is done, and where figures go."""
+    return Torture(torture_seed, is_whole, lambda row: record_property(summary.FIGURE, row))

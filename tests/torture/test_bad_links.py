@@ -5,7 +5,6 @@ is missing is recorded, alarms come and go as they should.
 """
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from harness.bad_link import Link
 from harness.bench import LINK_ALARM, Seen, bench_of
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import until
+from harness.summary import Torture
 
 N_ROUNDS = 10
 LONGEST_S = 12.0
@@ -42,48 +42,41 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
 
 @pytest.mark.timeout(3600)
 def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
-    plant: LedgerPlant,
-    tmp_path: Path,
-    is_whole: bool,
-    torture_seed: int,
-    period_s: float,
-    figure: Callable[[str], None],
+    plant: LedgerPlant, tmp_path: Path, torture: Torture
 ) -> None:
-    rng = np.random.default_rng(torture_seed)
-    states = STATES if is_whole else FEW
+    rng = np.random.default_rng(torture.seed)
+    states = STATES if torture.is_whole else FEW
     seen = {state: Seen() for state in states}
-    with bench_of(plant, tmp_path, torture_seed, LINK_ALARM, period_s=period_s) as bench:
-        for _ in range(N_ROUNDS if is_whole else 1):
+    how = {"extra": LINK_ALARM, "period_s": torture.period_s}
+    with bench_of(plant, tmp_path, torture.seed, **how) as bench:
+        for _ in range(N_ROUNDS if torture.is_whole else 1):
             for state in states:
                 bench.links.become(state)
                 if state in CUTTING:
                     seen[state].lost_s.append(bench.wait_for_alarms())
-                time.sleep(rng.uniform(0.5, LONGEST_S) if is_whole else 1.0)
+                time.sleep(rng.uniform(0.5, LONGEST_S) if torture.is_whole else 1.0)
                 if state in HARMLESS:
                     assert bench.states() == {"connected"}, state
                 bench.links.become(Link.WELL)
                 seen[state].back_s.append(bench.wait_until_well())
                 until(lambda: not bench.active("link_lost"))
-        if not is_whole:
+        if not torture.is_whole:
             bench.freeze(1.0)
             bench.daq.tell("U1 wrong_time 3")
             bench.step(TWO_H)
             until(lambda: abs(bench.clock()["offset_s"] or 0.0) > ONE_H)
             bench.watch.wait_for_result()
-        figure("\n".join(["bad links", *(its.line(state) for state, its in seen.items())]))
+        torture.figure("\n".join(["bad links", *(its.line(state) for state, its in seen.items())]))
         assert bench.wrong() == {}
 
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
 def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
-    plant: LedgerPlant,
-    tmp_path: Path,
-    torture_seed: int,
-    figure: Callable[[str], None],
+    plant: LedgerPlant, tmp_path: Path, torture: Torture
 ) -> None:
     lines = ["SIGSTOP and SIGCONT of the service"]
-    with bench_of(plant, tmp_path, torture_seed) as bench:
+    with bench_of(plant, tmp_path, torture.seed) as bench:
         before = bench.raised()  # as where the host is busy with the start
         for frozen_s in FROZEN_S:
             bench.freeze(frozen_s)
@@ -91,7 +84,7 @@ def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
             lines.append(f"  frozen for {frozen_s:4.0f} s: fresh again after {back_s:.2f} s")
             time.sleep(2.0 * plant.refresh_s)
         gaps = bench.gaps()
-        figure("\n".join([*lines, f"  {len(gaps)} gaps of U1, exact"]))
+        torture.figure("\n".join([*lines, f"  {len(gaps)} gaps of U1, exact"]))
         assert set(bench.raised() - before) <= OF_THE_PLANT | OF_A_BUSY_HOST
         assert gaps
         assert not any(gap["is_estimated"] for gap in gaps)
@@ -111,13 +104,12 @@ def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
 def test_a_host_whose_clock_is_wrong_loses_and_doubles_nothing_and_says_so(
     plant: LedgerPlant,
     tmp_path: Path,
-    torture_seed: int,
     at_start_s: float,
     steps_s: tuple[float, ...],
     time_zone: str,
-    figure: Callable[[str], None],
+    torture: Torture,
 ) -> None:
-    with bench_of(plant, tmp_path, torture_seed, "", at_start_s, time_zone) as bench:
+    with bench_of(plant, tmp_path, torture.seed, at_start_s, time_zone) as bench:
         before = bench.raised()
         if at_start_s:
             until(lambda: bench.active("clock_offset"))
@@ -130,4 +122,6 @@ def test_a_host_whose_clock_is_wrong_loses_and_doubles_nothing_and_says_so(
         assert ("clock_offset" in found) == is_wrong
         assert set(found - before) <= OF_THE_PLANT | OF_A_BUSY_HOST | {"clock_offset"}
         assert bench.wrong() == {}
-    figure(f"wall clock {at_start_s:+g} s at start, then {steps_s} s, {time_zone}: nothing wrong")
+    torture.figure(
+        f"wall clock {at_start_s:+g} s at start, then {steps_s} s, {time_zone}: nothing wrong"
+    )

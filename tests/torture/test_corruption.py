@@ -2,7 +2,6 @@
 
 import shutil
 from collections import Counter
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import pytest
 from harness.corruption import CHANGES, corrupted
 from harness.deeds import Build
 from harness.everything import Rows, fill, served
+from harness.summary import Torture
 from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
@@ -93,11 +93,11 @@ def damaged(whole: Path, folder: Path, rng: np.random.Generator) -> str:
 
 
 def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
-    whole: Path, truth: Rows, tmp_path: Path, torture_seed: int, times: Callable[[int], int]
+    whole: Path, truth: Rows, tmp_path: Path, torture: Torture
 ) -> None:
-    rng = np.random.default_rng(torture_seed)
+    rng = np.random.default_rng(torture.seed)
     counted: Counter[str] = Counter()
-    for number in range(times(N_STORES)):
+    for number in range(torture.times(N_STORES)):
         done = damaged(whole, tmp_path / "data", rng)
         became, wrong = outcome(tmp_path / "data", truth)
         assert not wrong, (number, done)
@@ -111,14 +111,10 @@ def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
 @pytest.mark.planted("seals that are not compared")
 @pytest.mark.long
 def test_a_store_without_seals_is_found_out(
-    whole: Path,
-    truth: Rows,
-    tmp_path: Path,
-    torture_seed: int,
-    monkeypatch: pytest.MonkeyPatch,
+    whole: Path, truth: Rows, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, torture: Torture
 ) -> None:
     monkeypatch.setattr(SealedTable, "is_whole", lambda *_: "1")
-    rng = np.random.default_rng(torture_seed)
+    rng = np.random.default_rng(torture.seed)
     for _ in range(300):
         damaged(whole, tmp_path / "data", rng)
         if outcome(tmp_path / "data", truth)[1]:
@@ -147,12 +143,12 @@ def read(folder: Path) -> bytes:
 
 
 def test_no_wrong_sample_is_read_from_a_damaged_recording(
-    recording: tuple[Path, bytes], tmp_path: Path, torture_seed: int, times: Callable[[int], int]
+    recording: tuple[Path, bytes], tmp_path: Path, torture: Torture
 ) -> None:
     whole, content = recording
-    rng = np.random.default_rng(torture_seed)
+    rng = np.random.default_rng(torture.seed)
     n_refused = 0
-    for _ in range(times(N_RECORDINGS)):
+    for _ in range(torture.times(N_RECORDINGS)):
         folder = tmp_path / "run"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(whole, folder)

@@ -1,7 +1,6 @@
 """Devices whose clocks drift, or stamp their samples with years that cannot be."""
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import pytest
 from harness.bench import bench_of
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import until
+from harness.summary import Torture
 
 DRIFT_PPM = 1000.0
 DRIFTS_WITHIN_S = 600.0
@@ -21,23 +21,25 @@ pytestmark = pytest.mark.torture
 
 @pytest.mark.timeout(3600)
 def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
-    plant: LedgerPlant, tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
+    plant: LedgerPlant, tmp_path: Path, torture: Torture
 ) -> None:
-    with bench_of(replace(plant, drift_ppm=DRIFT_PPM), tmp_path, torture_seed) as bench:
+    with bench_of(replace(plant, drift_ppm=DRIFT_PPM), tmp_path, torture.seed) as bench:
         until(lambda: bench.active("clock_drift"), DRIFTS_WITHIN_S)
         clock = bench.clock()
         drift_ppm, u_ppm = clock["drift_ppm"], clock["drift_uncertainty_ppm"]
         assert abs(drift_ppm - DRIFT_PPM) <= 4.0 * u_ppm, clock
         assert bench.wrong() == {}
-    figure(f"a device {DRIFT_PPM:g} ppm too fast: found {drift_ppm:.0f} +- {u_ppm:.0f} ppm, told")
+    torture.figure(
+        f"a device {DRIFT_PPM:g} ppm too fast: found {drift_ppm:.0f} +- {u_ppm:.0f} ppm, told"
+    )
 
 
 @pytest.mark.timeout(3600)
 def test_stamps_of_2106_are_told_and_no_result_has_their_time(
-    plant: LedgerPlant, tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
+    plant: LedgerPlant, tmp_path: Path, torture: Torture
 ) -> None:
     n_expected = 0
-    with bench_of(plant, tmp_path, torture_seed) as bench:
+    with bench_of(plant, tmp_path, torture.seed) as bench:
         for n_slots in SLOTS:
             bench.daq.tell(f"U1 wrong_time {n_slots}")
             n_expected += n_slots
@@ -46,4 +48,4 @@ def test_stamps_of_2106_are_told_and_no_result_has_their_time(
         assert bench.clock()["n_stamp_faults"] == n_expected
         time.sleep(2.0 * plant.refresh_s)
         assert bench.wrong() == {}
-    figure(f"{n_expected} slots stamped 2106: all told, no result has that time")
+    torture.figure(f"{n_expected} slots stamped 2106: all told, no result has that time")

@@ -5,7 +5,7 @@ import ctypes.util
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,8 @@ import pytest
 from harness.bench import STORE_ALARM, Bench
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.service_rig import RefusedError, ServiceRig, until
+from harness.service_rig import RefusedError, until
+from harness.summary import Torture
 
 N_CYCLES, N_FEW = 20, 1
 DISK_MIB = 32.0
@@ -80,30 +81,27 @@ def _written(handle: int, data: bytes) -> bool:
 
 @pytest.mark.timeout(3600)
 def test_a_full_disk_costs_nothing_that_was_promised(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    tmp_path: Path,
-    is_whole: bool,
-    period_s: float,
-    figure: Callable[[str], None],
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
 ) -> None:
-    plant_file = tmp_path / "plant.toml"
-    with small_disk(tmp_path / "small", DISK_MIB) as disk, ServiceRig(plant_file) as rig:
-        plant.write(plant_file, disk.folder / "data", daq.ports, STORE_ALARM)
-        bench = Bench(plant, daq, rig, plant_file, period_s)
+    with (
+        small_disk(tmp_path / "small", DISK_MIB) as disk,
+        Bench(
+            *(plant, daq, tmp_path, STORE_ALARM, torture.period_s), data=disk.folder / "data"
+        ) as bench,
+    ):
         bench.begin()
         bench.watch.wait_for_result()
-        n_cycles = N_CYCLES if is_whole else N_FEW
+        n_cycles = N_CYCLES if torture.is_whole else N_FEW
         resumed_s = [_filled_and_freed(bench, disk) for _ in range(n_cycles)]
         bench.watch.wait_for_result()
         found = bench.end()
-    figure(
+    torture.figure(
         f"disk full and freed\n  cycles {len(resumed_s)}, stored again after at most"
         f" {max(resumed_s):.2f} s; {found.counts}"
     )
     assert found.wrong == {}
     assert found.n_results > 0
-    assert not is_whole or max(resumed_s) <= RESUMED_WITHIN_S
+    assert not torture.is_whole or max(resumed_s) <= RESUMED_WITHIN_S
 
 
 def _filled_and_freed(bench: Bench, disk: SmallDisk) -> float:
@@ -128,17 +126,15 @@ def _filled_and_freed(bench: Bench, disk: SmallDisk) -> float:
 @pytest.mark.torture
 @pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 def test_a_slow_disk_holds_up_nothing_but_itself(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, figure: Callable[[str], None]
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
 ) -> None:
-    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, STORE_ALARM)
-    with ServiceRig(plant_file, before=STRACE) as rig:
-        bench = Bench(plant, daq, rig, plant_file)
+    with Bench(plant, daq, tmp_path, STORE_ALARM, before=STRACE) as bench:
         bench.begin()
         [alarm] = until(lambda: bench.active(NOT_STORED))
         pace = [bench.wait_for_newer() for _ in range(3)]
         bench.watch.wait_for_result()
         found = bench.end()
-    figure(f"every sync takes {SLOW_US / 1e6:g} s\n  {found.counts}")
+    torture.figure(f"every sync takes {SLOW_US / 1e6:g} s\n  {found.counts}")
     assert alarm["condition_reason"] == "the store does not answer"
     assert len(set(pace)) == len(pace)
     assert found.wrong == {}

@@ -10,7 +10,7 @@ import pytest
 from harness.deeds import Build, Loss, deed, letters, loss
 from harness.enduring import DATABASE, GAVE_UP
 from harness.failing_calls import Case, FailingCalls, Outcome, failing_calls, n_calls
-from harness.summary import planted
+from harness.summary import Torture, planted
 
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -116,30 +116,20 @@ def require_all_or_nothing(
 
 @pytest.mark.timeout(7200)
 def test_whatever_call_fails_a_transaction_is_whole_or_absent_and_the_store_goes_on(
-    calls: FailingCalls,
-    empty: Path,
-    torture_seed: int,
-    assessment: Build,
-    times: Callable[[int], int],
-    figure: Callable[[str], None],
+    calls: FailingCalls, empty: Path, assessment: Build, torture: Torture
 ) -> None:
-    n = None if times(N_CASES) == N_CASES else times(N_CASES)
-    figure(require_all_or_nothing(calls, empty, n, torture_seed, assessment))
+    n = None if torture.times(N_CASES) == N_CASES else torture.times(N_CASES)
+    torture.figure(require_all_or_nothing(calls, empty, n, torture.seed, assessment))
 
 
 @pytest.mark.timeout(3600)
 def test_whatever_call_fails_a_new_database_is_made_all_the_same(
-    calls: FailingCalls,
-    tmp_path: Path,
-    torture_seed: int,
-    assessment: Build,
-    times: Callable[[int], int],
-    figure: Callable[[str], None],
+    calls: FailingCalls, tmp_path: Path, assessment: Build, torture: Torture
 ) -> None:
     nothing = tmp_path / "nothing"
     nothing.mkdir()
-    n = times(N_CASES // 2)
-    figure(require_all_or_nothing(calls, nothing, n, torture_seed, assessment))
+    n = torture.times(N_CASES // 2)
+    torture.figure(require_all_or_nothing(calls, nothing, n, torture.seed, assessment))
 
 
 def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") -> Outcome:
@@ -150,14 +140,14 @@ def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") ->
 
 
 def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
-    calls: FailingCalls, empty: Path, torture_seed: int, assessment: Build
+    calls: FailingCalls, empty: Path, assessment: Build, torture: Torture
 ) -> None:
     outcome = failing_for_ever(calls, empty, "fdatasync")
 
     assert outcome.exit_code == GAVE_UP
     assert 0 <= outcome.acknowledged < N_DEEDS - 1
     assert all("SQLITE_IOERR" in error for error in outcome.errors)
-    assert wrong(empty.with_name("case"), outcome, torture_seed, assessment) is None
+    assert wrong(empty.with_name("case"), outcome, torture.seed, assessment) is None
 
 
 @pytest.mark.parametrize(
@@ -168,13 +158,13 @@ def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
     ],
 )
 def test_planted_bugs_are_found(
-    begun: Begun, empty: Path, torture_seed: int, assessment: Build, bug: str, what: str
+    begun: Begun, empty: Path, assessment: Build, bug: str, what: str, torture: Torture
 ) -> None:
     """A program that promises what was refused, and one that writes in two transactions."""
     with begun(bug) as calls:
         provoke = {"lost": failing_for_ever, "torn": stopped_between}[what]
         outcome = provoke(calls, empty)
-    found = wrong(empty.with_name("case"), outcome, torture_seed, assessment)
+    found = wrong(empty.with_name("case"), outcome, torture.seed, assessment)
 
     assert isinstance(found, Loss)
     assert getattr(found, what)

@@ -1,7 +1,6 @@
 """The service is killed at random moments under load: nothing that it promised is gone."""
 
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from harness.bench import Bench
 from harness.kill_cycles import kill_cycles
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.service_rig import ServiceRig
+from harness.summary import Torture
 
 N_CYCLES, N_FEW = 200, 1
 LOAD = 2.0
@@ -28,28 +27,20 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
 
 @pytest.mark.timeout(ACCOUNTED_S)
 def test_a_killed_service_has_kept_what_it_has_shown(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    tmp_path: Path,
-    torture_seed: int,
-    is_whole: bool,
-    period_s: float,
-    figure: Callable[[str], None],
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
 ) -> None:
-    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
-    rng = np.random.default_rng(torture_seed)
-    with ServiceRig(plant_file) as rig:
-        bench = Bench(plant, daq, rig, plant_file, period_s)
-        if is_whole:
+    rng = np.random.default_rng(torture.seed)
+    with Bench(plant, daq, tmp_path, period_s=torture.period_s) as bench:
+        if torture.is_whole:
             done = kill_cycles(bench, N_CYCLES, rng, trouble=partial(also, daq))
         else:
             done = kill_cycles(bench, N_FEW, rng, SHORT_LIFE_S)
-    figure(f"kill -9 of the running service at {LOAD:g} times nominal\n{done.table()}")
+    torture.figure(f"kill -9 of the running service at {LOAD:g} times nominal\n{done.table()}")
     assert done.findings.wrong == {}
     assert done.alarms == []
     assert done.silent_healthy_s == 0.0
     assert done.findings.n_results > 0
-    assert done.findings.n_exceedances > 0 or not is_whole
+    assert done.findings.n_exceedances > 0 or not torture.is_whole
     assert done.findings.n_shown > 0
 
 

@@ -2,7 +2,6 @@
 
 import subprocess
 import time
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from harness.deeds import HOP_NS, T0_NS, Build, value
 from harness.deleting import LATER_NS
+from harness.summary import Torture
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
@@ -46,15 +46,15 @@ def by_the_hour(store: SqliteStore) -> Trend:
 
 
 def test_killed_while_deleting_every_hour_says_what_it_said(
-    old_file: bytes, tmp_path: Path, torture_seed: int, times: Callable[[int], int]
+    old_file: bytes, tmp_path: Path, torture: Torture
 ) -> None:
-    rng = np.random.default_rng(torture_seed)
+    rng = np.random.default_rng(torture.seed)
     path = tmp_path / "old.sqlite3"
     path.write_bytes(old_file)
     with closing(SqliteStore(path)) as store:
         before = by_the_hour(store)
     n_cut_short = 0
-    for _ in range(times(N_KILLS)):
+    for _ in range(torture.times(N_KILLS)):
         for left in tmp_path.glob("old.sqlite3*"):
             left.unlink()
         path.write_bytes(old_file)

@@ -9,8 +9,7 @@ from harness.bench import Bench
 from harness.kill_cycles import kill_cycles
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.service_rig import ServiceRig
-from harness.summary import planted
+from harness.summary import Torture, planted
 
 N_CYCLES = 4
 LIFE_S = 8.0
@@ -48,15 +47,8 @@ def plant(torture_seed: int) -> LedgerPlant:
     ],
 )
 def test_a_bug_in_the_service_is_found_out(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    tmp_path: Path,
-    torture_seed: int,
-    bug: str,
-    kind: str,
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, bug: str, kind: str, torture: Torture
 ) -> None:
-    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
-
     def trouble(number: int) -> None:
         time.sleep(SHOWN_S)
         if number % 4 == 2:
@@ -66,9 +58,9 @@ def test_a_bug_in_the_service_is_found_out(
             time.sleep(SILENT_S)
             daq.answer_again()
 
-    with ServiceRig(plant_file, "harness.planted", environment={"PLANTED": bug}) as rig:
-        bench = Bench(plant, daq, rig, plant_file)
-        rng = np.random.default_rng(torture_seed)
+    how = {"program": "harness.planted", "environment": {"PLANTED": bug}}
+    with Bench(plant, daq, tmp_path, **how) as bench:
+        rng = np.random.default_rng(torture.seed)
         done = kill_cycles(bench, N_CYCLES, rng, LIFE_S, trouble, LIFE_S)
     kinds = set(done.findings.wrong)
     kinds |= {"silent"} if done.silent_healthy_s else set()

@@ -1,6 +1,6 @@
 """`padwatch run` over PostgreSQL: the server stops for a while, and nothing is missing after it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,7 +8,8 @@ from harness.bench import Bench
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.postgres_server import PostgresServer, why_not
-from harness.service_rig import ServiceRig, until
+from harness.service_rig import until
+from harness.summary import Torture
 
 STORE = """
 [store]
@@ -33,17 +34,11 @@ def server() -> Iterator[PostgresServer]:
 
 @pytest.mark.timeout(3600)
 def test_a_database_that_was_away_has_everything_when_it_is_back(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    server: PostgresServer,
-    tmp_path: Path,
-    times: Callable[[int], int],
+    plant: LedgerPlant, daq: LedgerDaq, server: PostgresServer, tmp_path: Path, torture: Torture
 ) -> None:
     extra = STORE.format(conninfo=server.conninfo("padwatch"))
-    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, extra)
-    n_stops = times(N_STOPS)
-    with ServiceRig(plant_file) as rig:
-        bench = Bench(plant, daq, rig, plant_file)
+    n_stops = torture.times(N_STOPS)
+    with Bench(plant, daq, tmp_path, extra) as bench:
         bench.begin()
         for _ in range(n_stops):
             bench.watch.wait_for_result()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
-from harness.summary import planted
+from harness.summary import Torture, planted
 from harness.tape import Acknowledged, Step, environment, python, record
 
 from service.store.sqlite import SqliteStore
@@ -79,21 +79,16 @@ def damage(path: Path) -> list[str]:
 
 @pytest.mark.timeout(3600)
 def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
-    recorded: Record,
-    tmp_path: Path,
-    torture_seed: int,
-    is_whole: bool,
-    assessment: Build,
-    figure: Callable[[str], None],
+    recorded: Record, tmp_path: Path, assessment: Build, torture: Torture
 ) -> None:
-    n_cuts = N_CUTS if is_whole else N_FEW
-    for acknowledged, files in cuts(recorded(""), n_cuts, torture_seed):
+    n_cuts = N_CUTS if torture.is_whole else N_FEW
+    for acknowledged, files in cuts(recorded(""), n_cuts, torture.seed):
         path = left_in(tmp_path / "data", files)
-        assert not found_after(path, torture_seed, acknowledged, assessment), acknowledged
+        assert not found_after(path, torture.seed, acknowledged, assessment), acknowledged
         assert damage(path) == []
         assert not mark_findings(path)
         assert verify_trail(path).is_whole
-    figure(f"power cuts: {n_cuts}, 0 acknowledged lost, 0 torn, 0 altered, 0 corrupt")
+    torture.figure(f"power cuts: {n_cuts}, 0 acknowledged lost, 0 torn, 0 altered, 0 corrupt")
 
 
 @pytest.mark.timeout(3600)
@@ -106,11 +101,11 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
     ],
 )
 def test_a_store_that_promises_too_much_is_found_out(
-    recorded: Record, tmp_path: Path, torture_seed: int, assessment: Build, bug: str, what: str
+    recorded: Record, tmp_path: Path, assessment: Build, bug: str, what: str, torture: Torture
 ) -> None:
-    for acknowledged, files in cuts(recorded(bug), N_CUTS, torture_seed):
+    for acknowledged, files in cuts(recorded(bug), N_CUTS, torture.seed):
         path = left_in(tmp_path / "data", files)
-        if getattr(found_after(path, torture_seed, acknowledged, assessment), what):
+        if getattr(found_after(path, torture.seed, acknowledged, assessment), what):
             return
     pytest.fail(f"{bug} was not noticed")
 

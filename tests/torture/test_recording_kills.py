@@ -1,7 +1,6 @@
 """The service is killed while it records all samples: what it called recorded is there."""
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.recordings_ledger import Recorded, promised, recorded
 from harness.service_rig import ServiceRig, until
-from harness.summary import planted
+from harness.summary import Torture, planted
 
 from service.continuous.joining import clear_unfinished, join, unjoined
 
@@ -54,18 +53,13 @@ def write_plant(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Path:
 
 @pytest.mark.timeout(3600)
 def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    tmp_path: Path,
-    torture_seed: int,
-    is_whole: bool,
-    figure: Callable[[str], None],
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
 ) -> None:
-    n_cycles = N_CYCLES if is_whole else N_FEW
+    n_cycles = N_CYCLES if torture.is_whole else N_FEW
     with ServiceRig(write_plant(plant, daq, tmp_path)) as rig:
         root = tmp_path / "data" / "recordings"
-        found = killed(plant, daq, rig, root, n_cycles, torture_seed)
-    figure(f"kill -9 during continuous recording, {n_cycles} cycles\n{found.table()}")
+        found = killed(plant, daq, rig, root, n_cycles, torture.seed)
+    torture.figure(f"kill -9 during continuous recording, {n_cycles} cycles\n{found.table()}")
 
     assert found.wrong == []
     assert found.n_samples > 0
@@ -87,16 +81,11 @@ def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
     ],
 )
 def test_a_bug_in_recording_is_found_out(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    tmp_path: Path,
-    torture_seed: int,
-    bug: str,
-    kind: str,
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, bug: str, kind: str, torture: Torture
 ) -> None:
     plant_file = write_plant(plant, daq, tmp_path)
     with ServiceRig(plant_file, "harness.planted", environment={"PLANTED": bug}) as rig:
         root = tmp_path / "data" / "recordings"
-        found = killed(plant, daq, rig, root, N_PLANTED, torture_seed)
+        found = killed(plant, daq, rig, root, N_PLANTED, torture.seed)
 
     assert any(words.startswith(kind) for words in found.wrong), found.wrong

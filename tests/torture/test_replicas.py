@@ -8,11 +8,11 @@ import pytest
 from harness.checker import check
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.nats_cluster import nats_cluster
-from harness.nats_server import nats_server_command
+from harness.nats_server import nats_cluster, nats_server_command
 from harness.postgres_server import PostgresServer, why_not
 from harness.replicas import Replicas, chain, chance, replicas
 from harness.service_rig import until
+from harness.summary import Torture
 from harness.watch import silent_healthy_s
 
 N_ROUNDS, N_KILLS = 5, 10
@@ -45,8 +45,8 @@ def whole(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Replic
         pytest.skip("needs nats-server")
     with (
         PostgresServer() as postgres,
-        nats_cluster(tmp_path / "nats") as cluster,
-        chain(plant, tmp_path, daq, postgres, cluster) as found,
+        nats_cluster(tmp_path / "nats") as nodes,
+        chain(plant, tmp_path, daq, postgres, nodes) as found,
     ):
         yield found
 
@@ -65,19 +65,19 @@ def kills(kinds: list[str], n: int, rng: np.random.Generator) -> list[str]:
 
 @pytest.mark.timeout(3600)
 def test_whatever_is_killed_beside_a_single_process_nothing_is_lost(
-    running: Replicas, seed: int, figure: Callable[[str], None]
+    running: Replicas, seed: int, torture: Torture
 ) -> None:
     does = {
         "analysis": running.kill_analysis,
         "serving": running.kill_serving,
         "postgres": running.restart_postgres,
     }
-    kill_in_turn(running, does, seed, figure)
+    kill_in_turn(running, does, seed, torture.figure)
 
 
 @pytest.mark.timeout(3600)
 def test_whatever_is_killed_of_the_whole_chain_nothing_is_lost(
-    whole: Replicas, seed: int, figure: Callable[[str], None]
+    whole: Replicas, seed: int, torture: Torture
 ) -> None:
     does = {
         "acquiring": whole.kill_acquiring,
@@ -86,7 +86,7 @@ def test_whatever_is_killed_of_the_whole_chain_nothing_is_lost(
         "node": whole.kill_node,
         "postgres": whole.restart_postgres,
     }
-    kill_in_turn(whole, does, seed, figure)
+    kill_in_turn(whole, does, seed, torture.figure)
 
 
 def kill_in_turn(

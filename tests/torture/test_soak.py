@@ -1,7 +1,6 @@
 """Twenty units at five times nominal for a long time: nothing grows, and every account closes."""
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +8,8 @@ import pytest
 from harness.bench import Bench
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.service_rig import ServiceRig
 from harness.soak import Soaked, soak
+from harness.summary import Torture
 
 LOAD = 5.0
 WHOLE = LedgerPlant(n_units=20, load=LOAD, segment_samples=8192, n_segments=24)
@@ -50,23 +49,16 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
 
 @pytest.mark.timeout(9000)
 def test_a_long_time_under_load_leaves_everything_as_it_was(
-    plant: LedgerPlant,
-    daq: LedgerDaq,
-    tmp_path: Path,
-    is_whole: bool,
-    soak_s: float,
-    figure: Callable[[str], None],
+    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, soak_s: float, torture: Torture
 ) -> None:
-    plant_file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports, FEW_BUNDLES)
-    with ServiceRig(plant_file) as rig:
-        bench = Bench(plant, daq, rig, plant_file, period_s=1.0)
+    with Bench(plant, daq, tmp_path, FEW_BUNDLES, period_s=1.0) as bench:
         done = soak(bench, soak_s, plant.units[:2])
-    figure(f"soak\n{done.table(plant)}")
+    torture.figure(f"soak\n{done.table(plant)}")
     assert done.findings.wrong == {}
     assert done.findings.n_results > 0
     assert done.open_accounts == []
     assert done.silent_healthy_s == 0.0
-    if is_whole:
+    if torture.is_whole:
         assert_nothing_grows(done)
 
 

@@ -3,7 +3,6 @@
 import os
 import sqlite3
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from harness.ledger_daq import ledger_daq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig
+from harness.summary import Torture
 
 N_STARTS = 20
 GB = 2**30
@@ -46,10 +46,8 @@ def fill(database: Path, n_bytes: int) -> int:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
-def test_a_killed_service_with_a_gigabyte_is_ready_again(
-    tmp_path: Path, torture_seed: int, figure: Callable[[str], None]
-) -> None:
-    plant = LedgerPlant(seed=torture_seed, load=1.0)
+def test_a_killed_service_with_a_gigabyte_is_ready_again(tmp_path: Path, torture: Torture) -> None:
+    plant = LedgerPlant(seed=torture.seed, load=1.0)
     ready_s, costs_s = [], []
     with ledger_daq(plant, tmp_path) as daq:
         file = plant.write(tmp_path / "plant.toml", tmp_path / "data", daq.ports)
@@ -67,7 +65,7 @@ def test_a_killed_service_with_a_gigabyte_is_ready_again(
                     assert api.get("/readyz")["status"] == "ok"
                 rig.kill()
     p50, p99 = np.quantile(ready_s, (0.5, 0.99))
-    figure(
+    torture.figure(
         f"ready after kill -9 with 1 GB ({n_rows} results), {N_STARTS} starts:"
         f" p50 {p50:.2f} s, p99 {p99:.2f} s; CPU time p99 {np.quantile(costs_s, 0.99):.2f} s"
     )

@@ -3,7 +3,6 @@
 import asyncio
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer, nats_server, nats_server_command
 from harness.service_rig import ServiceRig, until
 from harness.stream_rig import found_in, on_the_stream, positions, single_process
+from harness.summary import Torture
 
 from service.settings.loading import load_plant_file
 
@@ -75,13 +75,11 @@ def _settle(database: Path) -> None:
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
 def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_process(
-    tmp_path: Path,
-    torture_seed: int,
-    figure: Callable[[str], None],
+    tmp_path: Path, torture: Torture
 ) -> None:
     if nats_server_command() is None:
         pytest.skip("needs nats-server")
-    rng = np.random.default_rng(torture_seed)
+    rng = np.random.default_rng(torture.seed)
     with nats_server(tmp_path / "nats") as server, ledger_daq(PLANT, tmp_path) as daq:
         stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 2.0\n'
         files = {
@@ -103,7 +101,7 @@ def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_p
     }
     assert found == wanted
     kills = ", ".join(f"{n} of {name}" for name, n in sorted(killed.items()))
-    figure(
+    torture.figure(
         f"kills over a stream ({kills}): {len(sent)} messages, {len(wanted['assessment'])} results"
         " equal to a single process"
     )

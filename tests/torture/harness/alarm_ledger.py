@@ -1,36 +1,28 @@
 """What alarms must have told of the exceedances that the truth holds: each once, with a letter."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from core.alarms.event import AlarmChange, AlarmEvent
-from harness.ledger_daq import Offered
 from harness.ledger_plant import ALERT_UM_PK, DEADBAND_UM, RECEIVER, LedgerPlant
-from harness.lives import ALWAYS, index_of
+from harness.lives import Rows
 from harness.truth import BEARINGS, Spell, Truth
-from harness.watch import Watch
-from service.store.port import AlarmQuery, Store, TrendQuery
+from service.store.port import AlarmQuery, Store
 
 if TYPE_CHECKING:
-    from harness.checker import Findings
+    from harness.checker import Case, Findings
 
 PAGE = 5000
 Told = tuple[str, AlarmChange, int]
 """Alarm, what happened to it, when."""
 
 
-def alarm_faults(
-    found: "Findings",
-    plant: LedgerPlant,
-    store: Store,
-    offered: Offered,
-    watch: Watch,
-    units: Sequence[str],
-) -> None:
-    """Add what is wrong with the alarms of a store to what was found."""
-    events = list(_events(store))
+def alarm_faults(case: "Case", rows: Mapping[str, Rows]) -> None:
+    """Add what is wrong with the alarms of a store, beside its results by unit, to the findings."""
+    found, watch = case.found, case.watch
+    events = list(_events(case.store))
     chains: dict[str, list[AlarmEvent]] = defaultdict(list)
     for event in events:
         chains[event.identity.id].append(event)
@@ -45,12 +37,9 @@ def alarm_faults(
     kept = {(event.identity.id, str(event.change), event.occurrence) for event in events}
     found.lost += [f"promised: {one}" for one in watch.promised - kept]
     found.n_promised = len(watch.promised)
-    for unit in units:
-        number = plant.units.index(unit) + 1
-        _check_unit(
-            found, plant, store, offered, unit, Truth(plant.seed, number, plant.rate_hz), chains
-        )
-    _check_letters(found, store, events)
+    for unit, its in rows.items():
+        _check_unit(case, unit, its, chains)
+    _check_letters(found, case.store, events)
 
 
 def _events(store: Store) -> Iterator[AlarmEvent]:
@@ -75,19 +64,18 @@ def _check_chain(found: "Findings", alarm: str, chain: Sequence[AlarmEvent]) -> 
 
 
 def _check_unit(
-    found: "Findings",
-    plant: LedgerPlant,
-    store: Store,
-    offered: Offered,
-    unit: str,
-    truth: Truth,
-    chains: dict[str, list[AlarmEvent]],
+    case: "Case", unit: str, rows: Rows, chains: Mapping[str, Sequence[AlarmEvent]]
 ) -> None:
-    spells = list(truth.spells(0, offered.samples[unit, 1]))
+    found, plant = case.found, case.plant
+    truth = Truth(plant.seed, plant.units.index(unit) + 1, plant.rate_hz)
+    spells = list(truth.spells(0, case.offered.samples[unit, 1]))
     for number, bearing in enumerate(BEARINGS):
         mine = [spell for spell in spells if spell.bearing == number]
         for axis in "xy":
-            values = list(_values(store, unit, bearing, f"order1_shaft_{axis}_um_pk"))
+            name = f"order1_shaft_{axis}_um_pk"
+            values = sorted(
+                (key[1], row[name][0]) for key, row in rows.items() if key[0] == bearing
+            )
             alarm = f"{unit}:{bearing}:order1_shaft_{axis}"
             chain = chains.get(alarm, [])
             told = [
@@ -96,25 +84,12 @@ def _check_unit(
                 if event.change in (AlarmChange.RAISED, AlarmChange.RETURNED)
             ]
             _compare(found, list(_expected(alarm, values)), told)
-            stops = [index_of(time_ns, offered.t0_ns, plant.rate_hz) for time_ns, _ in values]
-            raised = [
-                index_of(time_ns, offered.t0_ns, plant.rate_hz)
-                for _, change, time_ns in told
-                if change is AlarmChange.RAISED
-            ]
+            stops = [case.index_of(time_ns) for time_ns, _ in values]
+            raised = [case.index_of(ns) for _, change, ns in told if change is AlarmChange.RAISED]
             for spell in _demanded(mine, stops, plant):
                 found.n_exceedances += 1
                 if not any(spell.start < at for at in raised if at <= spell.stop):
                     found.alarms.append(f"{alarm}: {spell} was not told of")
-
-
-def _values(store: Store, unit: str, bearing: str, name: str) -> Iterator[tuple[int, float | None]]:
-    start_ns: int | None = 0
-    while start_ns is not None:
-        query = TrendQuery(unit, bearing, (name,), start_ns, ALWAYS[1], PAGE, 2**62, is_page=True)
-        trend = store.trend(query)
-        yield from zip(map(int, trend.time_ns), trend.series[name].mean, strict=True)
-        start_ns = trend.next_ns
 
 
 def _expected(alarm: str, values: Sequence[tuple[int, float | None]]) -> Iterator[Told]:

@@ -3,15 +3,15 @@
 import signal
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from harness.bad_link import BadLinks, bad_links
+from harness.bad_link import BadLinks
 from harness.checker import Findings, check
 from harness.ledger_daq import LedgerDaq, ledger_daq
 from harness.ledger_plant import LedgerPlant
@@ -41,25 +41,44 @@ class Seen:
 
 
 class Bench:
-    """A DAQ, a service and a client.
+    """A DAQ, a service and a client; the last two end when it is left.
 
     Parameters
     ----------
+    extra
+        More tables of the plant file.
     period_s
         Time from one question of the client to the next.
+    data, ports
+        Data folder of the service, and where it finds the devices, if not as usual.
+    how
+        How the service is run, as of `ServiceRig`.
     """
 
     def __init__(
         self,
         plant: LedgerPlant,
         daq: LedgerDaq,
-        rig: ServiceRig,
-        plant_file: Path,
+        folder: Path,
+        extra: str = "",
         period_s: float = PERIOD_S,
+        data: Path | None = None,
+        ports: Mapping[str, int] | None = None,
+        **how: Any,
     ) -> None:
-        self.plant, self.daq, self.rig, self.plant_file = plant, daq, rig, plant_file
+        self.plant, self.daq = plant, daq
+        data, ports = data or folder / "data", ports or daq.ports
+        self.plant_file = plant.write(folder / "plant.toml", data, ports, extra)
+        self.rig = ServiceRig(self.plant_file, **how)
         self.watch = Watch(plant, daq.offered, period_s)
         self.lives: dict[str, list[int]] = {unit: [] for unit in plant.units}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.watch.end()
+        self.rig.kill()
 
     def begin(self) -> float:
         """Start the service and the client; returns the seconds until the service is ready."""
@@ -170,18 +189,16 @@ class BadLinkBench(Bench):
         daq: LedgerDaq,
         links: BadLinks,
         folder: Path,
-        extra: str = "",
-        wrong_s: float = 0.0,
-        time_zone: str = "UTC",
-        period_s: float = PERIOD_S,
+        wrong_s: float,
+        time_zone: str,
+        **more: Any,
     ) -> None:
         self.links = links
         self._wall_clock = folder / "wall-clock"
         self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
-        plant_file = plant.write(folder / "plant.toml", folder / "data", links.ports, extra)
-        environment = {"WALL_CLOCK": str(self._wall_clock), "TZ": time_zone}
-        rig = ServiceRig(plant_file, "harness.stepped_service", environment=environment)
-        super().__init__(plant, daq, rig, plant_file, period_s)
+        clock = {"PLANTED": "wrong_wall_clock", "WALL_CLOCK": str(self._wall_clock)}
+        how = {"program": "harness.planted", "environment": {**clock, "TZ": time_zone}}
+        super().__init__(plant, daq, folder, ports=links.ports, **how, **more)
 
     def step(self, wrong_s: float) -> None:
         """Let the service's wall clock be wrong by so much from now on."""
@@ -194,26 +211,24 @@ def bench_of(
     plant: LedgerPlant,
     folder: Path,
     seed: int,
-    extra: str = "",
     wrong_s: float = 0.0,
     time_zone: str = "UTC",
-    period_s: float = PERIOD_S,
+    **more: Any,
 ) -> Iterator[BadLinkBench]:
     """Build a bench with bad links, and let it run.
 
     Parameters
     ----------
-    extra
-        More tables of the plant file.
     wrong_s
         Error of the service's wall clock.
+    more
+        As of `Bench`.
     """
-    with ledger_daq(plant, folder) as daq, bad_links(daq.ports, seed) as links:
-        bench = BadLinkBench(plant, daq, links, folder, extra, wrong_s, time_zone, period_s)
-        with bench.rig:
-            try:
-                bench.begin()
-                bench.wait_until_well()
-                yield bench
-            finally:
-                bench.watch.end()
+    with (
+        ledger_daq(plant, folder) as daq,
+        BadLinks(daq.ports, seed).listening() as links,
+        BadLinkBench(plant, daq, links, folder, wrong_s, time_zone, **more) as bench,
+    ):
+        bench.begin()
+        bench.wait_until_well()
+        yield bench

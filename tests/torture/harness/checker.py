@@ -6,6 +6,7 @@ number is computed again from seed, channel, epoch and index by the real monitor
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
@@ -29,9 +30,6 @@ from harness.watch import Watch
 from service.settings.loading import load_plant_file
 from service.store.port import Store
 from service.wiring.stores import open_store
-
-Shown = Mapping[tuple[str, str], Mapping[int, float | None]]
-"""What a client was shown as stored: by unit and bearing, by index of the result's last sample."""
 
 
 @dataclass
@@ -88,6 +86,21 @@ class Findings:
         return {name: len(v) if isinstance(v, list) else v for name, v in named.items()}
 
 
+@dataclass(frozen=True)
+class Case:
+    """A store that no service writes to, what it is compared with, and what is found."""
+
+    plant: LedgerPlant
+    store: Store
+    offered: Offered
+    watch: Watch
+    found: Findings
+
+    def index_of(self, time_ns: int) -> int:
+        """Index of the sample that begins at a time."""
+        return index_of(time_ns, self.offered.t0_ns, self.plant.rate_hz)
+
+
 def check(
     plant: LedgerPlant,
     plant_file: Path,
@@ -107,48 +120,34 @@ def check(
     units
         Those that are looked at; all of them unless given.
     """
-    found = Findings()
     file = load_plant_file(plant_file)
-    store = open_store(file)
-    try:
-        for unit in units or plant.units:
+    with closing(open_store(file)) as store:
+        case = Case(plant, store, offered, watch, Findings())
+        rows = {unit: stored_rows(store, unit) for unit in units or plant.units}
+        for unit, its in rows.items():
             replay = Replay(plant, file, unit, offered.t0_ns)
-            _check_unit(found, plant, store, unit, offered, lives[unit], replay, watch.shown)
-        alarm_faults(found, plant, store, offered, watch, units or plant.units)
-    finally:
-        store.close()
-    return found
+            _check_unit(case, unit, its, lives[unit], replay)
+        alarm_faults(case, rows)
+    return case.found
 
 
-def _check_unit(
-    found: Findings,
-    plant: LedgerPlant,
-    store: Store,
-    unit: str,
-    offered: Offered,
-    lives: Sequence[int],
-    replay: Replay,
-    shown: Shown,
-) -> None:
-    rows = stored_rows(store, unit)
-    index = {key: index_of(key[1], offered.t0_ns, plant.rate_hz) for key in rows}
-    runs = runs_of(index.values(), plant, lives)
-    n_offered = offered.samples[unit, 1]
-    found.n_offered += n_offered
-    found.n_results += len(rows)
-    _check_shown(found, unit, rows, index, shown)
-    gaps = sorted(store.gaps(unit, *ALWAYS), key=lambda gap: gap.first_index)
-    _check_values(found, unit, rows, replay, taken(runs, gaps))
-    _check_gaps(found, unit, gaps, runs, n_offered, plant)
+def _check_unit(case: Case, unit: str, rows: Rows, lives: Sequence[int], replay: Replay) -> None:
+    index = {key: case.index_of(key[1]) for key in rows}
+    runs = runs_of(index.values(), case.plant, lives)
+    case.found.n_offered += case.offered.samples[unit, 1]
+    case.found.n_results += len(rows)
+    _check_shown(case, unit, rows, index)
+    gaps = sorted(case.store.gaps(unit, *ALWAYS), key=lambda gap: gap.first_index)
+    _check_values(case.found, unit, rows, replay, taken(runs, gaps))
+    _check_gaps(case, unit, gaps, runs)
 
 
-def _check_shown(
-    found: Findings, unit: str, rows: Rows, index: Mapping[tuple[str, int], int], shown: Shown
-) -> None:
+def _check_shown(case: Case, unit: str, rows: Rows, index: Mapping[tuple[str, int], int]) -> None:
+    found = case.found
     there = {(bearing, index[bearing, time_ns]): (bearing, time_ns) for bearing, time_ns in rows}
     repeated = Counter((key[0], n) for key, n in index.items())
     found.duplicated += [f"{unit} {key}" for key, n in repeated.items() if n > 1]
-    for (shown_unit, bearing), values in shown.items():
+    for (shown_unit, bearing), values in case.watch.shown.items():
         if shown_unit != unit:
             continue
         found.n_shown += len(values)
@@ -182,18 +181,12 @@ def _check_values(
     found.unexpected += [f"{unit} {key}" for key in left]
 
 
-def _check_gaps(
-    found: Findings,
-    unit: str,
-    gaps: Sequence[Gap],
-    runs: Sequence[Run],
-    n_offered: int,
-    plant: LedgerPlant,
-) -> None:
+def _check_gaps(case: Case, unit: str, gaps: Sequence[Gap], runs: Sequence[Run]) -> None:
     """Between two runs everything is in a gap, but what was taken and led to no result.
 
     Samples that were taken between two gaps, or before one, may not suffice for a result.
     """
+    found, plant = case.found, case.plant
     found.n_in_results += sum(run.stop - run.start for run in runs)
     found.n_in_gaps += sum(gap.n_samples for gap in gaps)
     for before, gap in pairwise(gaps):
@@ -201,7 +194,7 @@ def _check_gaps(
             found.gaps.append(f"{unit}: {before} and {gap} tell of the same samples")
     for gap in gaps:
         stop = gap.first_index + gap.n_samples
-        if stop > n_offered:
+        if stop > case.offered.samples[unit, 1]:
             found.gaps.append(f"{unit}: {gap} is of samples that were never offered")
         if any(run.start < stop and gap.first_index < run.stop for run in runs):
             found.gaps.append(f"{unit}: {gap} is of samples that led to results")

@@ -1,6 +1,7 @@
 """What disks, cables and memory do to bytes."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -21,14 +22,9 @@ def flips(content: bytearray, rng: np.random.Generator) -> None:
         flip(content, rng)
 
 
-def zero_page(content: bytearray, rng: np.random.Generator) -> None:
-    """A page holds nothing."""
-    _put(content, rng, PAGE_BYTES, bytes(PAGE_BYTES))
-
-
-def zero_sector(content: bytearray, rng: np.random.Generator) -> None:
-    """A sector holds nothing."""
-    _put(content, rng, SECTOR_BYTES, bytes(SECTOR_BYTES))
+def zero(content: bytearray, rng: np.random.Generator, size: int) -> None:
+    """A sector or a page holds nothing."""
+    _put(content, rng, size, bytes(size))
 
 
 def noise(content: bytearray, rng: np.random.Generator) -> None:
@@ -36,14 +32,15 @@ def noise(content: bytearray, rng: np.random.Generator) -> None:
     _put(content, rng, SECTOR_BYTES, rng.bytes(SECTOR_BYTES))
 
 
-def swap(content: bytearray, rng: np.random.Generator) -> None:
-    """Two sectors are in each other's place."""
-    _swap(content, rng, SECTOR_BYTES)
-
-
-def swap_pages(content: bytearray, rng: np.random.Generator) -> None:
-    """Two pages are in each other's place."""
-    _swap(content, rng, PAGE_BYTES)
+def swap(content: bytearray, rng: np.random.Generator, size: int) -> None:
+    """Two sectors or pages are in each other's place."""
+    n = len(content) // size
+    if n < 2:
+        return
+    one, other = (int(place) * size for place in rng.choice(n, 2, replace=False))
+    held = content[one : one + size]
+    content[one : one + size] = content[other : other + size]
+    content[other : other + size] = held
 
 
 def cut(content: bytearray, rng: np.random.Generator) -> None:
@@ -52,8 +49,14 @@ def cut(content: bytearray, rng: np.random.Generator) -> None:
 
 
 CHANGES: Mapping[str, Change] = {
-    change.__name__: change
-    for change in (flip, flips, zero_page, zero_sector, noise, swap, swap_pages, cut)
+    "flip": flip,
+    "flips": flips,
+    "zero_page": partial(zero, size=PAGE_BYTES),
+    "zero_sector": partial(zero, size=SECTOR_BYTES),
+    "noise": noise,
+    "swap": partial(swap, size=SECTOR_BYTES),
+    "swap_pages": partial(swap, size=PAGE_BYTES),
+    "cut": cut,
 }
 
 
@@ -71,13 +74,3 @@ def _put(content: bytearray, rng: np.random.Generator, size: int, data: bytes) -
     start = int(rng.integers(-(-len(content) // size))) * size
     end = min(start + size, len(content))
     content[start:end] = data[: end - start]
-
-
-def _swap(content: bytearray, rng: np.random.Generator, size: int) -> None:
-    n = len(content) // size
-    if n < 2:
-        return
-    one, other = (int(place) * size for place in rng.choice(n, 2, replace=False))
-    held = content[one : one + size]
-    content[one : one + size] = content[other : other + size]
-    content[other : other + size] = held

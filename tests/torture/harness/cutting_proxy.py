@@ -4,7 +4,6 @@ import selectors
 import socket
 from contextlib import suppress
 from threading import Lock, Thread
-from types import TracebackType
 
 
 class CuttingProxy:
@@ -29,12 +28,7 @@ class CuttingProxy:
     def __enter__(self) -> "CuttingProxy":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._listener.close()
 
     def cut_at(self, word: bytes, *, reaches: bool) -> None:

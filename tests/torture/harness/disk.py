@@ -5,17 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.tape import (
-    Acknowledged,
-    Cut,
-    Emptied,
-    Made,
-    Removed,
-    Renamed,
-    Step,
-    Synced,
-    Written,
-)
+from harness.tape import Acknowledged, Cut, Made, Removed, Renamed, Step, Synced, Written
 
 SECTOR_BYTES = 512
 
@@ -56,8 +46,6 @@ class Disk:
         match step:
             case Made(name):
                 self._rename(self._names | {name: _File()})
-            case Emptied(name):
-                self._names[name].pending.append(Cut(name, 0))
             case Written(name) | Cut(name):
                 self._names[name].pending.append(step)
             case Synced(""):

@@ -26,8 +26,7 @@ from acquisition.daq.ledger import Ledger
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
-from harness.ledger_feed import LedgerFeed
-from harness.ledger_plant import LedgerPlant
+from harness.ledger_plant import LedgerFeed, LedgerPlant
 from service.daq_program import run_daq
 
 ROOT = Path(__file__).parents[3]

@@ -1,11 +1,13 @@
-"""The plant that the ledger DAQ serves, and the plant file that a service reads it with."""
+"""The plant that the ledger DAQ serves, its samples, and the plant file of a service."""
 
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.truth import BEARINGS, SPEED_RPM
+from acquisition.raw import RawBlock
+from core.units import NS_PER_S
+from harness.truth import BEARINGS, N_CHANNELS, SPEED_RPM, Truth
 
 NOMINAL_HZ = 600.0
 """Load 1: so many samples a second of each of twelve channels of a unit."""
@@ -111,6 +113,38 @@ class LedgerPlant:
                 )
             )
         return "".join(parts)
+
+
+class LedgerFeed:
+    """A unit's converter; every sample follows from seed, channel, epoch and index.
+
+    Parameters
+    ----------
+    t0_ns
+        Time of sample 0, a whole number of microseconds.
+    first_index
+        Where it begins; a multiple of a slot.
+    """
+
+    def __init__(
+        self, plant: LedgerPlant, unit: int, t0_ns: int, epoch: int = 1, first_index: int = 0
+    ) -> None:
+        self._truth = Truth(plant.seed, unit, plant.rate_hz, epoch)
+        self._slot, self._t0_ns, self._next = plant.slot_samples, t0_ns, first_index
+
+    def advance(self, n_samples: int) -> RawBlock:
+        """Produce the next samples, as one slot."""
+        first, self._next = self._next, self._next + n_samples
+        truth = self._truth
+        return RawBlock(
+            epoch=truth.epoch,
+            first_index=first,
+            start_ns=self._t0_ns + round(first * NS_PER_S / truth.rate_hz) // 1000 * 1000,
+            rate_hz=truth.rate_hz,
+            counts=truth.counts(first, n_samples),
+            ok=(True,) * N_CHANNELS,
+            slow=truth.slow(first // self._slot),
+        )
 
 
 SLOW = (

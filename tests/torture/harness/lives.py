@@ -14,8 +14,7 @@ from core.account import Gap
 from core.assessment import Assessment
 from core.monitor import UnitMonitor
 from core.quantities import CATALOGUE
-from harness.ledger_feed import LedgerFeed
-from harness.ledger_plant import LedgerPlant
+from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.truth import BEARINGS
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.plant import PlantFile

@@ -2,28 +2,24 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.clock import Clock, SystemClock
+from harness.stream_rig import ground_of
 from service.bus import Bus
 from service.delivery.facts import Around
-from service.heartbeats import Heartbeats
-from service.metrics.timings import Timings
-from service.origin import Origin
 from service.recorder import Findings
 from service.roles.analysis import Analysis, analysis_on
-from service.roles.ground import Ground, live_view
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
 from service.stream.names import identity_of
 from service.stream.progress import UnitProgress
 from service.stream.stored import memories_of, usable
-from service.wiring.sources import monitor_of
 
 STREAM = "born once"
 
@@ -109,13 +105,10 @@ class MovingUnit:
         newest
             Number of the newest message on the stream.
         """
-        plant, clock = self.plant, self._clock
-        unit = plant.unit[0]
-        store, live = SqliteStore(self.database), live_view(plant, clock)
-        stack.callback(store.close)
-        monitors = {unit.id: monitor_of(unit, plant.analysis)}
-        beats, timings = Heartbeats(clock), Timings(monitors, clock)
-        ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
+        clock, unit = self._clock, self.plant.unit[0]
+        store = stack.enter_context(closing(SqliteStore(self.database)))
+        ground, monitors = ground_of(self.plant, clock, store)
+        live = ground.live
         found = store.position(unit.id)
         memories = memories_of([found] if found else [])
         analysis = await analysis_on(

@@ -1,16 +1,27 @@
-"""A real NATS server with JetStream, on a free port; it can be killed and started again."""
+"""Real NATS servers with JetStream, alone or three together; killed and started again."""
 
 import json
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 WAIT_S = 20.0
+N_NODES = 3
+
+CLUSTER = """
+server_name: n{number}
+cluster {{
+  name: padwatch
+  listen: "127.0.0.1:{port}"
+  routes: [{routes}]
+}}
+"""
 
 
 def nats_server_command() -> str | None:
@@ -121,3 +132,20 @@ def nats_server(folder: Path, lines: str = "") -> Iterator[NatsServer]:
         yield server
     finally:
         server.stop()
+
+
+@contextmanager
+def nats_cluster(folder: Path) -> Iterator[list[NatsServer]]:
+    """Three servers that keep a stream together, and none when this is left."""
+    with ExitStack() as held, ExitStack() as running:
+        sockets = [
+            held.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(N_NODES)
+        ]
+        ports = [one.getsockname()[1] for one in sockets]
+        held.close()  # all are held until all are found
+        routes = ", ".join(f'"nats://127.0.0.1:{port}"' for port in ports)
+        lines = [CLUSTER.format(number=n, port=port, routes=routes) for n, port in enumerate(ports)]
+        yield [
+            running.enter_context(nats_server(folder / f"n{number}", line))
+            for number, line in enumerate(lines)
+        ]

@@ -8,17 +8,14 @@ from typing import Any
 import psycopg
 
 from harness.postgres_server import PostgresServer
-from service.origin import Origin
-from service.store.outbox_port import Address, nobody
 from service.store.postgres import PostgresStore
 from service.store.postgres.address import PostgresAddress
-from service.store.spectra_port import SpectraLimits
 from service.store.sql_store import SqlStore
 from service.store.sqlite import SqliteStore
 
 
 class SqlitePlace:
-    """A SQLite file, made by whoever opens a store there first."""
+    """A SQLite file, made by whoever opens a store there first; the caller closes the store."""
 
     kind = "sqlite"
     refusal: type[Exception] = sqlite3.IntegrityError
@@ -26,14 +23,9 @@ class SqlitePlace:
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    def open(
-        self,
-        origin: Origin = Origin.LIVE,
-        address: Address = nobody,
-        spectra: SpectraLimits | None = None,
-    ) -> SqlStore:
-        """Open a store there; the caller closes it."""
-        return SqliteStore(self.path, origin, address, spectra)
+    def open(self, *how: Any, **more: Any) -> SqlStore:
+        """Open a store there."""
+        return SqliteStore(self.path, *how, **more)
 
     def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:
         """Do something to the database from outside, for good."""
@@ -46,7 +38,7 @@ class SqlitePlace:
 
 
 class PostgresPlace:
-    """A database of a server, and a folder on this host."""
+    """A database of a server, and a folder on this host; the caller closes the store."""
 
     kind = "postgresql"
     refusal: type[Exception] = psycopg.errors.RestrictViolation
@@ -56,14 +48,9 @@ class PostgresPlace:
         self.head = folder / "postgresql.audit-head.json"
         self.address = PostgresAddress(server.conninfo(database))
 
-    def open(
-        self,
-        origin: Origin = Origin.LIVE,
-        address: Address = nobody,
-        spectra: SpectraLimits | None = None,
-    ) -> SqlStore:
-        """Open a store there; the caller closes it."""
-        return PostgresStore(self.address, self.head, origin, address, spectra)
+    def open(self, *how: Any, **more: Any) -> SqlStore:
+        """Open a store there."""
+        return PostgresStore(self.address, self.head, *how, **more)
 
     def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:
         """Do something to the database from outside, for good; ``?`` as in SQLite."""

@@ -1,22 +1,25 @@
 """The service with one bug in it: ``python -m harness.planted run FILE --port 0``.
 
 The environment variable PLANTED names the bug; it is planted as the process starts, and the product
-knows nothing of it.
+knows nothing of it. Among them is a host whose wall clock is wrong.
 """
 
 import asyncio
 import os
+import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from acquisition.clock import SystemClock
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.monitored_unit import MonitoredUnit
 from core.ring import Ring
+from core.units import NS_PER_S
 from service.alarms.engine import AlarmEngine
 from service.cli.main import main
 from service.continuous import joining, tape, unit_tape
@@ -185,6 +188,18 @@ def sample_altered() -> None:
     Stretch.write = altered  # type: ignore[method-assign]
 
 
+def wrong_wall_clock() -> None:
+    """Step the host's wall clock by the seconds in the file WALL_CLOCK, and again on SIGUSR1."""
+    path, wrong_ns = Path(os.environ["WALL_CLOCK"]), [0]
+
+    def read(*_: object) -> None:
+        wrong_ns[0] = round(float(path.read_text(encoding="ascii")) * NS_PER_S)
+
+    read()
+    signal.signal(signal.SIGUSR1, read)
+    SystemClock.now_ns = lambda self: time.time_ns() + wrong_ns[0]  # type: ignore[method-assign]  # noqa: ARG005
+
+
 TAPES: list[unit_tape.UnitTape] = []
 
 BUGS: Mapping[str, Callable[[], None]] = {
@@ -204,6 +219,7 @@ BUGS: Mapping[str, Callable[[], None]] = {
         hole_of_the_outage_not_told,
         part_joined_twice,
         sample_altered,
+        wrong_wall_clock,
     )
 }
 

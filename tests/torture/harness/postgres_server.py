@@ -11,7 +11,6 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import IO
 
 import psycopg
@@ -82,12 +81,7 @@ class PostgresServer:
     def __enter__(self) -> "PostgresServer":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def conninfo(self, database: str = "postgres", *, by: str = "socket") -> str:
@@ -104,11 +98,11 @@ class PostgresServer:
         """Start, and wait until it answers."""
         options = " ".join(f"-c {name}='{value}'" for name, value in self._settings.items())
         log = self.folder / "log"
-        self._run("pg_ctl", "-w", "-D", self.data, "-l", log, "-o", options, "start")
+        self.run("pg_ctl", "-w", "-D", self.data, "-l", log, "-o", options, "start")
 
     def stop(self, mode: str = "fast") -> None:
         """Stop: ``fast`` ends sessions, ``immediate`` is as good as a power cut."""
-        self._run("pg_ctl", "-w", "-D", self.data, "-m", mode, "stop")
+        self.run("pg_ctl", "-w", "-D", self.data, "-m", mode, "stop")
 
     def restart(self, mode: str = "fast") -> None:
         """Stop and start."""
@@ -138,10 +132,6 @@ class PostgresServer:
         """Remove a database, whoever uses it."""
         self.execute(f"DROP DATABASE IF EXISTS {database} WITH (FORCE)")
 
-    def run(self, program: str, *arguments: object) -> str:
-        """Run one of PostgreSQL's own programs; what it prints."""
-        return self._run(program, *arguments)
-
     def _make(self, like: "PostgresServer | None") -> None:
         if self._user is not None:
             shutil.chown(self.folder, self._user)
@@ -158,13 +148,14 @@ class PostgresServer:
         password = self.folder / "password"
         password.write_text(self.PASSWORD)
         password.chmod(0o644)
-        self._run(
+        self.run(
             *("initdb", "-D", self._empty, "-U", "postgres", "--no-sync", "--no-instructions"),
             *("--encoding=utf8", "--locale=C.UTF-8", "--wal-segsize=4"),
             *("--auth-local=trust", "--auth-host=scram-sha-256", f"--pwfile={password}"),
         )
 
-    def _run(self, program: str, *arguments: object) -> str:
+    def run(self, program: str, *arguments: object) -> str:
+        """Run one of PostgreSQL's own programs; what it prints."""
         command = [str(self._programs / program), *(str(argument) for argument in arguments)]
         with tempfile.TemporaryFile("w+") as out:  # not a pipe: the server would hold it open
             done = subprocess.run(

@@ -3,6 +3,7 @@
 import http.client
 import re
 from collections import Counter
+from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +19,6 @@ from harness.ledger_plant import LedgerPlant
 from harness.truth import Truth
 
 PROMISED = re.compile(r"^padwatch_recording_samples_total ([0-9.e+]+)$", re.M)
-SHED = re.compile(r"^padwatch_recording_shed_samples_total\{[^}]*\} ([0-9.e+]+)$", re.M)
 
 
 @dataclass
@@ -51,12 +51,11 @@ class Recorded:
 
 def promised(url: str) -> int:
     """Samples that the running service says are on the disk."""
-    return round(sum(map(float, PROMISED.findall(_metrics(url)))))
-
-
-def shed(url: str) -> int:
-    """Samples that the running service says it has let go of."""
-    return round(sum(map(float, SHED.findall(_metrics(url)))))
+    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=30.0)
+    with closing(connection):
+        connection.request("GET", "/metrics")
+        metrics = connection.getresponse().read().decode()
+    return round(sum(map(float, PROMISED.findall(metrics))))
 
 
 def recorded(root: Path, plant: LedgerPlant, unit: int, offered: Offered) -> Recorded:
@@ -107,12 +106,3 @@ def _account(heads: list[BlockHead], n_offered: int, found: Recorded) -> None:
             f"not accounted for: {found.n_span} passed, {found.n_samples} are there,"
             f" {found.told.total()} are told as missing"
         )
-
-
-def _metrics(url: str) -> str:
-    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=30.0)
-    try:
-        connection.request("GET", "/metrics")
-        return connection.getresponse().read().decode()
-    finally:
-        connection.close()

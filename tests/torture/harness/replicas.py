@@ -12,7 +12,7 @@ import numpy as np
 from harness.kill_cycles import act
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.nats_cluster import NatsCluster
+from harness.nats_server import NatsServer
 from harness.postgres_server import PostgresServer
 from harness.service_rig import PATIENCE_S, ServiceRig
 from harness.watch import Watch
@@ -57,7 +57,7 @@ class Replicas:
     lives: dict[str, list[int]]
     begins_anew: bool = True
     acquiring: list[ServiceRig] = field(default_factory=list)
-    cluster: NatsCluster | None = None
+    nodes: Sequence[NatsServer] = ()
     n_restarts: int = 0
 
     def start(self) -> None:
@@ -85,8 +85,9 @@ class Replicas:
 
     def kill_node(self, number: int) -> None:
         """Kill one of three servers of the stream; it is started again."""
-        if self.cluster is not None:
-            self.cluster.kill(number)
+        node = self.nodes[number % len(self.nodes)]
+        node.kill()
+        node.start()
 
     def kill_serving(self, number: int) -> None:
         """Kill one that serves, while people ask it; it is started again."""
@@ -174,10 +175,10 @@ def chain(
     folder: Path,
     daq: LedgerDaq,
     postgres: PostgresServer,
-    cluster: NatsCluster,
+    nodes: Sequence[NatsServer],
 ) -> Iterator[Replicas]:
     """`padwatch acquire`, two `padwatch analyse` and two `padwatch serve`, over three nodes."""
-    servers = ", ".join(f'"{url}"' for url in cluster.urls)
+    servers = ", ".join(f'"{node.url}"' for node in nodes)
     roles = {
         "acquire": ("acquire",),
         "analyse1": ("analyse", "--partition", "1/2"),
@@ -187,7 +188,7 @@ def chain(
     }
     stream = STREAM.format(servers=servers)
     with _processes(plant, folder, daq, postgres, roles, stream) as found:
-        found.begins_anew, found.cluster = False, cluster
+        found.begins_anew, found.nodes = False, nodes
         yield found
 
 

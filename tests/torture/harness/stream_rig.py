@@ -10,8 +10,9 @@ from pathlib import Path
 import nats
 import numpy as np
 
-from acquisition.clock import SystemClock
+from acquisition.clock import Clock, SystemClock
 from core.blocks import SampleBlock
+from core.monitor import UnitMonitor
 from core.quality import GOOD, Reading
 from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
@@ -29,6 +30,7 @@ from service.roles.link_news import LinkNews
 from service.roles.partition import Partition
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.store.port import Store
 from service.store.sqlite import SqliteStore
 from service.stream.names import identity_of, stream_name, subject
 from service.stream.publisher import Publisher
@@ -40,6 +42,8 @@ LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
 T0 = 1_767_225_600 * NS_PER_S
 N_SAMPLES = 600
 WAIT_S = 60.0
+
+Monitors = dict[str, UnitMonitor]
 
 
 def written_plant(folder: Path, server: NatsServer, name: str = "plant") -> Path:
@@ -100,16 +104,20 @@ async def publish(plant: PlantFile, sent: Iterable[SampleBlock]) -> None:
         await asyncio.wait([running])
 
 
+def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[Ground, Monitors]:
+    """What the roles of a process stand on, and the monitors of all units."""
+    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
+    beats, timings, live = Heartbeats(clock), Timings(monitors, clock), live_view(plant, clock)
+    return Ground(plant, Origin.LIVE, clock, store, live, beats, timings), monitors
+
+
 @asynccontextmanager
 async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, Ground]]:
     """Run the analysis of a process; what is not stored when this is left is lost."""
-    clock = SystemClock()
-    store, live = open_store(plant), live_view(plant, clock)
-    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
-    beats, timings = Heartbeats(clock), Timings(monitors, clock)
-    ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
+    store = open_store(plant)
+    ground, monitors = ground_of(plant, SystemClock(), store)
     assert plant.stream is not None
-    process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(live))
+    process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(ground.live))
     task = asyncio.create_task(process._analyse())
     try:
         yield process, ground
@@ -145,11 +153,9 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
     """Let one process make of it what it makes; returns its database."""
     plant, clock = load_plant_file(plant_file), SystemClock()
     path = Path(plant.service.data_folder) / "padwatch.sqlite3"
-    store, live = SqliteStore(path), live_view(plant, clock)
-    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
-    beats, timings = Heartbeats(clock), Timings(monitors, clock)
-    ground = Ground(plant, Origin.LIVE, clock, store, live, beats, timings)
-    analysis = await analysis_on(ground, monitors, Bus(512, clock), Around(live))
+    store = SqliteStore(path)
+    ground, monitors = ground_of(plant, clock, store)
+    analysis = await analysis_on(ground, monitors, Bus(512, clock), Around(ground.live))
     try:
         for unit, message in sent:
             if isinstance(message, LinkNews):

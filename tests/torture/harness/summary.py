@@ -1,21 +1,51 @@
-"""What `make torture` says at its end: a table of figures, and which planted bugs were caught.
+"""What `make torture` does and says: a table of figures, and which planted bugs were caught.
 
-A test records a figure by its fixture ``figure``: a row of the table and what was found. A test
+A test records a figure by its fixture ``torture``: a row of the table and what was found. A test
 that plants a bug is marked ``planted`` with the bug's name; it passes if the harness catches it.
 """
 
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from _pytest.mark import ParameterSet
 
+from harness.watch import PERIOD_S
+
 FIGURE, PLANTED = "figure", "planted"
 
-Property = tuple[str, object]
+N_SHORT = 25
+"""By how much the short torture of every test run is less than the whole one."""
+
+
+@dataclass(frozen=True)
+class Torture:
+    """How much a test does: as in the whole torture, or as in every run of all tests.
+
+    Parameters
+    ----------
+    seed
+        Of everything that is random.
+    figure
+        Adds a row to the table at the end.
+    """
+
+    seed: int
+    is_whole: bool
+    figure: Callable[[str], None]
+
+    def times(self, number: int) -> int:
+        """Number of repetitions, of the number that the whole torture takes."""
+        return number if self.is_whole else max(1, number // N_SHORT)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two questions of a client, which cost most of the short torture."""
+        return PERIOD_S if self.is_whole else 3.0 * PERIOD_S
 
 
 def planted(bug: str, *values: object, mark: pytest.MarkDecorator) -> ParameterSet:

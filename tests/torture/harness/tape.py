@@ -25,13 +25,6 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Emptied:
-    """A file that was opened to be written anew."""
-
-    name: str
-
-
-@dataclass(frozen=True)
 class Written:
     """Bytes at a place in a file."""
 
@@ -77,7 +70,7 @@ class Acknowledged:
     number: int
 
 
-Step = Made | Emptied | Written | Cut | Synced | Renamed | Removed | Acknowledged
+Step = Made | Written | Cut | Synced | Renamed | Removed | Acknowledged
 
 _LINE = re.compile(r"^\d+ +(\w+)\((.*)\) += (-?\d+)")
 _FD = re.compile(r"(\d+)<([^>]*)>")
@@ -136,7 +129,7 @@ def _step(
         if name not in known:
             yield Made(name)
         elif "O_TRUNC" in arguments:
-            yield Emptied(name)
+            yield Cut(name, 0)
         known.add(name)
         offsets[name] = 0
         return
