@@ -1,17 +1,15 @@
 """An alarm's evidence, from the running plant to the printed page."""
 
-import io
 import re
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.async_api import expect
+from real_plant import DEMO
 
 ALARM = "U1:UJB:order1_shaft_x"
 ROW = f"[data-alarm='{ALARM}']"
-HOSTILE = "<script>alert(1)</script>"
 CAPTURE = "\n[capture]\npre_s = 5.0\npost_s = 2.0\nmax_s = 60.0\n"
 LIMIT = "alarms.shaft_order1_um_pk = { alert = 1.0, deadband = 0.1 }\n"
 OIL = 'oil_temperature = "ujb_oil_temperature"\n'
@@ -19,9 +17,8 @@ OIL = 'oil_temperature = "ujb_oil_temperature"\n'
 
 @pytest.fixture
 def alarmed_plant(new_plant, tmp_path: Path) -> Iterator[object]:
-    """A plant with a hostile name whose shaft moves further than it may."""
-    text = Path(new_plant._example).read_text(encoding="utf-8")
-    text = text.replace('name = "Demo plant"', f"name = '{HOSTILE}'").replace(OIL, OIL + LIMIT, 1)
+    """A plant whose shaft moves further than it may."""
+    text = DEMO.read_text(encoding="utf-8").replace(OIL, OIL + LIMIT, 1)
     example = tmp_path / "example.toml"
     example.write_text(text, encoding="utf-8")
     new_plant._example = example
@@ -32,7 +29,7 @@ def alarmed_plant(new_plant, tmp_path: Path) -> Iterator[object]:
 
 
 @pytest.mark.long
-async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
+async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
     alarmed_plant, page, complaints
 ) -> None:
     await page.goto(f"{alarmed_plant.url}#/alarms")
@@ -52,16 +49,9 @@ async def test_a_report_is_one_printed_page_and_its_bundle_holds_the_samples(
     await report.wait_for_load_state()
 
     await expect(report.locator("h1")).to_have_text("U1 UJB: shaft vibration 1×, x")
-    await expect(report.locator("dl")).to_contain_text(HOSTILE)
-    assert await report.locator("script").count() == 0
     assert await report.locator("figure").count() == 2
     printed = await report.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page\b(?!s)", printed)) == 1
-
-    answer = await page.request.get(f"{links}/1/bundle.zip")
-    with zipfile.ZipFile(io.BytesIO(await answer.body())) as bundle:
-        assert bundle.testzip() is None
-        assert {"evidence.json", "report.html", "samples/samples.parquet"} <= set(bundle.namelist())
 
     await page.goto(f"{alarmed_plant.url}#/recordings")
     recording = page.locator("[data-recording]").first

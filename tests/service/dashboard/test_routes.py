@@ -1,4 +1,4 @@
-"""How the dashboard's files travel: complete, uncached where they change, and nothing else."""
+"""How the dashboard's files travel: complete, uncached where they change, under their edition."""
 
 import gzip
 
@@ -6,7 +6,9 @@ import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from service.dashboard.assets import pages, plotly
+from service.dashboard import edition as told
+from service.dashboard.assets import Asset, pages, plotly
+from service.dashboard.edition import EditionHeader, edition
 from service.dashboard.routes import dashboard_router
 
 AS_IS = {"Accept-Encoding": "identity"}
@@ -65,3 +67,19 @@ def test_packed_and_plain_are_the_same_file_with_different_tags(client) -> None:
 @pytest.mark.parametrize("path", ["nothing.js", "../routes.py", "%2e%2e/routes.py", "charts", ""])
 def test_nothing_else_is_served(client, path) -> None:
     assert client.get(f"/static/{path}").status_code == 404
+
+
+def test_every_answer_names_the_edition_even_a_refusal() -> None:
+    app = FastAPI()
+    app.add_middleware(EditionHeader)
+    answer = TestClient(app).get("/api/v1/nothing-here")
+    assert answer.status_code == 404
+    assert answer.headers["padwatch-edition"] == edition()
+
+
+def test_another_byte_in_any_file_of_the_dashboard_is_another_edition(monkeypatch) -> None:
+    before = edition()
+    changed = dict(told.pages())
+    changed["app.js"] = Asset(changed["app.js"].body + b"\n", changed["app.js"].media_type)
+    monkeypatch.setattr(told, "pages", lambda: changed)
+    assert edition.__wrapped__() != before

@@ -74,16 +74,6 @@ async def test_a_poll_is_what_lies_between_two_waits_of_one_task(stepped_clock: 
     assert seen.sum_s == pytest.approx(4 * 0.25 + 2 * 0.5)
 
 
-async def test_the_time_without_a_link_is_no_poll(stepped_clock: Any) -> None:
-    polls = PollClock(stepped_clock)
-    await polls.sleep(1.0)
-    stepped_clock.step(3600.0)
-    polls.forget()
-    await polls.sleep(1.0)
-
-    assert polls.polls.seen().n_up_to[-1] == 0
-
-
 def test_however_many_reasons_there_are_labels_stay_few() -> None:
     rejected = {f"reason_{number}": 1 for number in range(1000)} | {"a text, not a word": 5}
 
@@ -113,7 +103,7 @@ async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) 
     for _ in range(2):
         async with source.connect() as blocks:
             assert [block async for block in blocks] == []
-        stepped_clock.step(3600.0)
+        stepped_clock.step(3600.0)  # without a link, which is no poll
 
     assert source.polls.seen().n_up_to[-1] == 4
     assert source.polls.seen().sum_s == pytest.approx(4 * 0.25)

@@ -1,10 +1,26 @@
-"""What Prometheus is told by a running service."""
+"""What Prometheus is told by a running service, under names and labels by its own rules."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
 
 from core.account import SampleAccount
+
+LABELS = {
+    *("volume", "about", "kind"),
+    *("unit", "bearing", "quality", "priority", "verdict", "reason", "receiver"),
+    *("version", "python", "le"),
+}
+
+TIMES = {"lag", "age", "wait", "behind", "offset", "duration"}
+BASE_UNITS = ("_seconds", "_bytes")
+
+NOT_BASE_UNITS = {
+    *("milliseconds", "ms", "us", "ns", "minutes", "hours", "days", "percent", "kilobytes"),
+    *("mb", "celsius_milli", "rpm"),
+}
 
 
 def test_counts_agree_with_the_account_of_samples(told: Any, account: SampleAccount) -> None:
@@ -26,9 +42,7 @@ def test_counts_agree_with_the_account_of_samples(told: Any, account: SampleAcco
     )
 
 
-def test_a_device_that_does_not_answer_is_told_without_numbers_that_nobody_knows(
-    told: Any,
-) -> None:
+def test_a_device_that_does_not_answer_has_no_numbers_that_nobody_knows(told: Any) -> None:
     value = told.plain.value
     assert value("padwatch_link_connected", unit="U1") == 1.0
     assert value("padwatch_link_connected", unit="U2") == 0.0
@@ -52,17 +66,10 @@ def test_every_result_every_poll_and_every_commit_is_timed_once(told: Any) -> No
     assert count("store_commit") > 0.0
 
 
-def test_frames_that_were_not_used_are_counted(told: Any) -> None:
+def test_frames_that_were_not_used_are_counted_and_polls_timed_by_both_ends(told: Any) -> None:
     refused = told.plain.numbers("padwatch_frames_refused_total")
-
     assert refused == {frozenset({("unit", "U1"), ("reason", "duplicate")}): 2.0}
-
-
-def test_the_health_of_sources_says_what_polls_take_and_which_frames_were_not_used(
-    told: Any,
-) -> None:
     first, second = told.sources
-
     assert (first["unit"], first["polls"]["n"]) == ("U1", 18)
     assert first["polls"]["newest_s"] > 0.0
     total_s = told.plain.value("padwatch_poll_duration_seconds_sum", unit="U1")
@@ -80,10 +87,7 @@ def test_the_format_is_the_one_that_is_asked_for(told: Any) -> None:
     assert asked.text.endswith("# EOF\n")
     names = {family.name for family in text_string_to_metric_families(asked.text)}
     assert names == set(plain.families)
-
-
-def test_a_strange_accept_header_is_no_fault_and_not_repeated(told: Any) -> None:
-    assert "zzz" not in str(told.scrapes["strange"].headers)
+    assert "zzz" not in str(told.scrapes["strange"].headers)  # answered, and not repeated
 
 
 def test_metrics_are_described_with_the_api(told: Any) -> None:
@@ -104,3 +108,56 @@ def test_an_outbox_that_cannot_be_read_is_a_metric_and_no_failed_scrape(told: An
     assert told.plain.value(waiting, receiver="control-room") is not None
     assert told.blind.value("padwatch_outbox_readable") == 0.0
     assert told.blind.value(waiting, receiver="control-room") is None
+
+
+def test_names_follow_the_rules_of_prometheus(told: Any) -> None:
+    families = [f for f in told.plain.families.values() if f.name.startswith("padwatch_")]
+
+    assert len(families) > 30
+    for family in families:
+        words = family.name.split("_")
+        assert re.fullmatch(r"[a-z][a-z0-9_]*", family.name), family.name  # a colon is for rules
+        assert not set(words) & NOT_BASE_UNITS, family.name
+        assert words[-1] not in ("total", "count", "sum", "bucket"), family.name
+        assert family.documentation.endswith("."), family.name
+        assert family.type in ("counter", "gauge", "histogram"), family.name
+        if family.type == "counter":
+            assert all(sample.name == f"{family.name}_total" for sample in family.samples)
+        if family.type == "histogram" or TIMES & set(words):
+            assert family.name.endswith(BASE_UNITS), family.name
+
+
+def test_labels_are_few_and_their_values_are_words_of_the_plant(told: Any) -> None:
+    for family in told.plain.families.values():
+        for sample in family.samples:
+            assert set(sample.labels) <= LABELS, sample
+            for label, value in sample.labels.items():
+                assert re.fullmatch(r"[A-Za-z0-9_.+-]{1,60}", value), sample
+                assert label not in family.name.split("_"), f"{family.name} repeats {label}"
+
+
+def test_histograms_rise_and_end_with_all(told: Any) -> None:
+    for family in told.plain.families.values():
+        if family.type != "histogram":
+            continue
+        by_unit: dict[str, list[float]] = {}
+        for sample in family.samples:
+            unit = sample.labels.get("unit", "")
+            if sample.name.endswith("_bucket"):
+                by_unit.setdefault(unit, []).append(sample.value)
+            if sample.name.endswith("_count"):
+                assert by_unit[unit][-1] == sample.value
+        for counts in by_unit.values():
+            assert counts == sorted(counts)
+
+
+def test_the_guide_names_all_that_is_told_and_nothing_else(told: Any) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "metrics.md").read_text("utf-8")
+    table = guide[guide.index("## What there is") : guide.index("## Grafana")]
+
+    told = {
+        family.name + ("_total" if family.type == "counter" else "")
+        for family in told.plain.families.values()
+        if family.name.startswith("padwatch_")
+    }
+    assert set(re.findall(r"`(padwatch_\w+)`", table)) == told

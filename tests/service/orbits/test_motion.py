@@ -9,7 +9,7 @@ import pytest
 from core.arrays import FloatArray
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.quality import Reading
-from service.orbits.motion import motion_of
+from service.orbits.motion import ShaftMotion, motion_of
 from service.orbits.stretch import ShaftStretch
 
 RATE_HZ, TURN_HZ, N = 600.0, 1.5, 6000
@@ -58,45 +58,35 @@ def stretch(slow: Mapping[str, Reading] | None = None, **changes: FloatArray) ->
     return ShaftStretch(1, 0, 0, RATE_HZ, {**samples, **changes}, slow or {"speed": Reading(91.0)})
 
 
-def test_the_mark_of_the_shaft_gives_speed_and_place_of_each_turn() -> None:
-    unit = machine()
+def motion(given: ShaftStretch, **changes: object) -> ShaftMotion:
+    unit = machine(**changes)
+    return motion_of(given, unit, unit.bearings[0])
 
-    found = motion_of(stretch(), unit, unit.bearings[0])
+
+def test_four_probes_tell_the_centre_from_growth_and_the_mark_gives_speed_and_turns() -> None:
+    found = motion(stretch())
 
     assert found.marks is not None
     expected = (np.arange(1.0, 16.0) - 0.3) / TURN_HZ * RATE_HZ
     assert found.marks == pytest.approx(expected, abs=1.0)
     assert found.speed_rpm == pytest.approx(90.0)  # not the slow channel's
-
-
-def test_four_probes_tell_the_centre_from_thermal_growth() -> None:
-    unit = machine()
-
-    found = motion_of(stretch(), unit, unit.bearings[0])
-
     assert found.centre_um == pytest.approx((CENTRE_X_UM, CENTRE_Y_UM), abs=0.01)
     assert found.x_um == pytest.approx(50.0 * np.cos(2.0 * math.pi * TURNS), abs=0.01)
     assert found.order1 is not None
-    assert found.order1.ellipse.major_um_pk == pytest.approx(50.0, rel=1e-3)
-    assert found.order1.ellipse.minor_um_pk == pytest.approx(50.0, rel=1e-3)
-    assert found.order1.ellipse.sense == 1
+    ellipse = found.order1.ellipse
+    assert (ellipse.major_um_pk, ellipse.minor_um_pk) == pytest.approx((50.0, 50.0), rel=1e-3)
+    assert ellipse.sense == 1
 
 
 def test_without_a_key_phase_there_are_no_marks_and_the_slow_channel_says_the_speed() -> None:
-    unit = machine(key_phase=None)
-
-    found = motion_of(stretch(), unit, unit.bearings[0])
-
+    found = motion(stretch(), key_phase=None)
     assert found.marks is None
     assert found.speed_rpm == 91.0
 
 
 def test_a_lost_probe_leaves_no_motion_no_centre_and_no_zeros() -> None:
-    unit = machine()
     lost = np.full(N, np.nan)
-
-    found = motion_of(stretch(y=lost, far_y=lost), unit, unit.bearings[0])
-
+    found = motion(stretch(y=lost, far_y=lost))
     assert np.isnan(found.y_um).all()
     assert np.isfinite(found.x_um).all()
     assert (found.centre_um, found.order1) == (None, None)
@@ -106,11 +96,8 @@ def test_a_lost_probe_leaves_no_motion_no_centre_and_no_zeros() -> None:
 def test_a_moment_too_short_for_a_turn_is_motion_without_its_part_at_running_speed(
     n_samples: int,
 ) -> None:
-    unit = machine()
     whole = stretch()
     short = {id_: each[:n_samples] for id_, each in whole.samples.items()}
-
-    found = motion_of(ShaftStretch(1, 0, 0, RATE_HZ, short, whole.slow), unit, unit.bearings[0])
-
+    found = motion(ShaftStretch(1, 0, 0, RATE_HZ, short, whole.slow))
     assert found.x_um.size == n_samples
     assert found.order1 is None

@@ -1,6 +1,7 @@
 """Recordings around alarms and continuous ones side by side on one shelf."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,18 +39,21 @@ def shelf(tmp_path: Path) -> Shelf:
     return Shelf((captures, recordings))
 
 
-def test_all_are_listed_newest_first_without_those_that_are_being_written(shelf: Shelf) -> None:
-    assert [kept.name for kept in shelf.newest(10)] == [SECOND, CAPTURE, OTHER, FIRST]
-    assert [kept.name for kept in shelf.newest(2, "U1")] == [SECOND, CAPTURE]
-
-
-def test_each_kind_can_be_asked_for_alone(shelf: Shelf) -> None:
-    captures = shelf.newest(10, kind=WaveformKind.CAPTURE)
-    continuous = shelf.newest(10, "U1", WaveformKind.CONTINUOUS)
-
-    assert [kept.name for kept in captures] == [CAPTURE]
-    assert [kept.name for kept in continuous] == [SECOND, FIRST]
-    assert {kept.kind for kept in continuous} == {WaveformKind.CONTINUOUS}
+@pytest.mark.parametrize(
+    ("asked", "names"),
+    [
+        ((10,), [SECOND, CAPTURE, OTHER, FIRST]),
+        ((2, "U1"), [SECOND, CAPTURE]),
+        ((10, None, WaveformKind.CAPTURE), [CAPTURE]),
+        ((10, "U1", WaveformKind.CONTINUOUS), [SECOND, FIRST]),
+    ],
+)
+def test_whole_recordings_are_listed_newest_first_by_unit_and_kind(
+    shelf: Shelf, asked: tuple[Any, ...], names: list[str]
+) -> None:
+    found = shelf.newest(*asked)
+    assert [kept.name for kept in found] == names
+    assert {kept.kind for kept in found} >= set(asked[2:])
 
 
 def test_one_of_either_kind_is_opened_by_its_name(shelf: Shelf) -> None:
