@@ -34,6 +34,8 @@ def test_a_failed_channel_takes_nothing_from_the_others(phasors: np.ndarray) -> 
     spectrum = average(FREQUENCY_HZ, spoiled, usable)
     whole = average(FREQUENCY_HZ, phasors, np.ones((9, 4), dtype=bool))
     np.testing.assert_allclose(spectrum.power[:, 0, 1], whole.power[:, 0, 1])
+    own = np.mean(np.abs(phasors[:3, 2]) ** 2, axis=0)
+    np.testing.assert_allclose(spectrum.amplitude_um_pk(2), np.sqrt(own))
     assert spectrum.n_segments[0, 1] == 9
     assert spectrum.n_segments[0, 2] == 3
 

@@ -33,6 +33,9 @@ def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table() -> Non
     for freedoms, factor in ((3.0, 3.18), (6.0, 2.45), (20.0, 2.09)):
         found = coverage_factor([random_line("a", 1.0, freedoms)])
         assert found == pytest.approx(factor, abs=0.005)
+    # GUM, G.4.1, example: 0.25, 0.57 and 0.82 % of 10, 5 and 15 readings have 19.0 together
+    example = [random_line(*row) for row in (("a", 0.25, 9.0), ("b", 0.57, 4.0), ("c", 0.82, 14.0))]
+    assert coverage_factor(example) == pytest.approx(2.093, abs=0.003)
     mixed = [random_line("a", 1.0, 6.0), systematic_line("b", 10.0, 1.0)]
     assert coverage_factor(mixed) == pytest.approx(1.96, abs=0.01)
 

@@ -157,6 +157,15 @@ def test_counts_of_another_scale_become_engineering_units(
     np.testing.assert_array_equal(found.samples, (run.counts * PER_COUNT).astype(np.float32))
 
 
+@pytest.mark.parametrize("kind", ["hdf5", "tdms"])
+def test_slow_values_whose_time_goes_back_are_refused(
+    run: Any, imported: Imported, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.setattr(type(run), "slow_s", np.array([0.0, 2.0, 1.0]))
+    with pytest.raises(ConfigError, match="the time of slow channel oil goes back"):
+        imported(kind, run.units_um)
+
+
 def assert_times_and_slow_values(found: Any, run: Any) -> None:
     np.testing.assert_array_equal(found.index, run.index)
     for block in found.blocks:

@@ -110,6 +110,16 @@ def test_nothing_is_compared_outside_the_learned_support(healthy: StiffnessHisto
     assert np.isnan(found.deviation[:2]).all()
 
 
+def test_a_reading_that_scatters_more_than_the_learned_ones_weighs_less(
+    healthy: StiffnessHistory,
+) -> None:
+    baseline = learned(healthy)
+    here = FilmConditions(np.full(2, 0.4), np.full(2, 45.0), np.full(2, 30.0))
+    typical, noisy = baseline.u_random, 10.0 * baseline.scatter
+    weight = baseline.compare(here, np.full(2, 20.0), np.array([typical, noisy])).weight
+    assert weight[1] < 0.02 < 0.2 < weight[0] <= 1.0
+
+
 def test_a_cell_needs_readings_on_several_days_or_neighbours(healthy: StiffnessHistory) -> None:
     settings = BaselineSettings(min_days=5, min_readings=30)
     cells = {cell.cell: cell for cell in learned(healthy, settings).table.cells}
