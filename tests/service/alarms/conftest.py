@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 import structlog
 
-from core.alarms.alarm import Alarm
 from core.machine import Bearing, Channel, Measurand, Unit
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -63,52 +62,6 @@ class UncertainStore:
             raise StoreError("the answer got lost")
 
 
-class Expected:
-    """What is to be known of one alarm, by rules of its own."""
-
-    def __init__(self, is_latching: bool) -> None:
-        self.is_latching = is_latching
-        self.standing = 0  # level of the condition that was known last
-        self.level = 0
-        self.occurrence = 0
-        self.is_seen = True
-        self.hidden: dict[str, int | None] = {}
-
-    def finds(self, level: int) -> None:
-        was_latched, before = self.level > self.standing, self.standing
-        held, self.standing = self.level, level
-        if level > before and (was_latched or level > held):
-            self.occurrence += 1
-            self.is_seen = False
-        self.level = max(level, held) if self.is_latching else level
-
-    def hide(self, why: str, until: int | None = None) -> None:
-        self.hidden[why] = until
-
-    def show(self, why: str) -> None:
-        if why in self.hidden:
-            del self.hidden[why]
-            self.is_seen = self.is_seen and not self.level
-
-    def restarts(self) -> None:
-        self.standing = 0 if self.level > self.standing else self.level
-
-    def copied(self) -> "Expected":
-        twin = Expected(self.is_latching)
-        twin.__dict__.update(self.__dict__ | {"hidden": dict(self.hidden)})
-        return twin
-
-    def agrees_with(self, alarm: Alarm) -> bool:
-        hidden = {
-            *(["shelf"] if alarm.shelf else []),
-            *(["outage"] if alarm.outage else []),
-            *(["design"] if alarm.suppressed_by is not None else []),
-        }
-        return (self.level, self.occurrence, self.is_seen, set(self.hidden)) == (
-            *(int(alarm.level or 0), alarm.occurrence, alarm.is_acknowledged, hidden),
-        )
-
-
 @pytest.fixture
 def host() -> Host:
     return Host()
@@ -116,8 +69,8 @@ def host() -> Host:
 
 @pytest.fixture
 def tools() -> SimpleNamespace:
-    """Parts of a random life: a store that may fail, a model of an alarm, a unit."""
-    return SimpleNamespace(uncertain=UncertainStore, expected=Expected, unit=UNIT)
+    """Parts of a random life: a store that may fail, a unit."""
+    return SimpleNamespace(uncertain=UncertainStore, unit=UNIT)
 
 
 @pytest.fixture

@@ -62,9 +62,6 @@ def test_a_store_that_takes_nothing_is_an_alarm_that_says_why(watched: Watched) 
     ]
     assert watched.alarms.alarm(NOT_STORED).condition.reason == "disk full"
     assert watched.after(0.5) == [f"{NOT_STORED} returned"]
-
-
-def test_a_disk_that_does_not_answer_at_all_is_one_as_well(watched: Watched) -> None:
     watched.after(0.5, store_behind_s=60.0)
     assert "does not answer" in watched.alarms.alarm(NOT_STORED).condition.reason
 

@@ -56,10 +56,6 @@ def store(database: Callable[[], Path]) -> Iterator[SqliteStore]:
     opened.close()
 
 
-async def test_units_that_are_reported_on_are_no_alarm(store: SqliteStore, host: Any) -> None:
-    assert await Process(store, host).after(100, "U1", "U2") == []
-
-
 async def test_a_unit_of_which_reports_cease_is_one_until_they_come_again(
     store: SqliteStore, host: Any
 ) -> None:
@@ -96,6 +92,6 @@ async def test_the_next_leader_goes_on_with_the_alarm_and_neither_clears_nor_dou
 
 async def test_a_clock_of_another_host_decides_nothing(store: SqliteStore, host: Any) -> None:
     leader = Process(store, host)
-    found = [await leader.after(1, "U1", "U2") for _ in range(40)]
+    found = [await leader.after(1, "U1", "U2") for _ in range(100)]
     assert all(beat.beat_ns == 0 for beat in store.unit_states.beats())
-    assert found == [[]] * 40
+    assert found == [[]] * 100

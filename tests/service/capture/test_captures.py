@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,22 +81,31 @@ async def test_another_alarm_prolongs_the_capture_instead_of_beginning_one(root:
     ]
 
 
-async def test_no_capture_is_longer_than_it_may_be(root: Path) -> None:
+@pytest.mark.parametrize(
+    ("alarms_s", "sent", "expected"),
+    [
+        pytest.param([10, 20], [(0, 200)], [[(35, 75)], [(85, 125)]], id="each alarm its own"),
+        pytest.param(
+            range(10, 21, 2), [(0, 160)], [[(35, 95)], [(85, 125)]], id="twelve seconds at most"
+        ),
+        pytest.param(
+            *([10], [(0, 50), (45, 50), (60, 100)], [[(35, 50), (60, 75)]]),
+            id="samples that are missing or repeated are so in the capture",
+        ),
+    ],
+)
+async def test_captures_hold_no_more_and_no_less_than_they_should(
+    root: Path, alarms_s: list[int], sent: list[tuple[int, int]], expected: Any
+) -> None:
     async with running(root) as rig:
-        chatter = {n: raised((n + 1) / 5) for n in range(49, 100, 10)}
-        rig.send(0, 160, chatter)
-        first, second = await rig.written(2)
+        rig.send(*sent[0], {5 * at_s - 1: raised(at_s) for at_s in alarms_s})
+        for start, stop in sent[1:]:
+            rig.send(start, stop)
+        found = await rig.written(len(expected))
 
-    assert samples(first) == numbers(35, 95)  # twelve seconds
-    assert samples(second) == numbers(85, 125)
-
-
-async def test_the_next_alarm_after_it_begins_a_new_one(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 200, {49: raised(10.0), 99: raised(20.0)})
-        first, second = await rig.written(2)
-
-    assert (samples(first), samples(second)) == (numbers(35, 75), numbers(85, 125))
+    assert [samples(one) for one in found] == [
+        [number for span in spans for number in numbers(*span)] for spans in expected
+    ]
 
 
 async def test_two_units_are_captured_side_by_side(root: Path) -> None:
@@ -127,16 +137,6 @@ async def test_what_samples_do_not_explain_or_nobody_wants_to_see_is_not_capture
         rig.send(0, 100, {49: news})
         assert rig.captures.n_running == 0
     assert not root.exists()
-
-
-async def test_samples_that_are_missing_or_repeated_are_so_in_the_capture(root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 50, {49: raised(10.0)})
-        rig.send(45, 50)  # once more
-        rig.send(60, 100)
-        [recording] = await rig.written(1)
-
-    assert samples(recording) == numbers(35, 50) + numbers(60, 75)
 
 
 async def test_a_device_whose_clock_is_put_back_ends_its_capture_by_count(root: Path) -> None:

@@ -121,38 +121,38 @@ async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
     assert rig.tape.n_shed[Shed.DISK_REFUSED] == 100
 
 
-async def test_samples_that_are_missing_or_repeated_are_so_in_the_recording(
-    running: Any, root: Path
+@pytest.mark.parametrize(
+    ("lives", "expected", "missing"),
+    [
+        pytest.param(
+            [[(0, 10), (5, 10), (12, 30)]], [[(0, 10), (12, 30)]], {"gap": 20}, id="within one"
+        ),
+        pytest.param(
+            [[(0, 45), (55, 60)]], [[(0, 45)], [(55, 60)]], {"gap_before": 100}, id="between two"
+        ),
+        pytest.param(
+            [[(0, 20)], [(33, 40)]], [[(0, 20)], [(33, 40)]], {"not_running": 130}, id="an outage"
+        ),
+        pytest.param(
+            [[(0, 20)], [(10, 30)]], [[(0, 20)], [(20, 30)]], {}, id="once more after a restart"
+        ),
+    ],
+)
+async def test_a_hole_is_told_by_number_and_reason_and_nothing_is_recorded_twice(
+    running: Any, root: Path, lives: Any, expected: Any, missing: dict[str, int]
 ) -> None:
-    async with running(root) as rig:
-        rig.send(0, 10)
-        rig.send(5, 10)
-        rig.send(12, 30)
-    [recording] = rig.recordings()
+    for sent in lives:
+        async with running(root) as rig:
+            for start, stop in sent:
+                rig.send(start, stop)
+    found = rig.recordings()
 
-    assert samples(recording) == numbers(0, 10) + numbers(12, 30)
-    assert [gap.n_samples for gap in summary_of(recording).gaps] == [20]
-
-
-async def test_a_hole_between_two_recordings_is_told_by_the_second(
-    running: Any, root: Path
-) -> None:
-    async with running(root) as rig:
-        rig.send(0, 45)
-        rig.send(55, 60)
-    _, second = rig.recordings()
-
-    assert summary_of(second).rejected == {"gap_before": 100}
-
-
-async def test_the_hole_of_an_outage_is_told_exactly(running: Any, root: Path) -> None:
-    async with running(root) as rig:
-        rig.send(0, 20)
-    async with running(root) as rig:
-        rig.send(33, 40)
-    _, second = rig.recordings()
-
-    assert summary_of(second).rejected == {"not_running": 130}
+    assert [samples(one) for one in found] == [
+        [number for span in spans for number in numbers(*span)] for spans in expected
+    ]
+    summary = summary_of(found[-1])
+    gaps = {"gap": summary.n_gap_samples} if summary.gaps else {}
+    assert {**summary.rejected, **gaps} == missing
 
 
 async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(
@@ -192,18 +192,6 @@ async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
 
     assert aside.name == "U1-20260101T000000.000Z-continuous-00001.damaged"
     assert samples(open_recording(whole)) == numbers(0, 10) + numbers(20, 30)
-
-
-async def test_samples_that_come_once_more_after_a_restart_are_not_recorded_twice(
-    running: Any, root: Path
-) -> None:
-    async with running(root) as rig:
-        rig.send(0, 20)
-    async with running(root) as rig:
-        rig.send(10, 30)
-    first, second = rig.recordings()
-
-    assert samples(first) + samples(second) == numbers(0, 30)
 
 
 async def test_what_another_process_is_writing_of_its_own_units_is_let_alone(
