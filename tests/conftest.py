@@ -20,16 +20,13 @@ import pytest
 import structlog
 import uvloop
 from hypothesis import settings as hypothesis_settings
+from rigs.assessments import assessment as build_assessment
 from scipy.signal import lfilter
 
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.raw import RawBlock
 from core.arrays import FloatArray
-from core.assessment import Assessment, AveragingWindow
-from core.cross_spectrum import average
-from core.quality import GOOD, Reading, Reason, missing
-from core.quantities import CATALOGUE
-from core.speed import SpeedSource
+from core.assessment import Assessment
 from core.stiffness_history import StiffnessHistory
 
 NS_PER_S = 1_000_000_000
@@ -152,35 +149,6 @@ def counting_feed() -> Callable[..., CountingFeed]:
 def counts_calibration() -> Callable[..., UnitCalibration]:
     """Builds calibrations that leave counts as they are."""
     return calibration_in_counts
-
-
-def build_assessment(
-    time_ns: int = 1_767_225_600 * NS_PER_S,
-    unit: str = "U1",
-    bearing: str = "UJB",
-    **readings: Reading | float,
-) -> Assessment:
-    """An assessment in which only the named readings have a value."""
-    given = {
-        name: value if isinstance(value, Reading) else Reading(value)
-        for name, value in readings.items()
-    }
-    everything = {q.name: missing(Reason.NOT_MEASURED) for q in CATALOGUE} | given
-    nothing = average(np.arange(1.0, 3.0), np.zeros((1, 4, 2), complex), np.ones((1, 4), bool))
-    return Assessment(
-        unit=unit,
-        bearing=bearing,
-        time_ns=time_ns,
-        window=AveragingWindow(3, 0, 8192, 1, 24, 0, 1.0, 13.653),
-        speed_source=SpeedSource.SLOW_CHANNEL,
-        quality=GOOD,
-        readings=everything,
-        budgets={},
-        estimators={"xx": None, "yy": None},
-        spectrum=nothing,
-        orbit=None,
-        runout={},
-    )
 
 
 @pytest.fixture(scope="session")

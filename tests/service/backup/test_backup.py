@@ -18,6 +18,7 @@ from service.origin import Origin
 from service.store.port import UnitGap
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.migrating import APPLICATION_IDS
 
 NOW_NS = 1_767_225_600_000_000_000
 HOUR_NS = 3_600_000_000_000
@@ -230,8 +231,8 @@ SPOILT: dict[str, tuple[Callable[[Path], None], str]] = {
         lambda copy: spoil(copy, f"PRAGMA user_version = {len(MIGRATIONS) + 1}"),
         f"has schema {len(MIGRATIONS) + 1}, this padwatch knows up to {len(MIGRATIONS)}",
     ),
-    "another program's": (
-        lambda copy: spoil(copy, "PRAGMA application_id = 7"),
+    "a replay's": (
+        lambda copy: spoil(copy, f"PRAGMA application_id = {APPLICATION_IDS[Origin.REPLAY]}"),
         "is not a database of a live plant",
     ),
     "damaged": (damage, "damaged|malformed"),
@@ -252,14 +253,6 @@ def test_a_copy_that_is_not_whole_or_not_ours_is_refused_and_changes_nothing(
         restore(copy, database, NOW_NS)
 
     assert gaps_in(database) == 150
-
-
-def test_a_replay_is_not_restored_as_a_plants_history(tmp_path: Path, database: Path) -> None:
-    replayed = tmp_path / "replay.sqlite3"
-    SqliteStore(replayed, Origin.REPLAY).close()
-
-    with pytest.raises(BackupError, match="live plant"):
-        restore(replayed, database, NOW_NS)
 
 
 @pytest.mark.usefixtures("copy")

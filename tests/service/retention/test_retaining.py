@@ -60,34 +60,35 @@ def old(stepped_clock: Clock) -> OldStore:
     return OldStore(stepped_clock, stepped_clock.step)  # type: ignore[attr-defined]
 
 
-async def test_bearings_take_turns_until_nothing_is_old(
-    old: OldStore, stepped_clock: Clock
-) -> None:
-    retaining = Retaining(old, LIMITS, stepped_clock)
+@pytest.fixture
+def retaining(old: OldStore, stepped_clock: Clock) -> Retaining:
+    return Retaining(old, LIMITS, stepped_clock)
 
+
+async def test_bearings_take_turns_until_nothing_is_old(
+    old: OldStore, retaining: Retaining
+) -> None:
     assert [await retaining.round() for _ in range(4)] == [True, True, True, False]
     assert old.done == [1, 2] * 4
 
 
-async def test_it_rests_longer_than_it_works(old: OldStore, stepped_clock: Clock) -> None:
+async def test_it_rests_longer_than_it_works(retaining: Retaining, stepped_clock: Clock) -> None:
     begun_s = stepped_clock.monotonic_s()
-    await Retaining(old, LIMITS, stepped_clock).round()
+    await retaining.round()
 
     lasted_s = stepped_clock.monotonic_s() - begun_s
     assert lasted_s == pytest.approx(2.0 * (1.0 + REST_SHARE))
     assert LOOK_S < PERIOD_S
 
 
-async def test_a_store_that_fails_is_asked_again(old: OldStore, stepped_clock: Clock) -> None:
-    retaining = Retaining(old, LIMITS, stepped_clock)
+async def test_a_store_that_fails_is_asked_again(old: OldStore, retaining: Retaining) -> None:
     old.refusal = "disk full"
     assert not await retaining.round()
     old.refusal = None
     assert await retaining.round()
 
 
-async def test_what_cannot_be_deleted_is_told_once(old: OldStore, stepped_clock: Clock) -> None:
-    retaining = Retaining(old, LIMITS, stepped_clock)
+async def test_what_cannot_be_deleted_is_told_once(old: OldStore, retaining: Retaining) -> None:
     old.held_up = "roll-ups are damaged"
     with capture_logs() as lines:
         for _ in range(3):
@@ -97,18 +98,18 @@ async def test_what_cannot_be_deleted_is_told_once(old: OldStore, stepped_clock:
 
 
 async def test_a_clock_that_is_years_ahead_makes_nothing_old(
-    old: OldStore, stepped_clock: Clock
+    old: OldStore, retaining: Retaining, stepped_clock: Clock
 ) -> None:
     stepped_clock.step(20.0 * 365.0 * 86_400.0)  # type: ignore[attr-defined]
-    await Retaining(old, LIMITS, stepped_clock).round()
+    await retaining.round()
     assert old.asked_ns == old.believed
 
 
 async def test_where_there_is_no_day_of_results_nothing_is_old(
-    old: OldStore, stepped_clock: Clock
+    old: OldStore, retaining: Retaining
 ) -> None:
     old.believed = None
-    assert not await Retaining(old, LIMITS, stepped_clock).round()
+    assert not await retaining.round()
     assert old.done == []
 
 

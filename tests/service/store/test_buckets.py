@@ -95,14 +95,6 @@ def test_a_range_never_takes_more_buckets_than_asked_for(
     assert inside[1] // width_ns - inside[0] // width_ns + 1 <= max_points
 
 
-def test_a_bucket_without_readings_between_two_with_some_is_empty() -> None:
-    trend = bucketed(readings_of([(0, 1.0, Level.GOOD), (25, 3.0, Level.GOOD)]), SECOND_NS)
-
-    assert list(trend.series["q"].mean) == [1.0, None, 3.0]
-    assert list(trend.series["q"].count) == [1, 0, 1]
-    assert list(trend.series["q"].worst_level) == [Level.GOOD, None, Level.GOOD]
-
-
 def test_no_reading_at_all_makes_no_bucket() -> None:
     trend = bucketed(readings_of([]), SECOND_NS)
 

@@ -15,23 +15,17 @@ REFUSED = Answer(CommandState.REFUSED, "it does not fit")
 NOW_NS = 10**18 + 1
 
 
-def test_an_open_command_is_read_as_it_was_asked_by_whoever_has_its_unit(
+def test_open_commands_are_read_as_they_were_asked_in_that_order_by_whoever_has_their_unit(
     store: SqliteStore,
 ) -> None:
-    store.commands.ask(COMMAND)
-
-    assert store.commands.open(["U1"]) == [OpenCommand(COMMAND, None)]
-    assert store.commands.open(["U2"]) == []
-    assert store.commands.look("c1") == Answer(CommandState.WAITING, "")
-    assert store.commands.look("c9") is None
-
-
-def test_commands_are_read_in_the_order_in_which_they_were_asked(store: SqliteStore) -> None:
     later = replace(COMMAND, id="a", asked_ns=COMMAND.asked_ns + 1)
     store.commands.ask(later)
     store.commands.ask(COMMAND)
 
-    assert [found.command.id for found in store.commands.open(["U1"])] == ["c1", "a"]
+    assert store.commands.open(["U1"]) == [OpenCommand(COMMAND, None), OpenCommand(later, None)]
+    assert store.commands.open(["U2"]) == []
+    assert store.commands.look("c1") == Answer(CommandState.WAITING, "")
+    assert store.commands.look("c9") is None
 
 
 def test_what_is_answered_stays_answered(store: SqliteStore) -> None:
@@ -44,20 +38,16 @@ def test_what_is_answered_stays_answered(store: SqliteStore) -> None:
     assert store.commands.open(["U1"]) == []
 
 
-def test_a_withdrawn_command_is_not_taken(store: SqliteStore) -> None:
-    store.commands.ask(COMMAND)
+def test_a_withdrawn_command_is_not_taken_and_a_taken_one_not_withdrawn(store: SqliteStore) -> None:
+    for id_ in ("c1", "c2"):
+        store.commands.ask(replace(COMMAND, id=id_))
 
     assert store.commands.withdraw("c1", "nobody did it", NOW_NS)
     assert not store.commands.take("c1", "one")
     assert store.commands.look("c1") == Answer(CommandState.WITHDRAWN, "nobody did it")
-
-
-def test_a_taken_command_is_not_withdrawn(store: SqliteStore) -> None:
-    store.commands.ask(COMMAND)
-
-    assert store.commands.take("c1", "one")
-    assert not store.commands.withdraw("c1", "too late", NOW_NS)
-    assert store.commands.open(["U1"]) == [OpenCommand(COMMAND, "one")]
+    assert store.commands.take("c2", "one")
+    assert not store.commands.withdraw("c2", "too late", NOW_NS)
+    assert store.commands.open(["U1"]) == [OpenCommand(replace(COMMAND, id="c2"), "one")]
 
 
 def test_a_command_is_answered_with_the_events_that_it_has_caused_or_not_at_all(

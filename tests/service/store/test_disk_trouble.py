@@ -7,8 +7,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from rigs.assessments import assessment
 from rigs.rolled_trends import n_rows
-from rigs.store_fixtures import Build, at
+from rigs.store_fixtures import at
 
 from core.assessment import Assessment
 from service.store.port import StoreError
@@ -38,9 +39,7 @@ def stored_of(store: SqliteStore, batches: list[list[Assessment]]) -> tuple[int,
     pytest.fail("nothing was refused")
 
 
-def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(
-    path: Path, assessment: Build
-) -> None:
+def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(path: Path) -> None:
     batch = [[assessment(at(10 * n + i), speed_rpm=1.0) for i in range(10)] for n in range(100)]
     with closing(SqliteStore(path)) as store:
         first = store._writer
@@ -77,9 +76,7 @@ def test_a_read_that_takes_too_long_is_ended(path: Path) -> None:
     slow.close()
 
 
-def test_the_log_is_cut_after_a_long_read(
-    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_log_is_cut_after_a_long_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limit = 2_000_000
     monkeypatch.setattr(writer, "MAX_LOG_BYTES", limit)
     log = path.with_name(path.name + "-wal")
@@ -99,9 +96,7 @@ def test_the_log_is_cut_after_a_long_read(
         assert log.stat().st_size <= limit
 
 
-def test_room_that_becomes_free_is_given_back(
-    path: Path, assessment: Build, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_room_that_becomes_free_is_given_back(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writer, "MIN_FREE_PAGES", 20)
     with closing(SqliteStore(path)) as store:
         store.append([assessment(at(i), speed_rpm=1.0) for i in range(400)], [])

@@ -1,17 +1,13 @@
 """The database file: what is foreign, newer or damaged is refused, what was appended is there."""
 
-import os
-import signal
 import sqlite3
-import subprocess
-import sys
 import threading
-from contextlib import closing
 from pathlib import Path
 
 import pytest
+from rigs.assessments import assessment
 from rigs.rolled_trends import n_rows
-from rigs.store_fixtures import Build, Execute, at, gap, query
+from rigs.store_fixtures import Execute, at, gap, query
 
 from service.origin import Origin
 from service.store.port import StoreError
@@ -29,39 +25,8 @@ def test_every_append_is_written_through_to_the_disk(store: SqliteStore, path: P
     )
 
 
-def test_what_was_appended_survives_kill_9(path: Path) -> None:
-    writer = subprocess.Popen(
-        [sys.executable, "-c", WRITE_AND_WAIT, str(path)],
-        stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
-    )
-    assert writer.stdout is not None
-    said = writer.stdout.readline()
-    writer.send_signal(signal.SIGKILL)
-    writer.wait()
-    writer.stdout.close()
-
-    assert said == b"appended\n"
-    with closing(SqliteStore(path)) as store:
-        assert [gap.first_index for gap in store.gaps("U1", 0, 1000)] == list(range(100))
-
-
-WRITE_AND_WAIT = """
-import sys, time
-from pathlib import Path
-from core.account import Gap
-from service.store.port import UnitGap
-from service.store.sqlite import SqliteStore
-store = SqliteStore(Path(sys.argv[1]))
-for n in range(100):
-    store.append([], [UnitGap("U1", Gap(3, n, 1, n))])
-print("appended", flush=True)
-time.sleep(60)
-"""
-
-
 def test_a_batch_is_stored_whole_or_not_at_all(
-    store: SqliteStore, path: Path, execute: Execute, assessment: Build
+    store: SqliteStore, path: Path, execute: Execute
 ) -> None:
     execute("CREATE TRIGGER refuse BEFORE INSERT ON gap BEGIN SELECT RAISE(ABORT, 'no gaps'); END;")
 
@@ -75,7 +40,7 @@ def test_a_batch_is_stored_whole_or_not_at_all(
 
 
 def test_a_full_disk_is_an_error_and_the_store_recovers_when_there_is_room(
-    store: SqliteStore, path: Path, assessment: Build
+    store: SqliteStore, path: Path
 ) -> None:
     n_pages = store._writer.execute("PRAGMA page_count").fetchone()[0]
     store._writer.execute(f"PRAGMA max_page_count = {n_pages}")
@@ -90,7 +55,7 @@ def test_a_full_disk_is_an_error_and_the_store_recovers_when_there_is_room(
 
 
 def test_a_commit_that_is_refused_leaves_no_transaction_behind(
-    store: SqliteStore, path: Path, execute: Execute, assessment: Build
+    store: SqliteStore, path: Path, execute: Execute
 ) -> None:
     execute("CREATE TABLE child (x REFERENCES layout (id) DEFERRABLE INITIALLY DEFERRED)")
     execute(
@@ -106,7 +71,7 @@ def test_a_commit_that_is_refused_leaves_no_transaction_behind(
     assert n_rows(path, "assessment") == 1
 
 
-def test_trends_are_read_while_others_are_written(store: SqliteStore, assessment: Build) -> None:
+def test_trends_are_read_while_others_are_written(store: SqliteStore) -> None:
     n_batches, per_batch = 20, 20
     lengths: list[int] = []
     first_written = threading.Event()
@@ -129,21 +94,6 @@ def test_trends_are_read_while_others_are_written(store: SqliteStore, assessment
     assert len(store.trend(query("speed_rpm")).time_ns) == n_batches * per_batch
     assert lengths == sorted(lengths)
     assert all(length % per_batch == 0 for length in lengths)
-
-
-def test_a_long_reader_does_not_hold_up_the_writer(
-    store: SqliteStore, path: Path, assessment: Build
-) -> None:
-    store.append([assessment(at(0), speed_rpm=1.0)], [])
-    reader = sqlite3.connect(path)
-    reader.execute("BEGIN")
-    seen = reader.execute("SELECT count(*) FROM assessment").fetchone()
-
-    store.append([assessment(at(1), speed_rpm=1.0)], [])
-
-    assert seen == reader.execute("SELECT count(*) FROM assessment").fetchone() == (1,)
-    reader.close()
-    assert n_rows(path, "assessment") == 2
 
 
 def test_a_closed_database_is_one_whole_file_also_after_reads(tmp_path: Path) -> None:

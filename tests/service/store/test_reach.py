@@ -1,9 +1,9 @@
 """How far results reach is known after a stop, and with it what is missing since."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from rigs.assessments import assessment
 from rigs.store_fixtures import at
 
 from core.account import Gap
@@ -11,13 +11,8 @@ from core.outage import Reach
 from service.store.port import UnitGap
 
 
-def test_nothing_stored_reaches_nowhere(store: Any) -> None:
+def test_results_reach_as_far_as_the_newest_of_any_bearing(store: Any) -> None:
     assert store.reach("U1") is None
-
-
-def test_results_reach_as_far_as_the_newest_of_any_bearing(
-    store: Any, assessment: Callable[..., Any]
-) -> None:
     found = [assessment(at(n), speed_rpm=90.0) for n in range(3)]
     windows = [replace(a.window, epoch=7, stop_index=1000 * n + 1000) for n, a in enumerate(found)]
     results = [replace(a, window=w) for a, w in zip(found, windows, strict=True)]
@@ -28,9 +23,7 @@ def test_results_reach_as_far_as_the_newest_of_any_bearing(
     assert store.reach("U1") == Reach(7, 9000, at(5))
 
 
-def test_gaps_behind_the_newest_result_are_known_as_they_were_recorded(
-    store: Any, assessment: Callable[..., Any]
-) -> None:
+def test_gaps_behind_the_newest_result_are_known_as_they_were_recorded(store: Any) -> None:
     found = assessment(at(1), speed_rpm=90.0)
     store.append([replace(found, window=replace(found.window, epoch=7, stop_index=1000))], [])
     behind = (

@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from rigs.store_fixtures import Build, at
+from rigs.assessments import assessment
+from rigs.store_fixtures import at
 
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
@@ -113,9 +114,7 @@ def test_a_reference_that_makes_no_sense_is_an_error_of_the_store(store: SqliteS
         store.references()
 
 
-def test_the_newest_readings_come_with_their_qualities(
-    store: SqliteStore, assessment: Build
-) -> None:
+def test_the_newest_readings_come_with_their_qualities(store: SqliteStore) -> None:
     doubtful = Reading(1998.5, uncertain(Reason.NON_STATIONARY))
     store.append([assessment(at(2), gap_x_um=doubtful, gap_y_um=2003.1)], [])
     store.append([assessment(at(1), gap_x_um=7.0)], [])

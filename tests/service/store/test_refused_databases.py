@@ -6,7 +6,8 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from rigs.store_fixtures import Build, Execute, at
+from rigs.assessments import assessment
+from rigs.store_fixtures import Execute, at
 
 from service.origin import Origin
 from service.store.port import StoreError
@@ -54,7 +55,7 @@ def test_a_file_that_is_no_database_is_refused(path: Path) -> None:
         SqliteStore(path)
 
 
-def test_a_truncated_database_is_refused(path: Path, assessment: Build) -> None:
+def test_a_truncated_database_is_refused(path: Path) -> None:
     store = SqliteStore(path)
     store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
     store.close()
@@ -64,18 +65,6 @@ def test_a_truncated_database_is_refused(path: Path, assessment: Build) -> None:
         path.write_bytes(whole[:n_bytes])
         with pytest.raises(StoreError, match=f"{path}: "):
             SqliteStore(path)
-
-
-def test_a_folder_in_the_place_of_the_database_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="is a folder: move it away"):
-        SqliteStore(tmp_path)
-
-
-def test_a_file_in_the_place_of_the_data_folder_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "data").write_text("")
-
-    with pytest.raises(StoreError, match="a file is in its place"):
-        SqliteStore(tmp_path / "data" / "padwatch.sqlite3")
 
 
 @pytest.mark.parametrize(("first", "then"), list(itertools.permutations(Origin)))

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs.store_fixtures import Build, Execute, at
+from rigs.assessments import assessment
+from rigs.store_fixtures import Execute, at
 
 from service.background import LOOK_S
 from service.heartbeats import PATIENCE_S, Heartbeats
@@ -28,7 +29,7 @@ def _few_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _filled(path: Path, assessment: Build) -> None:
+def _filled(path: Path) -> None:
     with closing(SqliteStore(path)) as store:
         store.append([assessment(at(n), speed_rpm=float(n)) for n in range(N)], [])
 

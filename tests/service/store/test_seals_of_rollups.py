@@ -5,8 +5,9 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from rigs.assessments import assessment
 from rigs.rolled_trends import gather_all
-from rigs.store_fixtures import Build, Execute
+from rigs.store_fixtures import Execute
 
 from service.store.port import TrendQuery
 from service.store.seals.damage import Place
@@ -19,7 +20,7 @@ LATER_NS = 1 << 62
 
 
 @pytest.fixture
-def store(path: Path, assessment: Build) -> Iterator[SqliteStore]:
+def store(path: Path) -> Iterator[SqliteStore]:
     """One reading a minute, of as many turns a minute as minutes have passed."""
     with closing(SqliteStore(path)) as opened:
         readings = [

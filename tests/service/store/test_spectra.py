@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rigs.store_fixtures import Build, Execute
+from rigs.assessments import assessment
+from rigs.store_fixtures import Execute
 
 from core.arrays import FloatArray
 from core.assessment import Assessment
@@ -35,16 +36,11 @@ def spectrum(n_lines: int = 8, scale_um: float = 1.0, lost: tuple[int, ...] = ()
     return CrossSpectrum(frequency_hz, power.astype(complex), power, np.outer(usable, usable))
 
 
-@pytest.fixture
-def found(assessment: Build) -> Build:
-    """Builds assessments with a spectrum, at seconds since the start."""
-
-    def build(at_s: float, bearing: str = "UJB", **of_spectrum: object) -> Assessment:
-        made = assessment(T0 + round(at_s * S), bearing=bearing, speed_rpm=92.3, power_mw=350.0)
-        condition = BearingCondition(OperatingState.PART_LOAD, True, None)
-        return replace(made, spectrum=spectrum(**of_spectrum), condition=condition)  # type: ignore[arg-type]
-
-    return build
+def found(at_s: float, bearing: str = "UJB", **of_spectrum: object) -> Assessment:
+    """An assessment with a spectrum, at seconds since the start."""
+    made = assessment(T0 + round(at_s * S), bearing=bearing, speed_rpm=92.3, power_mw=350.0)
+    condition = BearingCondition(OperatingState.PART_LOAD, True, None)
+    return replace(made, spectrum=spectrum(**of_spectrum), condition=condition)  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -80,9 +76,7 @@ def test_an_amplitude_comes_back_within_two_hundredths_of_a_percent(
     assert np.all(back[~told] == 0.0)
 
 
-def test_a_spectrum_comes_back_with_what_it_was_found_under(
-    kept: SqliteStore, found: Build
-) -> None:
+def test_a_spectrum_comes_back_with_what_it_was_found_under(kept: SqliteStore) -> None:
     kept.append([found(5.0)], [])
 
     [one] = read(kept).spectra
@@ -97,7 +91,7 @@ def test_a_spectrum_comes_back_with_what_it_was_found_under(
 
 
 def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving(
-    kept: SqliteStore, found: Build
+    kept: SqliteStore,
 ) -> None:
     kept.append([found(0.0, lost=(1,)), found(120.0, lost=(0, 1, 2, 3))], [])
 
@@ -106,9 +100,7 @@ def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving
     assert np.isnan(one.amplitude_um_pk).all(axis=1).tolist() == [False, True, False, False]
 
 
-def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(
-    kept: SqliteStore, found: Build
-) -> None:
+def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(kept: SqliteStore) -> None:
     kept.append([found(12.0 * n) for n in range(16)], [])
     kept.append([found(12.0 * n) for n in range(16)], [])  # the answer to the first got lost
 
@@ -116,7 +108,7 @@ def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(
 
 
 def test_old_spectra_thin_out_and_their_number_stays_bounded(
-    kept: SqliteStore, execute: Execute, found: Build
+    kept: SqliteStore, execute: Execute
 ) -> None:
     for minute in range(60):
         kept.append([found(60.0 * minute), found(60.0 * minute, "LJB")], [])
@@ -130,9 +122,7 @@ def test_old_spectra_thin_out_and_their_number_stays_bounded(
     assert per_tier == {Tier.DENSE: 10, Tier.SPARSE: 8}
 
 
-def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(
-    kept: SqliteStore, found: Build
-) -> None:
+def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(kept: SqliteStore) -> None:
     for n in range(5):
         kept.append([found(3e8 + 60.0 * n)], [])
     for n in range(5):
@@ -141,9 +131,7 @@ def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(
     assert times_s(read(kept)) == [0.0, 60.0, 120.0, 180.0, 240.0]
 
 
-def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(
-    path: Path, found: Build
-) -> None:
+def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(path: Path) -> None:
     for at_s in (0.0, 30.0, 60.0):
         with closing(SqliteStore(path, spectra=LIMITS)) as store:
             store.append([found(at_s)], [])
@@ -152,16 +140,14 @@ def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(
         assert times_s(read(store)) == [0.0, 60.0]
 
 
-def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(kept: SqliteStore, found: Build) -> None:
+def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(kept: SqliteStore) -> None:
     kept.append([found(at_s) for at_s in (0.0, 60.0, 86_400.0)], [])
 
     assert times_s(read(kept)) == [0.0, 60.0, 86_400.0]
     assert times_s(read(kept, start_s=60.0, end_s=86_400.0)) == [60.0]
 
 
-def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(
-    path: Path, found: Build
-) -> None:
+def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(path: Path) -> None:
     with closing(SqliteStore(path)) as store:
         store.append([found(60.0 * n) for n in range(101)], [])
 
@@ -171,7 +157,7 @@ def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(
     assert times_s(spectra) == [0.0, 1500.0, 3000.0, 4500.0, 6000.0]
 
 
-def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore, found: Build) -> None:
+def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore) -> None:
     kept.append([found(0.0, n_lines=50)], [])
 
     assert read(kept).spectra[0].resolution == (0.1, 12)
@@ -189,7 +175,7 @@ def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore, found: Build) ->
     ],
 )
 def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
-    kept: SqliteStore, execute: Execute, found: Build, damage: str
+    kept: SqliteStore, execute: Execute, damage: str
 ) -> None:
     kept.append([found(0.0), found(60.0)], [])
     execute(f"UPDATE spectrum SET {damage} WHERE time_ns = {T0 + 60 * S}")  # noqa: S608
@@ -200,9 +186,7 @@ def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
     assert list(spectra.damaged_ns) == [T0 + 60 * S]
 
 
-def test_a_result_without_a_spectrum_is_stored_without_one(
-    kept: SqliteStore, assessment: Build
-) -> None:
+def test_a_result_without_a_spectrum_is_stored_without_one(kept: SqliteStore) -> None:
     empty = np.empty((0, 4, 4))
     none = CrossSpectrum(np.empty(0), empty.astype(complex), empty, np.zeros((4, 4), np.int64))
     kept.append([replace(assessment(T0, speed_rpm=missing(Reason.STALE)), spectrum=none)], [])

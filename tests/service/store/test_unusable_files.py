@@ -17,33 +17,16 @@ NOBODY = 65534
 DATABASE = "padwatch.sqlite3"
 
 
-def read_only_file(data: Path) -> None:
+def database_in(data: Path) -> Path:
+    """Make a database in a data folder."""
     SqliteStore(data / DATABASE).close()
-    (data / DATABASE).chmod(0o444)
-
-
-def unreadable_file(data: Path) -> None:
-    SqliteStore(data / DATABASE).close()
-    (data / DATABASE).chmod(0)
-
-
-def read_only_folder(data: Path) -> None:
-    SqliteStore(data / DATABASE).close()
-    data.chmod(0o555)
+    return data / DATABASE
 
 
 def log_of_somebody_else(data: Path) -> None:
-    SqliteStore(data / DATABASE).close()
-    (data / f"{DATABASE}-wal").touch()
-    (data / f"{DATABASE}-wal").chmod(0o400)
-
-
-def folder_without_permission(data: Path) -> None:
-    data.chmod(0)
-
-
-def directory_in_its_place(data: Path) -> None:
-    (data / DATABASE).mkdir()
+    log = data / f"{database_in(data).name}-wal"
+    log.touch()
+    log.chmod(0o400)
 
 
 def file_in_place_of_the_folder(data: Path) -> None:
@@ -56,15 +39,29 @@ def folder_that_cannot_be_made(data: Path) -> None:
     data.parent.chmod(0o555)
 
 
-CASES: dict[Callable[[Path], None], str] = {
-    read_only_file: "may not read and write {data}/padwatch.sqlite3: give it to that user",
-    unreadable_file: "may not read and write {data}/padwatch.sqlite3: give it to that user",
-    read_only_folder: "may not make files in {data}: give it to that user",
-    log_of_somebody_else: "may not read and write {data}/padwatch.sqlite3-wal: give it to",
-    folder_without_permission: "may not look into or make the folder {data}: give it to that user",
-    directory_in_its_place: "{data}/padwatch.sqlite3 is a folder: move it away",
-    file_in_place_of_the_folder: "{data} cannot be a folder, for a file is in its place: move it",
-    folder_that_cannot_be_made: "may not look into or make the folder {data}: give it to that user",
+GIVE_FILE = "may not read and write {data}/padwatch.sqlite3: give it to that user"
+GIVE_FOLDER = "may not look into or make the folder {data}: give it to that user"
+CASES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "read-only file": (lambda data: database_in(data).chmod(0o444), GIVE_FILE),
+    "unreadable file": (lambda data: database_in(data).chmod(0), GIVE_FILE),
+    "read-only folder": (
+        lambda data: database_in(data).parent.chmod(0o555),
+        "may not make files in {data}: give it to that user",
+    ),
+    "log of somebody else": (
+        log_of_somebody_else,
+        "may not read and write {data}/padwatch.sqlite3-wal: give it to",
+    ),
+    "folder without permission": (lambda data: data.chmod(0), GIVE_FOLDER),
+    "directory in its place": (
+        lambda data: (data / DATABASE).mkdir(),
+        "{data}/padwatch.sqlite3 is a folder: move it away",
+    ),
+    "file in place of the folder": (
+        file_in_place_of_the_folder,
+        "{data} cannot be a folder, for a file is in its place: move it",
+    ),
+    "folder that cannot be made": (folder_that_cannot_be_made, GIVE_FOLDER),
 }
 
 
@@ -78,7 +75,7 @@ def place() -> Iterator[Path]:
     shutil.rmtree(folder)
 
 
-def prepared(folder: Path, plant_text: str, prepare: Callable[[Path], None]) -> Path:
+def prepared(folder: Path, plant_text: str, prepare: Callable[[Path], object]) -> Path:
     """A plant file whose data folder has something wrong with it, all of it nobody's."""
     data = folder / "data"
     data.mkdir(parents=True)
@@ -107,17 +104,18 @@ def as_nobody() -> Iterator[None]:
             os.setresgid(0, 0, 0)
 
 
-@pytest.mark.parametrize("prepare", CASES)
+@pytest.mark.parametrize("name", CASES)
 def test_each_is_told_in_one_sentence_with_what_to_do(
-    place: Path, plant_text: str, prepare: Callable[[Path], None]
+    place: Path, plant_text: str, name: str
 ) -> None:
+    prepare, said = CASES[name]
     place.chmod(0o755)
     plant = prepared(place / "plant", plant_text, prepare)
     with as_nobody():
         result = CliRunner().invoke(app, ["run", str(plant), "--port", "0"])
 
     assert result.exit_code == 1, result.output
-    assert CASES[prepare].format(data=plant.parent / "data") in result.stderr
+    assert said.format(data=plant.parent / "data") in result.stderr
     assert result.stderr.count("\n") == 1, result.stderr
 
 

@@ -88,22 +88,18 @@ def test_a_message_of_somebody_else_is_refused_with_what_to_do(
     assert refused.value.kind == kind
 
 
-def test_a_message_of_a_later_version_asks_for_an_upgrade(
-    block: SampleBlock, identity: UnitIdentity
+@pytest.mark.parametrize(
+    ("place", "number", "kind", "words"),
+    [(4, 9, "other_version", "version 9.*upgrade `padwatch"), (6, 77, "unknown_kind", "77")],
+)
+def test_a_message_of_a_later_version_asks_for_an_upgrade_and_an_unknown_kind_is_refused(
+    block: SampleBlock, identity: UnitIdentity, place: int, number: int, kind: str, words: str
 ) -> None:
     message = bytearray(encoded_block(block, identity, TAKEN_NS)[:-4])
-    message[4:6] = struct.pack("<H", 9)
-    with pytest.raises(WireError, match=r"version 9.*upgrade `padwatch analyse`") as refused:
+    message[place : place + 2] = struct.pack("<H", number)
+    with pytest.raises(WireError, match=words) as refused:
         decoded(with_crc(bytes(message)), identity)
-    assert refused.value.kind == "other_version"
-
-
-def test_an_unknown_kind_is_refused(block: SampleBlock, identity: UnitIdentity) -> None:
-    message = bytearray(encoded_block(block, identity, TAKEN_NS)[:-4])
-    message[6:8] = struct.pack("<H", 77)
-    with pytest.raises(WireError) as refused:
-        decoded(with_crc(bytes(message)), identity)
-    assert refused.value.kind == "unknown_kind"
+    assert refused.value.kind == kind
 
 
 def forged(head: bytes, samples: bytes, kind: int = 1) -> bytes:

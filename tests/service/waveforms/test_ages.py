@@ -1,5 +1,7 @@
 """From when on recordings are old, whatever clocks have said."""
 
+from dataclasses import replace
+
 from service.store.waveform_port import WaveformFile, WaveformKind
 from service.waveforms.ages import NotOldFrom
 
@@ -39,6 +41,15 @@ def test_a_recording_during_which_a_clock_was_set_is_no_day_of_recordings() -> N
     across = file_of(NOW_NS + YEAR_NS, YEAR_NS)
 
     assert old([*day_of(NOW_NS), across], NOW_NS + YEAR_NS) == []
+
+
+def test_what_a_device_records_in_the_year_2000_is_as_old_as_when_it_was_found() -> None:
+    begun_anew = [
+        replace(file_of(NOW_NS - 26 * YEAR_NS), changed_ns=NOW_NS - days * DAY_NS)
+        for days in (2, 4)
+    ]
+
+    assert old([*day_of(NOW_NS), *begun_anew]) == begun_anew[1:]
 
 
 def test_a_clock_that_is_behind_makes_less_old() -> None:

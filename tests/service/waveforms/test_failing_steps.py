@@ -23,30 +23,25 @@ FULL = DiskSpace(1, 10**12, 0)
 DAY_S = 86_400.0
 
 
-class Refusing:
-    """A store that takes nothing while it is away."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.is_away, put = False, StoredWaveforms.put
-
-        def refused(stored: StoredWaveforms, files: Sequence[WaveformFile]) -> None:
-            if self.is_away:
-                raise StoreError("database or disk is full")
-            put(stored, files)
-
-        monkeypatch.setattr(StoredWaveforms, "put", refused)
-
-
 @pytest.fixture
-def index(monkeypatch: pytest.MonkeyPatch) -> Refusing:
-    return Refusing(monkeypatch)
+def index(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """The index, which takes nothing while it is away."""
+    index, put = SimpleNamespace(is_away=False), StoredWaveforms.put
+
+    def refused(stored: StoredWaveforms, files: Sequence[WaveformFile]) -> None:
+        if index.is_away:
+            raise StoreError("database or disk is full")
+        put(stored, files)
+
+    monkeypatch.setattr(StoredWaveforms, "put", refused)
+    return index
 
 
 def files_in(root: Path) -> list[str]:
     return sorted(path.parent.name for path in root.rglob("samples.parquet"))
 
 
-def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig: Any, index: Refusing) -> None:
+def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig: Any, index: Any) -> None:
     for hour in range(3):
         rig.make(hour)
     rig.caretaker.look()
@@ -69,7 +64,7 @@ def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig: Any, index
 
 
 def test_what_could_not_be_told_before_a_restart_is_not_taken_for_a_loss(
-    rig: Any, index: Refusing
+    rig: Any, index: Any
 ) -> None:
     rig.make(0)
     rig.caretaker.look()
@@ -85,7 +80,7 @@ def test_what_could_not_be_told_before_a_restart_is_not_taken_for_a_loss(
 
 
 def test_one_that_comes_back_before_its_removal_was_told_is_there(
-    rig: Any, index: Refusing, tmp_path: Path
+    rig: Any, index: Any, tmp_path: Path
 ) -> None:
     folder = rig.make(0)
     shutil.copytree(folder, tmp_path / "copy")
@@ -204,7 +199,7 @@ def test_a_disk_that_does_not_say_leaves_the_others_measured(rig: Any) -> None:
     assert rig.names() == []
 
 
-def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Refusing) -> None:
+def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> None:
     keeper = WaveformKeeper(rig.gauge, lambda: rig.caretaker, rig.clock, WatchKeeping(rig.root))
     parts: Any = SimpleNamespace(
         store_error=None, behind_s=0.0, n_unstored=0, depth=0, capacity=1, oldest_wait_s=0.0

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from service.store.waveform_port import WaveformKind
+from service.store.waveform_port import WaveformKind, WaveformState
 from service.waveforms.caretaker import Caretaker
 from service.waveforms.keeper import WaveformKeeper
 from service.waveforms.place import place_of
@@ -48,14 +48,17 @@ def test_only_one_process_looks_after_a_folder_and_another_takes_over(rig: Any) 
     second.close()
 
 
-def test_a_disk_that_is_away_is_told_and_looked_for_again(rig: Any, tmp_path: Path) -> None:
+def test_a_disk_that_is_away_is_told_and_its_recordings_are_not_given_up(
+    rig: Any, tmp_path: Path
+) -> None:
     rig.make(0)
     keeper = keeper_of(rig)
     keeper.look()
     rig.roots[CONTINUOUS].rename(tmp_path / "unmounted")
     keeper.look()
     assert keeper.trouble is not None
-    assert "is not there" in keeper.trouble
+    assert "folder of 1 recordings is not there" in keeper.trouble
+    assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
     (tmp_path / "unmounted").rename(rig.roots[CONTINUOUS])
     keeper.look()
 

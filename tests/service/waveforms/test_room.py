@@ -79,32 +79,3 @@ def test_what_cannot_be_read_is_not_the_oldest_for_that(rig: Any) -> None:
     rig.caretaker.look()
 
     assert [file.name for file in rig.files()] == [f"{broken.name}.damaged"]
-
-
-def test_a_clock_that_stamps_recordings_too_is_believed_after_a_day_of_them(rig: Any) -> None:
-    kept = rig.make_day(0)
-    rig.limit(continuous_days=1.0)
-    rig.caretaker.look()
-    rig.clock.s = 366 * 86_400.0
-    rig.make(365 * 24)
-    rig.caretaker.look()
-    assert rig.names() == [*kept, "U1-8760-continuous"]
-    ahead = rig.make_day(365 * 24 + 1)
-    rig.caretaker.look()
-
-    assert rig.names() == ["U1-8760-continuous", *ahead]
-
-
-def test_what_a_device_records_in_the_year_2000_is_kept_as_long_as_all_else(rig: Any) -> None:
-    rig.limit(continuous_days=1.0)
-    rig.make_day(0)
-    rig.clock.s = 86_400.0
-    rig.caretaker.look()
-    begun_anew = rig.make(-26 * 366 * 24)
-    rig.caretaker.look()
-    assert begun_anew.exists()
-    rig.make_day(48)
-    rig.clock.s = 3 * 86_400.0
-    rig.caretaker.look()
-
-    assert not begun_anew.exists()

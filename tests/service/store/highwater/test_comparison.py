@@ -17,10 +17,6 @@ def only(found: list[MarkFinding]) -> MarkFinding:
     return finding
 
 
-def test_nothing_is_said_of_the_database_that_was_here_last(mark: Build) -> None:
-    assert compared(mark(), mark(), "host") == []
-
-
 @pytest.mark.parametrize("n_behind", [1, MAX_BEHIND])
 def test_a_crash_between_transaction_and_mark_is_nothing_to_tell(
     mark: Build, n_behind: int
@@ -74,8 +70,10 @@ def test_a_copied_machine_is_told(mark: Build) -> None:
     assert only(compared(mark(), mark(), "clone")).kind is Kind.OTHER_HOST
 
 
-@pytest.mark.parametrize(("before", "now"), [("", "host"), ("host", ""), ("", "")])
-def test_machines_without_a_name_are_not_taken_for_others(
+@pytest.mark.parametrize(
+    ("before", "now"), [("host", "host"), ("", "host"), ("host", ""), ("", "")]
+)
+def test_the_same_machine_and_those_without_a_name_are_not_taken_for_others(
     mark: Build, before: str, now: str
 ) -> None:
     assert compared(mark(host=before), mark(host=before), now) == []

@@ -3,14 +3,15 @@
 from contextlib import closing
 
 from harness.places import PostgresPlace
-from rigs.store_fixtures import Build, at, query
+from rigs.assessments import assessment
+from rigs.store_fixtures import at, query
 
 from service.audit.entry import Deed
 from service.store.postgres.trail import server_trail
 
 
 def test_a_dump_of_a_live_database_is_put_back_with_all_that_it_guards(
-    own_place: PostgresPlace, assessment: Build
+    own_place: PostgresPlace,
 ) -> None:
     server, dump = own_place.server, own_place.server.folder / "padwatch.dump"
     with closing(own_place.open()) as store:

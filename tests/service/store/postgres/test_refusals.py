@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from harness.places import PostgresPlace
 from harness.postgres_server import PostgresServer
-from rigs.store_fixtures import Build
+from rigs.assessments import assessment
 
 from service.origin import Origin
 from service.store import schema
@@ -187,7 +187,7 @@ def test_a_query_that_takes_too_long_ends_with_a_sentence(
 
 
 def test_a_full_disk_is_named_as_such(
-    postgres_store: PostgresStore, postgres_place: PostgresPlace, assessment: Build
+    postgres_store: PostgresStore, postgres_place: PostgresPlace
 ) -> None:
     postgres_place.execute(
         "CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from harness.places import PostgresPlace
+from rigs.assessments import assessment
 from rigs.store_fixtures import Build
 
 from core.assessment import Assessment
@@ -57,7 +58,7 @@ def all_write(place: PostgresPlace, folder: Path, build: Build) -> list[int]:
 
 
 def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(
-    postgres_place: PostgresPlace, tmp_path: Path, assessment: Build
+    postgres_place: PostgresPlace, tmp_path: Path
 ) -> None:
     assert all_write(postgres_place, tmp_path, assessment) == [0] * N_PROCESSES
 

@@ -7,7 +7,8 @@ import psycopg
 import pytest
 from harness.cutting_proxy import CuttingProxy
 from harness.places import PostgresPlace
-from rigs.store_fixtures import Build, at, query
+from rigs.assessments import assessment
+from rigs.store_fixtures import at, query
 
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore
@@ -23,7 +24,7 @@ def stored(place: PostgresPlace) -> list[int]:
 
 
 def test_a_commit_whose_answer_is_lost_is_looked_up_and_counts_once(
-    cut_store: PostgresStore, proxy: CuttingProxy, postgres_place: PostgresPlace, assessment: Build
+    cut_store: PostgresStore, proxy: CuttingProxy, postgres_place: PostgresPlace
 ) -> None:
     for number in range(N_CUTS):
         proxy.cut_at(COMMIT, reaches=True)
@@ -34,7 +35,7 @@ def test_a_commit_whose_answer_is_lost_is_looked_up_and_counts_once(
 
 
 def test_a_commit_that_never_reached_the_server_is_an_error_and_the_next_write_works(
-    cut_store: PostgresStore, proxy: CuttingProxy, postgres_place: PostgresPlace, assessment: Build
+    cut_store: PostgresStore, proxy: CuttingProxy, postgres_place: PostgresPlace
 ) -> None:
     made = [assessment(at(number)) for number in range(N_CUTS)]
     for one in made:
@@ -50,7 +51,7 @@ def test_a_commit_that_never_reached_the_server_is_an_error_and_the_next_write_w
 
 
 def test_what_was_acknowledged_outlives_a_server_that_stops_dead(
-    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build
+    own_store: PostgresStore, own_place: PostgresPlace
 ) -> None:
     for number in range(2):
         own_store.append([assessment(at(number))], [])
@@ -60,7 +61,7 @@ def test_what_was_acknowledged_outlives_a_server_that_stops_dead(
 
 
 def test_a_store_goes_on_after_the_server_was_started_anew(
-    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build
+    own_store: PostgresStore, own_place: PostgresPlace
 ) -> None:
     own_store.append([assessment(at(0))], [])
     assert len(own_store.trend(query()).time_ns) == 1
@@ -81,7 +82,7 @@ def test_a_store_goes_on_after_the_server_was_started_anew(
 
 
 def test_a_stop_in_the_middle_of_a_transaction_leaves_nothing_of_it(
-    own_store: PostgresStore, own_place: PostgresPlace, assessment: Build
+    own_store: PostgresStore, own_place: PostgresPlace
 ) -> None:
     with (  # noqa: PT012
         pytest.raises(StoreError, match="it is tried again"),
@@ -102,7 +103,7 @@ def test_every_commit_waits_for_the_disk(postgres_place: PostgresPlace) -> None:
 
 
 def test_what_an_error_has_undone_is_never_taken_for_written(
-    postgres_store: PostgresStore, postgres_place: PostgresPlace, assessment: Build
+    postgres_store: PostgresStore, postgres_place: PostgresPlace
 ) -> None:
     with (
         pytest.raises(StoreError, match="undone by an error"),

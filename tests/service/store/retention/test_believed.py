@@ -5,7 +5,8 @@ from contextlib import closing
 
 import pytest
 from harness.places import Place
-from rigs.old_results import HOUR_NS, SECOND_NS, T0, Build, asked
+from rigs.assessments import assessment
+from rigs.old_results import HOUR_NS, SECOND_NS, T0, asked
 from rigs.rolled_trends import gather_all
 
 from acquisition.clock import Clock
@@ -22,9 +23,7 @@ def store(store_place: Place) -> Iterator[SqlStore]:
         yield opened
 
 
-def measure(
-    store: SqlStore, assessment: Build, times_ns: Sequence[int], bearing: str = "UJB"
-) -> None:
+def measure(store: SqlStore, times_ns: Sequence[int], bearing: str = "UJB") -> None:
     """Results of these times, gathered; and one more, so that the last hour is complete."""
     all_ns = [*times_ns, times_ns[-1] + HOUR_NS]
     store.append([assessment(at, bearing=bearing, speed_rpm=90.0) for at in all_ns], [])
@@ -42,32 +41,30 @@ def n_single(store: SqlStore) -> int:
     return len(store.trend(wide).time_ns)
 
 
-def test_where_there_is_no_day_of_results_there_is_nothing_to_count_from(
-    store: SqlStore, assessment: Build
-) -> None:
+def test_where_there_is_no_day_of_results_there_is_nothing_to_count_from(store: SqlStore) -> None:
     assert store.retention.believed_ns() is None
-    measure(store, assessment, hours(0, 22))
+    measure(store, hours(0, 22))
     # more in an hour that has some is no more time, nor is the same hour of another bearing
-    measure(store, assessment, [T0 + 60 * SECOND_NS, T0 + 90 * SECOND_NS])
-    measure(store, assessment, hours(50, 20), "LJB")
+    measure(store, [T0 + 60 * SECOND_NS, T0 + 90 * SECOND_NS])
+    measure(store, hours(50, 20), "LJB")
     assert store.retention.believed_ns() is None
-    measure(store, assessment, [hours(30, 1)[0] + SECOND_NS])
+    measure(store, [hours(30, 1)[0] + SECOND_NS])
 
     assert store.retention.believed_ns() == T0
 
 
 async def test_a_clock_a_year_ahead_makes_results_old_after_a_day_of_them(
-    store: SqlStore, assessment: Build, stepped_clock: Clock
+    store: SqlStore, stepped_clock: Clock
 ) -> None:
     limits = RetentionLimits(readings_ns=30 * DAY_NS)
-    measure(store, assessment, hours(0, 48))
+    measure(store, hours(0, 48))
     step_s = (T0 + 2 * YEAR_NS - stepped_clock.now_ns()) / SECOND_NS
     stepped_clock.step(step_s)  # type: ignore[attr-defined]
     ahead = [at + YEAR_NS for at in hours(48, 24)]
-    measure(store, assessment, ahead[:1])
+    measure(store, ahead[:1])
     await Retaining(store.retention, limits, stepped_clock).round()
     assert n_single(store) == 51
-    measure(store, assessment, ahead[1:])
+    measure(store, ahead[1:])
     await Retaining(store.retention, limits, stepped_clock).round()
 
     assert n_single(store) == 25

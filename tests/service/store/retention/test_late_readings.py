@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rigs.assessments import assessment
 from rigs.memory_folder import memory_folder
 from rigs.old_results import (
     HOUR_NS,
@@ -38,7 +39,6 @@ def test_late_readings_are_added_to_what_is_left_of_their_hour(
     old: SqliteStore,
     plain: SqliteStore,
     path: Path,
-    assessment: Build,
     limits: RetentionLimits,
     widths: tuple[int, ...],
 ) -> None:
@@ -71,9 +71,7 @@ STEPS = st.lists(
 
 
 @pytest.mark.parametrize("n_examples", fast_and_long(6, 60))
-def test_whatever_happens_in_whatever_order_hours_say_what_was_read(
-    assessment: Build, n_examples: int
-) -> None:
+def test_whatever_happens_in_whatever_order_hours_say_what_was_read(n_examples: int) -> None:
     @settings(max_examples=n_examples, deadline=None)
     @given(STEPS, st.integers(0, 2**31))
     def check(steps: list[tuple[str, int]], seed: int) -> None:
@@ -139,7 +137,6 @@ def test_planted_bugs_are_found(
     old: SqliteStore,
     plain: SqliteStore,
     path: Path,
-    assessment: Build,
     monkeypatch: pytest.MonkeyPatch,
     module: object,
     name: str,

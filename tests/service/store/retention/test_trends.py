@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.places import Place
+from rigs.assessments import assessment
 from rigs.old_results import (
     HOUR_NS,
     NOW_NS,
     SECOND_NS,
     T0,
     TIERS,
-    Build,
     asked,
     delete_all,
     life,
@@ -89,9 +89,7 @@ def test_bounds_take_cells_that_are_wholly_within(old: SqliteStore, plain: Sqlit
     assert all(high is None or high <= 46.9 for high in oil.maximum)
 
 
-def test_both_databases_say_the_same_before_and_after(
-    store_place: Place, assessment: Build
-) -> None:
+def test_both_databases_say_the_same_before_and_after(store_place: Place) -> None:
     with closing(store_place.open()) as store:
         store.append(life(assessment, 150), [])
         gather_all(store)

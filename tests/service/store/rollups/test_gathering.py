@@ -21,13 +21,10 @@ from rigs.varied_results import (
 )
 
 from core.assessment import Assessment
-from service.store import schema
 from service.store.port import StoreError
 from service.store.rollups import rolling
 from service.store.rollups.cells import bins
-from service.store.rollups.schema import ROLLUP_TABLES
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.migrating import migrate
 
 LONG = pytest.mark.long
 
@@ -127,24 +124,3 @@ def test_a_value_on_the_bound_of_two_cells_is_in_the_upper_one(width: float) -> 
 
     assert bins(bounds, width).tolist() == numbers.tolist()
     assert bins(np.nextafter(bounds, -np.inf), width).tolist() == (numbers - 1).tolist()
-
-
-def test_a_database_from_before_roll_ups_is_gathered_after_its_upgrade(
-    plain: SqliteStore, path_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before = schema.MIGRATIONS[: schema.MIGRATIONS.index(ROLLUP_TABLES)]
-    with closing(sqlite3.connect(path_of("old"), isolation_level=None)) as old:
-        with monkeypatch.context() as at_that_time:
-            at_that_time.setattr(schema, "MIGRATIONS", before)
-            migrate(old, "old")
-        old.execute("ATTACH ? AS other", (str(path_of("plain")),))
-        for table in ("layout", "series", "assessment"):
-            old.execute(f"INSERT INTO {table} SELECT * FROM other.{table}")  # noqa: S608
-    store = SqliteStore(path_of("old"))
-
-    require_same(store.trend(WHOLE), plain.trend(WHOLE))
-    gather_all(store)
-    require_same(store.trend(WHOLE), plain.trend(WHOLE))
-
-    store.close()
-    assert len(dump(path_of("old"))) > 1000
