@@ -23,10 +23,6 @@ PATIENCE_MS = 90_000
 
 expect.set_options(timeout=PATIENCE_MS)
 
-CHROMIUM = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-
 QUIET = [
     "--no-sandbox",
     "--disable-gpu",
@@ -49,9 +45,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def chromium() -> str:
     """Path of an installed Chromium."""
-    if CHROMIUM is None:
-        pytest.skip("needs chromium")
-    return CHROMIUM
+    found = filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome")))
+    return next(found, None) or pytest.skip("needs chromium")
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """What tests of several pages ask of a page."""
 
+import copy
 import re
 
 import pytest
@@ -35,6 +36,13 @@ async def log_in(page: Page, name: str, password: str = PASSWORD) -> None:
     await page.get_by_label("Name", exact=True).fill(name)
     await page.get_by_label("Password", exact=True).fill(password)
     await page.keyboard.press("Enter")
+
+
+async def freeze(page: Page, url: str) -> dict:
+    """Let the page receive one real answer of the service again and again."""
+    overview = await (await page.request.get(f"{url}api/v1/overview")).json()
+    await page.route("**/api/v1/overview", lambda route: route.fulfill(json=overview))
+    return copy.deepcopy(overview)
 
 
 async def number_with(reading: Locator, unit: str) -> float:

@@ -1,8 +1,6 @@
 """What a page says is what the API says, to the last digit shown; nothing else passes for it."""
 
-import copy
-
-from on_screen import A_NUMBER
+from on_screen import A_NUMBER, freeze
 from playwright.async_api import Page, expect
 
 BEARING = "#/units/U1/bearings/UJB"
@@ -21,43 +19,24 @@ WORDS = {
 
 INTERVAL = ("low_95", "high_95")
 DECIMALS = {
-    "_n_per_m": (1e9, 3),
-    "_n_s_per_m": (1e6, 2),
-    "_um_pk": (1, 2),
-    "_um_pp": (1, 2),
-    "_mm_s_rms": (1, 2),
-    "_um": (1, 2),
-    "_rpm": (1, 2),
-    "_mw": (1, 1),
-    "_c": (1, 1),
-    "_deg": (1, 1),
-    "_hz": (1, 4),
-    "_ratio": (1, 3),
-    "_xx": (1, 3),
-    "_yy": (1, 3),
-    "coherence_x": (1, 3),
-    "coherence_y": (1, 3),
-    "_lack_of_fit_x": (1, 2),
-    "_lack_of_fit_y": (1, 2),
-    "_n_lines": (1, 0),
-    "_roundness": (1, 2),
+    ("_n_per_m",): (1e9, 3),
+    ("_n_s_per_m",): (1e6, 2),
+    ("_um_pk", "_um_pp", "_mm_s_rms", "_um", "_rpm", "_roundness"): (1, 2),
+    ("_lack_of_fit_x", "_lack_of_fit_y"): (1, 2),
+    ("_mw", "_c", "_deg"): (1, 1),
+    ("_hz",): (1, 4),
+    ("_ratio", "_xx", "_yy", "coherence_x", "coherence_y"): (1, 3),
+    ("_n_lines",): (1, 0),
 }
 
 
 def shown(name: str, value: float | None) -> str:
     if value is None:
         return "—"
-    scale, decimals = next(form for ending, form in DECIMALS.items() if name.endswith(ending))
+    scale, decimals = next(form for ends, form in DECIMALS.items() if name.endswith(ends))
     text = f"{value / scale:.{decimals}f}"
     # what is zero in all digits shown has no sign
     return text.replace("-", "" if float(text) == 0.0 else "−")
-
-
-async def freeze(page: Page, url: str) -> dict:
-    """Let the page receive one real answer of the service again and again."""
-    overview = await (await page.request.get(f"{url}api/v1/overview")).json()
-    await page.route("**/api/v1/overview", lambda route: route.fulfill(json=overview))
-    return copy.deepcopy(overview)
 
 
 async def texts_in(page: Page, place: str, of: str) -> dict[str, str]:

@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,9 +22,6 @@ RULES = DEPLOY / "prometheus" / "padwatch-rules.yml"
 
 TARGET = {"job", "instance"}
 """Labels that Prometheus itself puts on everything it has asked for."""
-
-BY_PROMETHEUS = {"up": ("gauge", {frozenset[tuple[str, str]]()})}
-"""Metrics that Prometheus makes."""
 
 OF_COUNTERS = {"rate", "increase"}
 OF_GAUGES = {"delta", "changes"}
@@ -47,18 +43,12 @@ REST = re.compile(rf"(?:\b(?:{WORDS})\b|[\s\d.()+*/><=,-])*")
 Exposed = dict[str, tuple[str, set[frozenset[tuple[str, str]]]]]
 """Type and sets of labels, by the name of a sample."""
 
-
-@dataclass(frozen=True)
-class Query:
-    """What a PromQL expression asks for: metrics with matchers and function, labels that remain."""
-
-    uses: list[tuple[str, dict[str, tuple[str, str]], str | None]]
-    kept: set[str]
-    matched_on: set[str]
+Use = tuple[str, dict[str, tuple[str, str]], str | None]
+"""A metric with its matchers and the function around it."""
 
 
-def read(expr: str) -> Query:
-    """Read the part of PromQL that is used here; all else is refused."""
+def read(expr: str) -> tuple[list[Use], set[str], set[str]]:
+    """Uses of metrics, labels that remain, labels that are matched on; other PromQL is refused."""
     expr = expr.replace("$__rate_interval", "5m")
     groups: dict[str, set[str]] = {"by": set(), "on": set()}
     for word, labels in GROUPING.findall(expr):
@@ -74,15 +64,15 @@ def read(expr: str) -> Query:
     assert expr.count("(") == expr.count(")"), f"{expr}: brackets do not match"
     rest = SELECTOR.sub("", expr)
     assert REST.fullmatch(rest), f"not understood: {rest}"
-    return Query(uses, groups["by"], groups["on"])
+    return uses, groups["by"], groups["on"]
 
 
-def check(expr: str, exposed: Exposed) -> tuple[Query, set[str]]:
-    """Compare an expression with what is told; return it with the labels of its result."""
-    query = read(expr)
+def check(expr: str, exposed: Exposed) -> tuple[set[str], set[str]]:
+    """Compare an expression with what is told; return its metrics and the labels of its result."""
+    uses, kept, matched_on = read(expr)
     known = set(TARGET)
-    assert query.uses, expr
-    for name, matchers, function in query.uses:
+    assert uses, expr
+    for name, matchers, function in uses:
         assert name in exposed, f"{expr}: nobody tells {name}"
         kind, label_sets = exposed[name]
         assert (kind == "counter") == (function in OF_COUNTERS), f"{name} in {function}"
@@ -92,8 +82,8 @@ def check(expr: str, exposed: Exposed) -> tuple[Query, set[str]]:
             assert label in labels | TARGET, f"{expr}: {name} has no label {label}"
             if operator == "=" and label in labels:
                 assert any((label, value) in labels for labels in label_sets), f"{label}={value}"
-    assert query.kept | query.matched_on <= known, f"{expr}: a label that nothing has"
-    return query, query.kept or known
+    assert kept | matched_on <= known, f"{expr}: a label that nothing has"
+    return {name for name, _, _ in uses}, kept or known
 
 
 def of_several_processes() -> Iterator[Metric]:
@@ -108,7 +98,7 @@ def of_several_processes() -> Iterator[Metric]:
 @pytest.fixture(scope="module")
 def exposed(told: Any) -> Exposed:
     """All that a running service tells, once its results are on the disk, and what others do."""
-    found: Exposed = dict(BY_PROMETHEUS)
+    found: Exposed = {"up": ("gauge", {frozenset()})}  # by Prometheus itself
     for family in (*told.plain.families.values(), *of_several_processes()):
         for sample in family.samples:
             is_gauge = family.type == "gauge"
@@ -136,8 +126,8 @@ def test_the_dashboard_asks_only_for_what_is_told(
     asked = set()
     for panel in dashboard["panels"]:
         for target in panel.get("targets", ()):
-            query, labels = check(target["expr"], exposed)
-            asked |= {name for name, _, _ in query.uses}
+            names, labels = check(target["expr"], exposed)
+            asked |= names
             legend = set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]))
             assert legend <= labels, f"{panel['title']}: {target['legendFormat']}"
     own = {name.removesuffix("_bucket") for name in asked if name.startswith("padwatch_")}
@@ -191,9 +181,9 @@ def test_alert_rules_ask_only_for_what_is_told(
 def test_a_link_without_results_is_an_alert(exposed: Exposed, rules: list[dict[str, Any]]) -> None:
     [silent] = [rule for rule in rules if rule["alert"] == "PadwatchSilentHealthy"]
 
-    query, _ = check(silent["expr"], exposed)
+    names, _ = check(silent["expr"], exposed)
 
-    by_name = {name: exposed[name][1] for name, _, _ in query.uses}
+    by_name = {name: exposed[name][1] for name in names}
     connected = by_name["padwatch_link_connected"]
     results = by_name["padwatch_assessment_duration_seconds_count"]
     # sides of `and` meet where all labels agree: from the start on, for every unit
