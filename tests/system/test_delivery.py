@@ -4,12 +4,10 @@ import asyncio
 import hashlib
 import hmac
 import json
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-Start = Callable[..., Awaitable[Any]]
-PATIENCE_S = 240.0
+from .conftest import PATIENCE_S, Start
 
 SETTINGS = """
 [alarms]

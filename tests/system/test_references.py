@@ -1,14 +1,14 @@
 """A reference that is set beside a running service moves its shaft centre within seconds."""
 
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from rigs.command_line import padwatch
 
-Start = Callable[..., Awaitable[Any]]
+from .conftest import Start
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 SHORT = "[analysis]\nsegment_samples = 4096\noverlap = 0.75\nn_segments = 4\n"

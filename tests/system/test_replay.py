@@ -121,9 +121,7 @@ def test_the_known_stiffness_is_the_films(straight: dict[str, Any]) -> None:
         assert usable[-1] == pytest.approx(film_n_per_m, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    "wire", [WIRES[0], *(pytest.param(wire, marks=pytest.mark.long) for wire in WIRES[1:])]
-)
+@pytest.mark.parametrize("wire", WIRES)
 async def test_every_wire_gives_the_same_results_to_the_last_bit(
     start: Start, straight: dict[str, Any], wire: str
 ) -> None:

@@ -49,18 +49,29 @@ def padwatch(plant_path: Path) -> Padwatch:
 
 
 @pytest.fixture
-def access(plant_path: Path) -> Iterator[AccessStore]:
+def store(plant_path: Path) -> Iterator[SqliteStore]:
     """The plant's database, as a running service has it open."""
-    with closing(SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")) as store:
-        yield store.access
+    with closing(SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")) as opened:
+        yield opened
 
 
-def test_an_account_that_was_added_can_log_in(padwatch: Padwatch, access: AccessStore) -> None:
+@pytest.fixture
+def access(store: SqliteStore) -> AccessStore:
+    return store.access
+
+
+def test_an_account_that_was_added_can_log_in_and_stands_in_the_audit_trail(
+    padwatch: Padwatch, store: SqliteStore
+) -> None:
     added = padwatch("users", "add", "Anna", "--role", "admin", password=PASSWORD + "\n")
     assert (added.exit_code, added.stdout) == (0, "anna: added as admin\n")
 
-    doors = Doors(access, Hashing(), Backoff())
+    doors = Doors(store.access, Hashing(), Backoff())
     assert isinstance(doors.log_in("anna", PASSWORD, "::1", NOW_NS, 0), LoggedIn)
+    newest = store.audit.entries(AuditQuery(limit=1))[0]
+    said = (newest.action, newest.object, newest.source)
+    assert said == ("account.added", "anna", "command_line")
+    assert newest.peer == made_by()
 
 
 def test_accounts_are_listed_without_anything_secret(
@@ -184,19 +195,3 @@ def test_a_key_that_cannot_be_is_not_made(
     assert found.exit_code == 2
     assert said in found.stderr
     assert len(json.loads(padwatch("keys", "list", "--json").stdout)) == 1
-
-
-def test_the_audit_trail_says_who_on_the_host_has_changed_an_account(
-    padwatch: Padwatch, plant_path: Path
-) -> None:
-    with closing(SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")) as store:
-        store.access.accounts.add("anna", Role.VIEWER, "a hash", NOW_NS)
-        padwatch("users", "role", "anna", "operator")
-        newest = store.audit.entries(AuditQuery(limit=1))[0]
-
-    assert (newest.action, newest.object, newest.source) == (
-        "account.role_set",
-        "anna",
-        "command_line",
-    )
-    assert newest.peer == made_by()

@@ -111,7 +111,7 @@ def test_wrong_options_are_refused(
 
 
 def test_states_are_neither_guessed_nor_needed_where_speed_and_power_tell(
-    readings: Path, plant_path: Path, plant_text: str
+    readings: Path, plant_path: Path
 ) -> None:
     lines = [HEADINGS, *rows(20)]
     readings.write_text("\n".join(lines), encoding="utf-8")
@@ -120,11 +120,8 @@ def test_states_are_neither_guessed_nor_needed_where_speed_and_power_tell(
     assert "unit U1: operating states are not known: give a column state" in result.stderr
     lines = [HEADINGS + ",speed_rpm,power_mw", *(line + ",92.3,500" for line in rows(20))]
     readings.write_text("\n".join(lines), encoding="utf-8")
-    if "rated_power_mw" not in plant_text:
-        plant_text = plant_text.replace(
-            "rated_speed_rpm", "rated_power_mw = 700.0\nrated_speed_rpm", 1
-        )
-        plant_path.write_text(plant_text, encoding="utf-8")
+    rated = "rated_power_mw = 700.0\nrated_speed_rpm"
+    plant_path.write_text(plant_path.read_text().replace("rated_speed_rpm", rated, 1))
     assert padwatch("backtest", readings, "--plant", plant_path).exit_code == 0
 
 

@@ -99,10 +99,6 @@ def test_help_names_every_command() -> None:
         assert re.search(rf"\b{command}\b", result.stdout)
 
 
-def test_a_command_that_does_not_exist_ends_with_2() -> None:
-    assert padwatch("runn").exit_code == 2
-
-
 def _keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     for model in [schema, *schema["$defs"].values()]:
         for name, key in model.get("properties", {}).items():

@@ -20,7 +20,6 @@ from service.wiring.recorded_units import recorded_unit
 from service.wiring.stores import open_store
 from service.wiring.waveforms import waveform_keeper
 
-EXAMPLE = Path(__file__).parents[3] / "deploy" / "plant.toml"
 START_NS = 1_767_225_600_000_000_000
 
 
@@ -34,13 +33,10 @@ def make(folder: Path, unit: RecordedUnit) -> Path:
 
 
 @pytest.fixture
-def plant(tmp_path: Path) -> Path:
+def plant(plant_path: Path) -> Path:
     """A plant with three recordings in its index, as a running service has left them."""
-    path = tmp_path / "plant.toml"
-    data = f'data_folder = "{tmp_path / "data"}"'
-    path.write_text(EXAMPLE.read_text().replace('data_folder = "var"', data))
-    settings = load_plant_file(path)
-    root = tmp_path / "data" / "recordings"
+    settings = load_plant_file(plant_path)
+    root = plant_path.parent / "data" / "recordings"
     root.mkdir(parents=True)
     for number in range(3):
         make(root / f"U1-{number}", recorded_unit(settings.unit[0]))
@@ -48,7 +44,7 @@ def plant(tmp_path: Path) -> Path:
         keeper = waveform_keeper(settings, store, SystemClock())
         keeper.look()
         keeper.close()
-    return path
+    return plant_path
 
 
 def run(plant: Path, *options: str) -> Any:
@@ -85,10 +81,6 @@ def test_each_recording_with_something_wrong_is_named_with_it(plant: Path) -> No
     assert sorted(path.name for path in root.iterdir()) == before
 
 
-def test_a_plant_that_has_never_run_has_nothing_to_check(tmp_path: Path) -> None:
-    path = tmp_path / "plant.toml"
-    data = f'data_folder = "{tmp_path / "none"}"'
-    path.write_text(EXAMPLE.read_text().replace('data_folder = "var"', data))
-
-    assert run(path).exit_code == 0
-    assert not (tmp_path / "none").exists()
+def test_a_plant_that_has_never_run_has_nothing_to_check(plant_path: Path) -> None:
+    assert run(plant_path).exit_code == 0
+    assert not (plant_path.parent / "data").exists()

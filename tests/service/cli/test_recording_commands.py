@@ -205,26 +205,14 @@ def test_another_calibration_is_told_and_used_only_when_asked_for(
     assert told_again == f"{recording}: {words} plant one\n"
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("rate_hz = 600.0", "rate_hz = 500.0", "600 Hz, unit U1 is configured for 500 Hz"),
-        ("ljb_shaft_y", "ljb_shaft_z", "unit U1 needs channel ljb_shaft_z, the recording has ujb_"),
-        (
-            'transducer = "proximity_probe"',
-            'transducer = "displacement"',
-            "channel ujb_shaft_x is recorded as gap_um, unit U1 is configured for displacement_um",
-        ),
-    ],
-)
 def test_a_recording_of_something_else_is_refused_naming_both(
-    plant_path: Path, recording: Path, old: str, new: str, words: str
+    plant_path: Path, recording: Path
 ) -> None:
     text = plant_path.read_text()
-    plant_path.write_text(text.replace(old, new))
+    plant_path.write_text(text.replace("rate_hz = 600.0", "rate_hz = 500.0"))
     result = padwatch("reanalyse", recording, "--plant", plant_path)
     assert (result.exit_code, result.stdout) == (1, ""), result.stderr
-    assert words in result.stderr
+    assert "600 Hz, unit U1 is configured for 500 Hz" in result.stderr
     assert result.stderr.count("\n") == 1
 
 

@@ -53,40 +53,32 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("flags", "changes", "said"),
     [
-        ({"x_um": "nan"}, "gap x is nan µm, must be above 0 and at most 10000 µm"),
-        ({"author": "a" * 81}, "author has 81 characters, must be at most 80"),
-        ({"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
-        ({"bearing": "XJB"}, "unit U1 has no bearing XJB, it has UJB, LJB, TJB"),
-        ({"unit": "U9"}, "has no unit U9, it has U1, U2"),
+        ((), {"x_um": "nan"}, "gap x is nan µm, must be above 0 and at most 10000 µm"),
+        ((), {"author": "a" * 81}, "author has 81 characters, must be at most 80"),
+        ((), {"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
+        ((), {"bearing": "XJB"}, "unit U1 has no bearing XJB, it has UJB, LJB, TJB"),
+        ((), {"unit": "U9"}, "has no unit U9, it has U1, U2"),
+        (
+            ("--measured",),
+            {"x_um": None, "y_um": None},
+            "there is no stored result yet whose gaps could be taken",
+        ),
+        (("--measured",), {}, "padwatch reference set: give gaps or --measured, not both"),
     ],
     ids=lambda value: None if isinstance(value, str) else "-".join(value),
 )
 def test_a_wrong_reference_is_one_line_with_value_and_limit_and_leaves_nothing_behind(
-    plant_path: Path, changes: dict[str, Any], said: str
+    plant_path: Path, flags: tuple[str, ...], changes: dict[str, Any], said: str
 ) -> None:
-    result = set_reference(padwatch, plant_path, **changes)
+    result = set_reference(padwatch, plant_path, *flags, **changes)
 
     assert result.exit_code == 2
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
     assert result.stdout == ""
     assert not (plant_path.parent / "data").exists()
-
-
-def test_a_measured_reference_without_results_is_refused(plant_path: Path) -> None:
-    result = set_reference(padwatch, plant_path, "--measured", x_um=None, y_um=None)
-
-    assert result.exit_code == 2
-    assert result.stderr.endswith("there is no stored result yet whose gaps could be taken\n")
-
-
-def test_gaps_are_given_or_measured_but_not_both(plant_path: Path) -> None:
-    result = set_reference(padwatch, plant_path, "--measured")
-
-    assert result.exit_code == 2
-    assert result.stderr == "padwatch reference set: give gaps or --measured, not both\n"
 
 
 def test_looking_at_references_creates_no_database(plant_path: Path) -> None:

@@ -62,14 +62,6 @@ def test_the_past_is_there_marked_and_judged(
     assert store.films.past_end_ns("U2", "UJB") is None
 
 
-def test_a_baseline_is_in_force_and_says_where_it_comes_from(store: SqliteStore) -> None:
-    steps = store.films.steps("U1", "LJB")
-    assert versions_after(steps).in_force == 1
-    [entry] = store.films.baselines("U1", "LJB")
-    assert (entry.author, entry.event) == ("padwatch demo", "learned from a simulated year")
-    assert set(store.films.responses()) == {"U1"}
-
-
 def test_trends_show_the_past(
     store: SqliteStore, pasts: Mapping[str, Mapping[str, StiffnessHistory]]
 ) -> None:
@@ -81,9 +73,12 @@ def test_trends_show_the_past(
     np.testing.assert_array_equal(shown[there], np.exp(past.ln_k[0]))
 
 
-def test_a_past_is_given_once(
+def test_a_past_is_given_once_with_a_baseline_that_says_where_it_comes_from(
     store: SqliteStore, plant: PlantFile, pasts: Mapping[str, Mapping[str, StiffnessHistory]]
 ) -> None:
     fill(store.films, plant, pasts, NOW_NS + 10**15)
     assert [unit.id for unit in without_past(store.films, plant)] == ["U2"]
-    assert len(store.films.baselines("U1", "UJB")) == 1
+    assert versions_after(store.films.steps("U1", "LJB")).in_force == 1
+    [entry] = store.films.baselines("U1", "LJB")
+    assert (entry.author, entry.event) == ("padwatch demo", "learned from a simulated year")
+    assert set(store.films.responses()) == {"U1"}
