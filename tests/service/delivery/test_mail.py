@@ -180,18 +180,14 @@ async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_bel
     assert "certificate verify failed" in refused.answer.lower()
     assert server.commands[-1] == "STARTTLS"
 
+    without_tls = await serve()
+    in_the_clear = await mail_to(without_tls, certificate, **login).carry(MESSAGE, BODY)
+    assert isinstance(in_the_clear, Failed)
+    assert [line.split()[0] for line in without_tls.commands if line[:4] in ("AUTH", "MAIL")] == []
+
     taken = await mail_to(server, certificate, **login).carry(MESSAGE, BODY)
     assert taken == Delivered("taken as 4711")
     assert server.commands[-5] == "AUTH PLAIN AHBhZHdhdGNoAGdlaGVpbQ=="
-
-
-async def test_nothing_is_sent_in_the_clear_where_tls_is_required(serve: ServeMail) -> None:
-    server = await serve()
-
-    outcome = await mail_to(server, tls="starttls").carry(MESSAGE, BODY)
-
-    assert isinstance(outcome, Failed)
-    assert not any(line.startswith("MAIL") for line in server.commands)
 
 
 async def test_a_missing_password_is_said_without_troubling_the_server(serve: ServeMail) -> None:

@@ -59,11 +59,17 @@ async def test_a_name_is_looked_up_anew_after_an_answer_and_an_address_never(
     assert names.asked == ["desk.example"] * 2
 
 
-async def test_a_name_that_there_is_not_is_said(names: NameServer, room: Any) -> None:
+async def test_what_cannot_be_looked_up_or_trusted_is_said(
+    names: NameServer, room: Any, tmp_path: Any
+) -> None:
     names.may_answer.set()
     webhook = Webhook(WebhookTarget("https://no.example/"), Trust(), room.clock)
-
     assert await webhook.carry({"id": "1"}, "{}") == Failed("Name or service not known")
+
+    webhook = Webhook(WebhookTarget("https://127.0.0.1:1/"), Trust(tmp_path / "ca.pem"), room.clock)
+    outcome = await webhook.carry({"id": "1"}, "{}")
+    assert isinstance(outcome, Failed)
+    assert f"ca_file {tmp_path / 'ca.pem'}" in outcome.answer
 
 
 async def test_a_message_goes_to_the_name_it_is_meant_for(names: NameServer, room: Any) -> None:
@@ -91,11 +97,3 @@ async def test_nothing_is_told_to_a_server_whose_certificate_is_not_believed(
 
     await Webhook(target, Trust(certificate), room.clock).carry({"id": "1"}, "{}")
     assert len(server.requests) == 1
-
-
-async def test_a_file_of_authorities_that_is_not_there_is_named(room: Any, tmp_path: Any) -> None:
-    webhook = Webhook(WebhookTarget("https://127.0.0.1:1/"), Trust(tmp_path / "ca.pem"), room.clock)
-    outcome = await webhook.carry({"id": "1"}, "{}")
-
-    assert isinstance(outcome, Failed)
-    assert f"ca_file {tmp_path / 'ca.pem'}" in outcome.answer
