@@ -3,6 +3,9 @@
 import asyncio
 from collections.abc import Sequence
 
+import pytest
+from rigs.standing_clock import StandingClock
+
 from service.rolling import PERIOD_S, Rolling
 from service.store.port import StoreError
 
@@ -13,7 +16,6 @@ class Pile:
     def __init__(self, *pieces: int) -> None:
         self.pieces = list(pieces)
         self.failures = 0
-        self.all_done = asyncio.Event()
 
     def due(self, now_ns: int) -> Sequence[int]:
         del now_ns
@@ -27,47 +29,37 @@ class Pile:
         self.pieces[series] -= 1
 
 
-class Clock:
-    """Time that passes when somebody waits; tells when everything that was due is done."""
+class Clock(StandingClock):
+    """Time that passes when somebody waits, and ends when everything that was due is done."""
 
     def __init__(self, pile: Pile) -> None:
-        self._pile, self.slept_s = pile, 0.0
-
-    def now_ns(self) -> int:
-        return 0
-
-    def monotonic_s(self) -> float:
-        return self.slept_s
+        super().__init__()
+        self._pile = pile
 
     async def sleep(self, duration_s: float) -> None:
-        self.slept_s += duration_s
+        self.s += duration_s
         if duration_s == PERIOD_S and not any(self._pile.pieces):
-            self._pile.all_done.set()
-        await asyncio.sleep(0)
+            raise asyncio.CancelledError
 
 
-async def done(pile: Pile) -> Clock:
+async def rested_s(pile: Pile) -> float:
+    """Gather everything; returns for how long the loop has rested."""
     clock = Clock(pile)
-    task = asyncio.create_task(Rolling(pile, clock).run())
-    await pile.all_done.wait()
-    task.cancel()
-    return clock
+    with pytest.raises(asyncio.CancelledError):
+        await Rolling(pile, clock).run()
+    return clock.s
 
 
 async def test_all_that_is_due_is_gathered_before_the_loop_rests() -> None:
     pile = Pile(3, 0, 5)
 
-    clock = await done(pile)
-
+    assert await rested_s(pile) == PERIOD_S
     assert pile.pieces == [0, 0, 0]
-    assert clock.slept_s == PERIOD_S
 
 
 async def test_a_store_that_fails_is_asked_again_later() -> None:
     pile = Pile(2)
     pile.failures = 3
 
-    clock = await done(pile)
-
+    assert await rested_s(pile) == 4 * PERIOD_S
     assert pile.pieces == [0]
-    assert clock.slept_s == 4 * PERIOD_S

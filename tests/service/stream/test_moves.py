@@ -1,10 +1,14 @@
 """Wherever the analysis of a unit is cut off, and however often: to the last bit the same results.
 
 What is on the stream is as bad as it comes: gaps of all lengths, devices that count anew, lost
-links, blocks that overlap or come twice, messages that nobody understands.
+links, blocks that overlap or come twice, messages that nobody understands, restarts that nobody
+told, impossible blocks.
 """
 
-from collections.abc import Callable, Iterator
+import sqlite3
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +18,8 @@ from harness.stream_rig import found_in
 from rigs.tiers import fast_and_long
 
 from core.arrays import FloatArray, SampleArray
-from core.blocks import SampleBlock
+from core.blocks import Rejection, SampleBlock
+from core.counts import ANEW
 from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
 from core.units import NS_PER_S
 from service.live import LinkState
@@ -152,10 +157,10 @@ class SteadyDevice(Device):
         """Measure so many samples that nobody fetches."""
         self._next += n_samples
 
-    def restart(self) -> None:
+    def restart(self, *, is_told: bool = True) -> None:
         """Be off for three seconds, and count anew."""
         self._begin_ns += round((self._next / self._unit.sampling_hz + 3.0) * NS_PER_S)
-        self._epoch, self._next = self._epoch + 1, 0
+        self._epoch, self._next = self._epoch + is_told, 0
 
 
 def sent_by(device: Device, unit: MovingUnit, n: int, first: int) -> list[Message]:
@@ -230,3 +235,82 @@ async def test_a_stream_that_lost_its_end_is_not_analysed_a_second_time(steady: 
     assert len(found["assessment"]) > len(first)
     (gap,) = found["gap"]
     assert gap["first_index"] + gap["n_samples"] == 60 * N_SAMPLES + SPAN
+
+
+def blocks(unit: MovingUnit) -> list[SampleBlock]:
+    device = SteadyDevice(unit.plant.unit[0], 1)
+    return [device.block() for _ in range(30)]
+
+
+def numbered(unit: MovingUnit, sent: Iterable[SampleBlock]) -> list[Message]:
+    return [(n + 1, encoded_block(block, unit.identity, T0)) for n, block in enumerate(sent)]
+
+
+def windows(unit: MovingUnit) -> list[tuple[int, int]]:
+    with sqlite3.connect(unit.database) as database:
+        found = database.execute("SELECT epoch, first_index FROM assessment ORDER BY time_ns")
+        return found.fetchall()
+
+
+async def test_samples_of_a_device_that_counts_anew_without_telling_are_analysed(
+    moving_unit: MakeUnit, rng: np.random.Generator
+) -> None:
+    whole, moved = moving_unit("whole"), moving_unit("moved")
+    device = SteadyDevice(whole.plant.unit[0], 1)
+    device.skip(10**6)
+    before = [device.block() for _ in range(20)]
+    device.restart(is_told=False)
+    sent = numbered(whole, before + [device.block() for _ in range(30)])
+    await whole.live(sent, None, rng)
+    found = windows(whole)
+    assert {first >= 10**6 for epoch, first in found if epoch == 3} == {True}
+    assert {first < 30 * N_SAMPLES for epoch, first in found if epoch >= ANEW} == {True}
+    for _ in range(6):
+        await moved.live(sent, 18, rng)
+    await moved.live(sent, None, rng)
+    assert found_in(moved.database) == found_in(whole.database)
+
+
+async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(
+    moving_unit: MakeUnit, rng: np.random.Generator
+) -> None:
+    clean, late = moving_unit("clean"), moving_unit("late")
+    once = blocks(clean)
+    await clean.live(numbered(clean, once), None, rng)
+    torn = replace(once[3], rejected=(Rejection("torn", 7),))
+    await late.live(numbered(late, [*once[:20], *once[:10], torn, *once[20:]]), None, rng)
+    assert found_in(late.database)["assessment"] == found_in(clean.database)["assessment"]
+    assert found_in(late.database)["gap"] == found_in(clean.database)["gap"]
+
+
+async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies_of_them(
+    moving_unit: MakeUnit, rng: np.random.Generator
+) -> None:
+    clean, spoilt = moving_unit("clean"), moving_unit("spoilt")
+    once = blocks(clean)
+    await clean.live(numbered(clean, once), None, rng)
+    one = once[10]
+    n_channels = one.samples.shape[0]
+    wrong = [
+        replace(one, samples=one.samples[:, :0]),
+        replace(one, samples=np.full_like(one.samples, np.nan)),
+        replace(one, samples=one.samples[1:], channel_quality=(GOOD,) * (n_channels - 1)),
+        replace(one, rate_hz=2 * one.rate_hz),
+        replace(one, rejected=(Rejection("torn", -5),)),
+        replace(one, slow={"speed": Reading(float("inf"))}),
+        replace(one, first_index=2**60),
+        replace(one, start_ns=2**63 - 1),
+    ]
+    refused = await spoilt.live(numbered(spoilt, [*once[:10], *wrong, *once[10:]]), None, rng)
+    assert refused == Counter({"impossible": 4, "misfit": 2, "not_understood": 2})
+    assert found_in(spoilt.database)["assessment"] == found_in(clean.database)["assessment"]
+
+
+async def test_a_block_that_says_nothing_of_a_slow_channel_is_analysed_without_it(
+    moving_unit: MakeUnit, rng: np.random.Generator
+) -> None:
+    unit = moving_unit("unit")
+    sent = blocks(unit)
+    sent = [*sent[:15], *(replace(block, slow={}) for block in sent[15:])]
+    assert not await unit.live(numbered(unit, sent), None, rng)
+    assert windows(unit)
