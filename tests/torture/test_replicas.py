@@ -1,6 +1,7 @@
 """Any process of a plant over PostgreSQL is killed, or the database restarted: nothing is lost."""
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -57,21 +58,12 @@ def running(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Repl
         yield found
 
 
-def kills(kinds: list[str], n: int, rng: np.random.Generator) -> list[str]:
-    """Which is killed, in what order."""
-    wanted = kinds * n
-    return [wanted[at] for at in rng.permutation(len(wanted))]
-
-
 @pytest.mark.timeout(3600)
 def test_whatever_is_killed_beside_a_single_process_nothing_is_lost(
     running: Replicas, seed: int, torture: Torture
 ) -> None:
-    does = {
-        "analysis": running.kill_analysis,
-        "serving": running.kill_serving,
-        "postgres": running.restart_postgres,
-    }
+    does = {role: partial(running.kill, role) for role in ("run", "serve")}
+    does["postgres"] = running.restart_postgres
     kill_in_turn(running, does, seed, torture.figure)
 
 
@@ -79,13 +71,8 @@ def test_whatever_is_killed_beside_a_single_process_nothing_is_lost(
 def test_whatever_is_killed_of_the_whole_chain_nothing_is_lost(
     whole: Replicas, seed: int, torture: Torture
 ) -> None:
-    does = {
-        "acquiring": whole.kill_acquiring,
-        "analysis": whole.kill_analysis,
-        "serving": whole.kill_serving,
-        "node": whole.kill_node,
-        "postgres": whole.restart_postgres,
-    }
+    does = {role: partial(whole.kill, role) for role in ("acquire", "analyse", "serve")}
+    does |= {"node": whole.kill_node, "postgres": whole.restart_postgres}
     kill_in_turn(whole, does, seed, torture.figure)
 
 
@@ -98,7 +85,7 @@ def kill_in_turn(
     """Kill each kind so often, at random moments; then look at all that is left."""
     rng = np.random.default_rng(seed)
     running.start()
-    order = kills(list(does), N_KILLS, rng)
+    order = rng.permutation(list(does) * N_KILLS).tolist()
     for number, kind in enumerate(order):
         running.wait_for_result()
         running.act(number)

@@ -37,12 +37,10 @@ class Replicas:
 
     Parameters
     ----------
-    analysis
-        Those that bring results: they are killed, and started again at once.
-    serving
-        Those that people ask.
-    begins_anew
-        Whether one that is killed knows nothing of the samples before; with a stream it does.
+    rigs
+        Processes by role: ``run``, ``acquire``, ``analyse`` and ``serve``, which people ask.
+    watches
+        One for each process that serves.
     lives
         For each unit, the number of the newest sample offered as one began that knew nothing.
     """
@@ -51,52 +49,47 @@ class Replicas:
     plant_file: Path
     daq: LedgerDaq
     postgres: PostgresServer
-    analysis: list[ServiceRig]
-    serving: list[ServiceRig]
+    rigs: Mapping[str, list[ServiceRig]]
     watches: list[Watch]
-    lives: dict[str, list[int]]
-    begins_anew: bool = True
-    acquiring: list[ServiceRig] = field(default_factory=list)
+    lives: dict[str, list[int]] = field(default_factory=dict)
     nodes: Sequence[NatsServer] = ()
-    n_restarts: int = 0
+
+    @property
+    def serving(self) -> list[ServiceRig]:
+        """Those that people ask."""
+        return self.rigs["serve"]
+
+    @property
+    def working(self) -> list[ServiceRig]:
+        """Those that bring results."""
+        return [rig for role, rigs in self.rigs.items() for rig in rigs if role != "serve"]
 
     def start(self) -> None:
         """Start all, those that serve last."""
         self._note_life()
-        _start([*self.acquiring, *self.analysis])
+        _start(self.working)
         for rig, watch in zip(self.serving, self.watches, strict=True):
-            rig.start()
-            rig.wait_ready()
+            _start([rig])
             watch.begin(rig.url)
 
-    def kill_analysis(self, number: int) -> None:
-        """Kill one that analyses; it is started again."""
-        rig = self.analysis[number % len(self.analysis)]
+    def kill(self, role: str, number: int) -> None:
+        """Kill one process of a role, perhaps while people ask it; it is started again."""
+        at = number % len(self.rigs[role])
+        rig, watches = self.rigs[role][at], self.watches[at : at + 1] if role == "serve" else []
         rig.kill()
-        if self.begins_anew:
+        for watch in watches:
+            watch.end()
+        if role == "run":  # it knows nothing of the samples before; over a stream others do
             self._note_life()
         _start([rig])
-
-    def kill_acquiring(self, number: int) -> None:
-        """Kill one that acquires; it is started again."""
-        rig = self.acquiring[number % len(self.acquiring)]
-        rig.kill()
-        _start([rig])
+        for watch in watches:
+            watch.begin(rig.url)
 
     def kill_node(self, number: int) -> None:
         """Kill one of three servers of the stream; it is started again."""
         node = self.nodes[number % len(self.nodes)]
         node.kill()
         node.start()
-
-    def kill_serving(self, number: int) -> None:
-        """Kill one that serves, while people ask it; it is started again."""
-        at = number % len(self.serving)
-        self.serving[at].kill()
-        self.watches[at].end()
-        self.serving[at].start()
-        self.serving[at].wait_ready()
-        self.watches[at].begin(self.serving[at].url)
 
     def restart_postgres(self, number: int) -> None:
         """Restart the database: every other time as after a power cut."""
@@ -110,9 +103,8 @@ class Replicas:
 
     def supervise(self) -> None:
         """Start what has ended by itself: who lost the database may not go on analysing."""
-        for rig in (*self.acquiring, *self.analysis):
+        for rig in self.working:
             if rig.process is not None and rig.process.poll() is not None:
-                self.n_restarts += 1
                 rig.kill()
                 _start([rig])
 
@@ -124,7 +116,7 @@ class Replicas:
             while watch.n_shown == n_before:
                 self.supervise()
                 if time.monotonic() > end_s:
-                    raise AssertionError(f"no result: {self.analysis[0].newest_log()}")
+                    raise AssertionError(f"no result: {self.working[-1].newest_log()}")
                 time.sleep(0.05)
 
     def stop(self) -> None:
@@ -132,7 +124,7 @@ class Replicas:
         for rig, watch in zip(self.serving, self.watches, strict=True):
             rig.stop()
             watch.end()
-        for rig in (*self.acquiring, *self.analysis):
+        for rig in self.working:
             rig.stop()
 
     def whole_watch(self) -> Watch:
@@ -188,7 +180,7 @@ def chain(
     }
     stream = STREAM.format(servers=servers)
     with _processes(plant, folder, daq, postgres, roles, stream) as found:
-        found.begins_anew, found.nodes = False, nodes
+        found.nodes = nodes
         yield found
 
 
@@ -209,14 +201,10 @@ def _processes(
             own = plant.write(folder / f"{name}.toml", folder / name, daq.ports, extra)
             rig = ServiceRig(own, role=role, log=f"{name}.log")
             rigs[role[0]].append(running.enter_context(rig))
-        serving, analysis = rigs["serve"], [*rigs["run"], *rigs["analyse"]]
-        watches = [Watch(plant, daq.offered) for _ in serving]
+        watches = [Watch(plant, daq.offered) for _ in rigs["serve"]]
         for watch in watches:
             running.callback(watch.end)
-        one = folder / ("run.toml" if rigs["run"] else "serve1.toml")
-        found = Replicas(plant, one, daq, postgres, analysis, serving, watches, {})
-        found.acquiring = rigs["acquire"]
-        yield found
+        yield Replicas(plant, folder / "serve1.toml", daq, postgres, rigs, watches)
 
 
 def chance(rng: np.random.Generator, mean_s: float, most_s: float) -> None:
