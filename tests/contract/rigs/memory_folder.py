@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 MEMORY = Path("/dev/shm")  # noqa: S108
 MIN_FREE_BYTES = 10**9
 
@@ -28,3 +30,10 @@ def memory_folder() -> Iterator[Path]:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(name="tmp_path")
+def path_in_memory() -> Iterator[Path]:
+    """A folder in memory, for folders of tests in which most of the time went into syncs."""
+    with memory_folder() as folder:
+        yield folder

@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 import pytest
+from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 
 from core.account import Gap
 from service.backup.backing_up import back_up
@@ -32,12 +33,6 @@ def write_gaps(store: SqliteStore, first: int, n: int) -> None:
 def gaps_in(path: Path) -> int:
     with closing(SqliteStore(path)) as store:
         return len(store.gaps("U1", 0, 1 << 62))
-
-
-@pytest.fixture
-def tmp_path(folder_in_memory: Path) -> Path:
-    """A folder in memory: most of the time went into syncs of the disk."""
-    return folder_in_memory
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import MovingUnit
 from harness.nats_server import NatsServer, nats_server, nats_server_command
 from nats import connect
-from rigs.memory_folder import memory_folder
+from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a fixture
 
 from core.blocks import Rejection, SampleBlock
 from core.device_clock import DeviceClock, StampFault
@@ -59,12 +59,6 @@ def bad_block(block: SampleBlock) -> SampleBlock:
 @pytest.fixture
 def plant() -> PlantFile:
     return load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")
-
-
-@pytest.fixture
-def tmp_path(folder_in_memory: Path) -> Path:
-    """A folder in memory: most of the time went into syncs of the disk."""
-    return folder_in_memory
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 from rigs.standing_clock import StandingClock
 
 from acquisition.raw import RawBlock
@@ -98,12 +99,6 @@ class Rig:
     def limit(self, **limits: float) -> None:
         self.room = replace(self.room, **limits)  # type: ignore[arg-type]
         self.hire()
-
-
-@pytest.fixture
-def tmp_path(folder_in_memory: Path) -> Path:
-    """A folder in memory: most of the time went into syncs of the disk."""
-    return folder_in_memory
 
 
 @pytest.fixture

@@ -24,19 +24,19 @@ from service.store.retention.limits import RetentionLimits
 from service.store.sqlite import SqliteStore
 
 
-def test_what_is_young_stays_as_it_was(old: SqliteStore, path: Path) -> None:
+def test_what_is_young_stays_as_it_was(rolled: SqliteStore, path: Path) -> None:
     keep = RetentionLimits(readings_ns=5 * HOUR_NS)
 
-    delete_all(old, keep)
+    delete_all(rolled, keep)
 
     assert n_rows(path, "assessment", f"time_ns < {T0 + 4 * HOUR_NS}") == 0
     young = asked(start_ns=T0 + 4 * HOUR_NS, max_points=5000)
-    assert old.trend(young).bucket_ns is None
+    assert rolled.trend(young).bucket_ns is None
 
 
-def test_without_limits_nothing_is_deleted(old: SqliteStore, path: Path) -> None:
+def test_without_limits_nothing_is_deleted(rolled: SqliteStore, path: Path) -> None:
     before = path.read_bytes()
-    delete_all(old, RetentionLimits())
+    delete_all(rolled, RetentionLimits())
     assert path.read_bytes() == before
 
 
@@ -55,7 +55,7 @@ DAMAGES = [
 
 @pytest.mark.parametrize(("width_s", "damage"), covering([60, 600, 3600], DAMAGES))
 def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
-    old: SqliteStore,
+    rolled: SqliteStore,
     plain: SqliteStore,
     path: Path,
     execute: Execute,
@@ -66,50 +66,50 @@ def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
     where = f"width_s = {width_s} AND start_ns >= {hour_ns} AND start_ns < {hour_ns + HOUR_NS}"
     execute(damage.format(where=where))
 
-    delete_all(old)
+    delete_all(rolled)
     assert n_rows(path, "assessment", f"time_ns < {hour_ns}") == 0
     assert n_rows(path, "assessment", f"time_ns < {hour_ns + HOUR_NS}") > 30
-    gather_all(old)
-    delete_all(old)
+    gather_all(rolled)
+    delete_all(rolled)
 
     assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
     for minutes in (2, 10, 60):
-        require_same_hours(old.trend(asked(minutes)), plain.trend(asked(minutes)))
+        require_same_hours(rolled.trend(asked(minutes)), plain.trend(asked(minutes)))
 
 
 def test_a_roll_up_that_is_damaged_when_nothing_finer_is_left_is_told(
-    old: SqliteStore, path: Path, execute: Execute
+    rolled: SqliteStore, path: Path, execute: Execute
 ) -> None:
-    delete_all(old, TIERS[0][0])
-    assert old.retention.trouble is None
+    delete_all(rolled, TIERS[0][0])
+    assert rolled.retention.trouble is None
     n_before = n_rows(path, "rollup_cell", "width_s = 60")
     execute(
         "UPDATE rollup_cell SET n_readings = n_readings + 1 WHERE width_s = 60"
         " AND start_ns = (SELECT min(start_ns) FROM rollup_cell WHERE width_s = 60)"
     )
-    delete_all(old, TIERS[1][0])
+    delete_all(rolled, TIERS[1][0])
 
     assert n_rows(path, "rollup_cell", "width_s = 60") == n_before
-    assert old.retention.trouble is not None
-    assert "roll-ups of 60 s of bearing 1 are damaged" in old.retention.trouble
+    assert rolled.retention.trouble is not None
+    assert "roll-ups of 60 s of bearing 1 are damaged" in rolled.retention.trouble
 
 
-def test_deleting_twice_changes_nothing(old: SqliteStore, path: Path) -> None:
+def test_deleting_twice_changes_nothing(rolled: SqliteStore, path: Path) -> None:
     limits = TIERS[1][0]
-    delete_all(old, limits)
+    delete_all(rolled, limits)
     once = [n_rows(path, t) for t in ("assessment", "rollup_cell", "rollup_numbers")]
 
-    assert not any(old.retention.delete(series, limits, NOW_NS) for series in series_of(old))
+    assert not any(rolled.retention.delete(series, limits, NOW_NS) for series in series_of(rolled))
     assert [n_rows(path, t) for t in ("assessment", "rollup_cell", "rollup_numbers")] == once
 
 
 def test_each_piece_of_work_is_small(
-    old: SqliteStore, path: Path, monkeypatch: pytest.MonkeyPatch
+    rolled: SqliteStore, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(deleting, "MAX_READINGS", 150)
-    (series,) = series_of(old)
+    (series,) = series_of(rolled)
     before = n_rows(path, "assessment")
-    while old.retention.delete(series, KEEP_NOTHING, NOW_NS):
+    while rolled.retention.delete(series, KEEP_NOTHING, NOW_NS):
         after = n_rows(path, "assessment")
         assert 0 < before - after <= 200
         before = after
@@ -128,7 +128,7 @@ EVENT = (
 
 
 def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
-    path: Path, old: SqliteStore, execute: Execute
+    path: Path, rolled: SqliteStore, execute: Execute
 ) -> None:
     rows = [("raised", 1, "delivered"), ("raised", 2, "delivered"), ("raised", 3, "waiting")]
     rows += [("other", 1, "refused")]
@@ -137,9 +137,9 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
         execute(LETTER, (f"{alarm}{number}", alarm, number, state, done_ns))
     limits = RetentionLimits(letters_ns=HOUR_NS)
 
-    old.retention.prune(limits, T0 + HOUR_NS)
+    rolled.retention.prune(limits, T0 + HOUR_NS)
     assert n_rows(path, "outbox") == 4
-    old.retention.prune(limits, T0 + HOUR_NS + 1)
+    rolled.retention.prune(limits, T0 + HOUR_NS + 1)
 
     assert n_rows(path, "outbox", "alarm = 'raised' AND number = 1") == 0
     assert n_rows(path, "outbox") == 3
@@ -148,13 +148,13 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(
 
 
 def test_a_message_of_what_happened_lately_stays_whatever_the_clock_said_then(
-    path: Path, old: SqliteStore, execute: Execute
+    path: Path, rolled: SqliteStore, execute: Execute
 ) -> None:
     for number, event_ns in ((1, T0 - 2 * HOUR_NS), (2, T0), (3, T0)):
         execute(EVENT, (number, event_ns))
         execute(LETTER, (f"probe{number}", "probe", number, "delivered", 0))
 
-    old.retention.prune(RetentionLimits(letters_ns=HOUR_NS), T0 + 1)
+    rolled.retention.prune(RetentionLimits(letters_ns=HOUR_NS), T0 + 1)
 
     assert n_rows(path, "outbox", "number = 1") == 0
     assert n_rows(path, "outbox") == 2

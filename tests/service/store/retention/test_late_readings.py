@@ -36,25 +36,25 @@ from service.store.sqlite import SqliteStore
 
 @pytest.mark.parametrize(("limits", "widths"), TIERS)
 def test_late_readings_are_added_to_what_is_left_of_their_hour(
-    old: SqliteStore,
+    rolled: SqliteStore,
     plain: SqliteStore,
     path: Path,
     limits: RetentionLimits,
     widths: tuple[int, ...],
 ) -> None:
-    delete_all(old, limits)
+    delete_all(rolled, limits)
     random = np.random.default_rng(2)
     late = [
         reading(assessment, random, T0 + hour * HOUR_NS + second * SECOND_NS + 7)
         for hour, second in ((1, 5), (1, 700), (1, 3599), (4, 1800), (4, 1801))
     ]
-    for store in (old, plain):
+    for store in (rolled, plain):
         store.append(late, [])
 
     for _ in range(2):  # before they are merged, and after that
         for minutes in widths:
-            require_same_hours(old.trend(asked(minutes)), plain.trend(asked(minutes)))
-        gather_all(old)
+            require_same_hours(rolled.trend(asked(minutes)), plain.trend(asked(minutes)))
+        gather_all(rolled)
     assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
     assert n_rows(path, "rollup_redo") == 0
 
@@ -134,7 +134,7 @@ def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
     ],
 )
 def test_planted_bugs_are_found(
-    old: SqliteStore,
+    rolled: SqliteStore,
     plain: SqliteStore,
     path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -148,13 +148,13 @@ def test_planted_bugs_are_found(
         connection.execute(
             "DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,)
         )
-    delete_all(old)
-    gather_all(old)
-    delete_all(old)
+    delete_all(rolled)
+    gather_all(rolled)
+    delete_all(rolled)
     late = reading(assessment, np.random.default_rng(2), T0 + HOUR_NS + 7)
-    for store in (old, plain):
+    for store in (rolled, plain):
         store.append([late], [])
-    gather_all(old)
+    gather_all(rolled)
 
     with pytest.raises(AssertionError):
-        require_same_hours(old.trend(asked(60)), plain.trend(asked(60)))
+        require_same_hours(rolled.trend(asked(60)), plain.trend(asked(60)))

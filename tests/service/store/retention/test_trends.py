@@ -29,55 +29,55 @@ from service.store.value_range import ValueRange
 
 @pytest.mark.parametrize(("limits", "widths"), TIERS)
 def test_trends_of_a_state_say_the_same_before_and_after(
-    old: SqliteStore,
+    rolled: SqliteStore,
     plain: SqliteStore,
     path: Path,
     limits: RetentionLimits,
     widths: tuple[int, ...],
 ) -> None:
-    delete_all(old, limits)
+    delete_all(rolled, limits)
 
     assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
     for minutes in widths:
         query = asked(minutes, states=(OperatingState.FULL_LOAD,))
-        require_same_hours(old.trend(query), plain.trend(query))
+        require_same_hours(rolled.trend(query), plain.trend(query))
 
 
 @pytest.mark.parametrize(
     ("limits", "width_s"), [(TIERS[0][0], 60), (TIERS[1][0], 600), (TIERS[2][0], 3600)]
 )
 def test_a_trend_over_what_is_gone_says_how_fine_it_is(
-    old: SqliteStore, limits: RetentionLimits, width_s: int
+    rolled: SqliteStore, limits: RetentionLimits, width_s: int
 ) -> None:
-    before = old.trend(asked(1, max_points=5000))
+    before = rolled.trend(asked(1, max_points=5000))
     assert (before.bucket_ns, before.coarse_until_ns) == (None, None)
 
-    delete_all(old, limits)
+    delete_all(rolled, limits)
 
     short = asked(start_ns=T0 + HOUR_NS, end_ns=T0 + 2 * HOUR_NS, max_points=5000)
     for query in (short, asked(max_points=5000)):
-        found = old.trend(query)
+        found = rolled.trend(query)
         assert found.bucket_ns == width_s * SECOND_NS
         assert found.coarse_until_ns == NOW_NS - HOUR_NS
-    newest = old.trend(asked(start_ns=NOW_NS - HOUR_NS, max_points=5000))
+    newest = rolled.trend(asked(start_ns=NOW_NS - HOUR_NS, max_points=5000))
     assert (newest.bucket_ns, newest.coarse_until_ns) == (None, None)
     assert len(newest.time_ns) > 30
 
 
-def test_pages_of_single_readings_say_from_when_on_there_are_any(old: SqliteStore) -> None:
-    delete_all(old)
+def test_pages_of_single_readings_say_from_when_on_there_are_any(rolled: SqliteStore) -> None:
+    delete_all(rolled)
 
-    page = old.trend(asked(is_page=True, max_points=1000))
+    page = rolled.trend(asked(is_page=True, max_points=1000))
 
     assert page.coarse_until_ns == NOW_NS - HOUR_NS
     assert min(page.time_ns) >= NOW_NS - HOUR_NS
 
 
-def test_bounds_take_cells_that_are_wholly_within(old: SqliteStore, plain: SqliteStore) -> None:
-    delete_all(old)
+def test_bounds_take_cells_that_are_wholly_within(rolled: SqliteStore, plain: SqliteStore) -> None:
+    delete_all(rolled)
     bounds = {"oil_temperature_c": ValueRange(45.7, 46.9)}
 
-    ours, theirs = old.trend(asked(60, **bounds)), plain.trend(asked(60, **bounds))
+    ours, theirs = rolled.trend(asked(60, **bounds)), plain.trend(asked(60, **bounds))
 
     pairs = list(
         zip(ours.series["speed_rpm"].count, theirs.series["speed_rpm"].count, strict=False)

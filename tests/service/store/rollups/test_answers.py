@@ -92,11 +92,11 @@ def count_roll_ups(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
 
 
 def test_a_whole_range_of_gathered_hours_reads_no_single_reading(
-    rolled: SqliteStore, plain: SqliteStore, path_of: Callable[[str], Path]
+    rolled: SqliteStore, plain: SqliteStore, tmp_path: Path
 ) -> None:
     day = replace(WHOLE, start_ns=T0 // HOUR_NS * HOUR_NS, end_ns=T0 // HOUR_NS * HOUR_NS + HOUR_NS)
     wanted = plain.trend(replace(day, max_points=2))
-    with closing(sqlite3.connect(path_of("rolled"))) as other, other:
+    with closing(sqlite3.connect(tmp_path / "rolled.sqlite3")) as other, other:
         other.execute("DELETE FROM assessment WHERE time_ns < ?", (day.end_ns,))
 
     require_same(rolled.trend(replace(day, max_points=2)), wanted)

@@ -1,7 +1,6 @@
 """However readings come, late, in pieces or before a crash, they are gathered to the same."""
 
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -9,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.assessments import assessment
 from rigs.rolled_trends import LATER_NS, gather_all, require_same
 from rigs.varied_results import (
     HOUR_NS,
     MINUTE_NS,
     T0,
     WHOLE,
-    Build,
     N,
     dump,
 )
@@ -33,35 +32,34 @@ def test_what_comes_piece_by_piece_is_gathered_like_what_comes_at_once(
     plain: SqliteStore,
     rolled: SqliteStore,
     results: list[Assessment],
-    path_of: Callable[[str], Path],
+    tmp_path: Path,
 ) -> None:
-    with closing(SqliteStore(path_of("pieces"))) as store:
+    with closing(SqliteStore(tmp_path / "pieces.sqlite3")) as store:
         for first in range(0, N, 37):
             store.append(results[first : first + 37], [])
             gather_all(store)
         for found in (store, rolled):
             require_same(found.trend(WHOLE), plain.trend(WHOLE))
 
-    assert dump(path_of("rolled")) == dump(path_of("pieces"))
+    assert dump(tmp_path / "rolled.sqlite3") == dump(tmp_path / "pieces.sqlite3")
 
 
 @pytest.mark.parametrize("at_once", [2, 50])
 @pytest.mark.usefixtures("rolled")
 def test_a_bounded_number_of_readings_is_gathered_at_a_time(
-    plain: SqliteStore, path_of: Callable[[str], Path], monkeypatch: Any, at_once: int
+    plain: SqliteStore, tmp_path: Path, monkeypatch: Any, at_once: int
 ) -> None:
     monkeypatch.setattr(rolling, "MAX_READINGS", at_once)
     gather_all(plain)
 
-    assert dump(path_of("plain")) == dump(path_of("rolled"))
+    assert dump(tmp_path / "plain.sqlite3") == dump(tmp_path / "rolled.sqlite3")
 
 
 @pytest.mark.parametrize("late_min", [3, 200, *(pytest.param(n, marks=LONG) for n in (70, 254))])
 def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     rolled: SqliteStore,
     plain: SqliteStore,
-    assessment: Build,
-    path_of: Callable[[str], Path],
+    tmp_path: Path,
     late_min: int,
 ) -> None:
     late = assessment(T0 + late_min * MINUTE_NS + 1, speed_rpm=1e6, eccentricity_ratio=0.35)
@@ -80,14 +78,14 @@ def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     gather_all(rolled)
     require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
     assert max(v for v in rolled.trend(WHOLE).series["speed_rpm"].maximum if v is not None) == 1e6
-    with closing(sqlite3.connect(path_of("rolled"))) as reader:
+    with closing(sqlite3.connect(tmp_path / "rolled.sqlite3")) as reader:
         assert reader.execute("SELECT count(*) FROM rollup_redo").fetchone() == (0,)
 
 
 def test_a_crash_while_gathering_leaves_nothing_half_done(
-    plain: SqliteStore, path_of: Callable[[str], Path]
+    plain: SqliteStore, tmp_path: Path
 ) -> None:
-    with closing(sqlite3.connect(path_of("plain"))) as other, other:
+    with closing(sqlite3.connect(tmp_path / "plain.sqlite3")) as other, other:
         other.execute(
             "CREATE TRIGGER crash BEFORE INSERT ON rollup_mark"
             " BEGIN SELECT RAISE(ABORT, 'power cut'); END"
@@ -99,7 +97,7 @@ def test_a_crash_while_gathering_leaves_nothing_half_done(
         plain.rollups.gather(series, LATER_NS)
 
     require_same(plain.trend(WHOLE), before)
-    with closing(sqlite3.connect(path_of("plain"))) as other, other:
+    with closing(sqlite3.connect(tmp_path / "plain.sqlite3")) as other, other:
         assert other.execute("SELECT count(*) FROM rollup_cell").fetchone() == (0,)
         other.execute("DROP TRIGGER crash")
     gather_all(plain)
@@ -107,13 +105,13 @@ def test_a_crash_while_gathering_leaves_nothing_half_done(
 
 
 def test_a_reading_from_the_future_does_not_make_all_others_late(
-    plain: SqliteStore, assessment: Build, path_of: Callable[[str], Path]
+    plain: SqliteStore, tmp_path: Path
 ) -> None:
     now_ns = T0 + 10 * HOUR_NS
     plain.append([assessment(T0 + 1000 * HOUR_NS, speed_rpm=1.0)], [])
     gather_all(plain, now_ns)
 
-    with closing(sqlite3.connect(path_of("plain"))) as reader:
+    with closing(sqlite3.connect(tmp_path / "plain.sqlite3")) as reader:
         assert reader.execute("SELECT until_ns FROM rollup_mark").fetchone()[0] <= now_ns
 
 
