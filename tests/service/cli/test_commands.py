@@ -91,14 +91,6 @@ def test_the_schema_says_what_every_key_means() -> None:
         assert reference in schema["$defs"]
 
 
-def test_help_names_every_command() -> None:
-    result = padwatch("--help")
-
-    assert result.exit_code == 0
-    for command in ("run", "demo", "daq", "validate", "config"):
-        assert re.search(rf"\b{command}\b", result.stdout)
-
-
 def _keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     for model in [schema, *schema["$defs"].values()]:
         for name, key in model.get("properties", {}).items():

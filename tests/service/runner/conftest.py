@@ -205,15 +205,8 @@ def block() -> Callable[..., SampleBlock]:
 
 
 @pytest.fixture
-def plant(tmp_path: Path) -> Iterator[Plant]:
-    built = Plant(tmp_path / "padwatch.sqlite3")
-    yield built
-    built.store.close()
-
-
-@pytest.fixture
-def small_plant(tmp_path: Path) -> Iterator[Plant]:
-    """A plant whose recorder keeps three findings at most."""
-    built = Plant(tmp_path / "padwatch.sqlite3", capacity=3)
+def plant(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Plant]:
+    """A plant; the parameter is how many findings its recorder keeps at most."""
+    built = Plant(tmp_path / "padwatch.sqlite3", getattr(request, "param", 5000))
     yield built
     built.store.close()

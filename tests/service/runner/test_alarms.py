@@ -123,10 +123,10 @@ async def test_the_same_samples_give_the_same_events_however_they_come(
     other.store.close()
 
 
+@pytest.mark.parametrize("plant", [3], indirect=True)
 async def test_news_of_alarms_outlives_a_store_that_fails_for_longer_than_results_do(
-    small_plant: Any, scripted: Make, block: Make
+    plant: Any, scripted: Make, block: Make
 ) -> None:
-    plant = small_plant
     broken = (
         "CREATE TRIGGER broken BEFORE INSERT ON alarm_event BEGIN SELECT RAISE(ABORT, 'x'); END"
     )

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+import structlog
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
@@ -43,30 +44,23 @@ async def test_a_device_that_does_not_answer_is_tried_again_in_each_poll_period(
 async def test_a_unit_without_link_says_why_and_since_when(
     plant: Any, scripted: Make, block: Make
 ) -> None:
-    first = scripted([LinkError("10.0.0.7:502: Connection refused")], [block(0)], ends=False)
+    reasons = ["10.0.0.7:502: Connection refused", "10.0.0.7:502: No route to host"]
+    source = scripted(*([LinkError(reason)] for reason in reasons), [block(0)], ends=False)
     seen: list[Any] = []
     plant.clock.sleep = _noting(plant, seen, plant.clock.sleep)
 
-    await run_until(plant, first.exhausted, U1=first)
+    with structlog.testing.capture_logs() as said:
+        await run_until(plant, source.exhausted, U1=source)
 
     assert [(s.state, s.reason) for s in seen] == [
-        (LinkState.NOT_CONNECTED, "10.0.0.7:502: Connection refused")
+        (LinkState.NOT_CONNECTED, reason) for reason in reasons
     ]
-    assert seen[0].since_ns == plant.clock.now_ns() - round(plant.clock.elapsed_s * 1e9)
+    begun_ns = plant.clock.now_ns() - round(plant.clock.elapsed_s * 1e9)
+    assert [s.since_ns for s in seen] == [begun_ns] * 2
+    assert [entry["event"] for entry in said] == ["not connected", "connected"]
     status = plant.live.status("U1")
     assert (status.state, status.reason) == (LinkState.CONNECTED, None)
     assert status.since_ns == plant.clock.now_ns()
-
-
-async def test_another_reason_replaces_the_first_but_not_since_when(plant: Any) -> None:
-    assert plant.live.set_link("U1", LinkState.NOT_CONNECTED, "refused")
-    plant.clock.elapsed_s = 60.0
-
-    assert not plant.live.set_link("U1", LinkState.NOT_CONNECTED, "no route")
-
-    status = plant.live.status("U1")
-    assert status.reason == "no route"
-    assert status.since_ns == plant.clock.now_ns() - 60_000_000_000
 
 
 async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(

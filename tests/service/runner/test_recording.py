@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx2
+import pytest
 from rigs.alarm_runs import Make, play
 
 from core.account import Gap
@@ -119,10 +120,10 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     assert stored(plant)[-1] == plant.live.assessment("U1", "UJB").readings[K].value
 
 
+@pytest.mark.parametrize("plant", [3], indirect=True)
 async def test_what_does_not_fit_while_the_store_is_away_is_counted(
-    small_plant: Any, scripted: Make, block: Make
+    plant: Any, scripted: Make, block: Make
 ) -> None:
-    plant = small_plant
     break_store(plant)
 
     await play(plant, scripted, [block(number) for number in range(36)], flush=False)

@@ -59,16 +59,11 @@ async def program(manager_socket: Any, stepped_clock: Any) -> Any:
     await asyncio.wait(program.tasks)
 
 
-def test_a_manager_hears_how_the_service_begins_and_ends(
-    manager_socket: Any, stepped_clock: Any
+async def test_a_manager_hears_how_the_service_begins_and_ends(
+    program: Any, manager_socket: Any
 ) -> None:
-    live = LiveView(["U1", "U2"], stepped_clock, 10.0)
-    live.set_link("U2", LinkState.CONNECTED)
-    manager = ServiceManager(manager_socket.environment)
-    supervision = Supervision(manager, Heartbeats(stepped_clock), live, ["U1", "U2"], stepped_clock)
-
-    supervision.ready()
-    supervision.stopping()
+    program.supervision.ready()
+    program.supervision.stopping()
 
     assert manager_socket.received == [
         {"READY": "1", "STATUS": "1 of 2 units connected"},
@@ -106,7 +101,7 @@ async def test_a_stuck_loop_is_named_and_starves_the_watchdog_until_it_goes_on(
     assert [message.get("WATCHDOG") for message in manager_socket.received] == ["1"]
 
 
-async def test_a_loop_that_has_ended_is_dead_however_lately_it_beat(
+async def test_a_loop_that_has_ended_is_dead_however_lately_it_beat_unless_its_work_is_done(
     program: Any, manager_socket: Any
 ) -> None:
     program.loops["record"].ends = True
@@ -116,12 +111,7 @@ async def test_a_loop_that_has_ended_is_dead_however_lately_it_beat(
     assert program.beats.troubles == {"record": "has ended"}
     assert manager_socket.received == [{"STATUS": "record has ended"}]
 
-
-async def test_a_loop_that_has_done_its_work_is_not_missed(program: Any) -> None:
-    program.loops["record"].ends = True
-    await program.loops["record"].go_on()
     program.beats.release("record")
-
     assert program.beats.look() == {"alarms": None}
 
 

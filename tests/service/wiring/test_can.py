@@ -63,16 +63,18 @@ def test_the_example_dbc_can_be_named_as_any_other(unit, stepped_clock):
     CanSource(can_settings_of(unit, source), calibration_of(unit), stepped_clock)
 
 
-@pytest.mark.parametrize("channel", ["can0", "socket://127.0.0.1:x"])
-def test_a_place_where_no_daq_can_be_is_refused(channel, unit, stepped_clock):
-    source = settings(profile="padwatch_int16", channel=channel)
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"profile": "padwatch_int16", "channel": "can0"}, "is no place for a simulated DAQ"),
+        (
+            {"profile": "padwatch_int16", "channel": "socket://127.0.0.1:x"},
+            "is no place for a simulated DAQ",
+        ),
+        ({"dbc": "demo_classic.dbc", "signals": {"x": "A.b"}}, "reads CAN by its own DBC"),
+    ],
+)
+def test_a_daq_that_cannot_be_simulated_is_refused(keys, said, unit, stepped_clock):
     feed = simulated_feed(unit, stepped_clock)
-    with pytest.raises(LookupError, match="is no place for a simulated DAQ"):
-        can_daq_of(unit, source, feed, None, patient=False)
-
-
-def test_a_daq_cannot_speak_a_foreign_dbc(unit, stepped_clock):
-    source = settings(dbc="demo_classic.dbc", signals={"x": "A.b"})
-    feed = simulated_feed(unit, stepped_clock)
-    with pytest.raises(LookupError, match="reads CAN by its own DBC"):
-        can_daq_of(unit, source, feed, None, patient=False)
+    with pytest.raises(LookupError, match=said):
+        can_daq_of(unit, settings(**keys), feed, None, patient=False)
