@@ -1,6 +1,7 @@
 """The simulated CAN DAQ: its pace, its end, its faults on command."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -54,19 +55,12 @@ def device(counting_feed) -> CanDevice:
     return CanDevice(counting_feed(), SHAPE)
 
 
-async def test_an_adapter_answers_commands_and_refuses_to_send(device):
-    device.next_frames()
+async def test_an_adapter_answers_commands_refuses_to_send_and_has_frames_when_open(device):
     async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as terminal:
-        answers = [await terminal.ask(c + b"\r") for c in (b"C", b"S6", b"Y2", b"L", b"t1230")]
-        assert answers == [b"\r", b"\r", b"\r", b"\r", b"\a"]
-        assert dict(server.commands) == {"C": 1, "S": 1, "Y": 1, "L": 1, "t": 1}
-
-
-async def test_frames_flow_from_open_to_close(device):
-    async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as terminal:
-        assert await terminal.ask(b"L\r") == b"\r"
-        first = await terminal.reader.readuntil(b"\r")
-        assert first == b"t10080000000007000000\r"
+        answers = [await terminal.ask(c + b"\r") for c in (b"C", b"S6", b"Y2", b"t1230", b"L")]
+        assert answers == [b"\r", b"\r", b"\r", b"\a", b"\r"]
+        assert dict(server.commands) == {"C": 1, "S": 1, "Y": 1, "t": 1, "L": 1}
+        assert await terminal.reader.readuntil(b"\r") == b"t10080000000007000000\r"
         assert await terminal.reader.readuntil(b"\r") == b"t10180000320003000000\r"
 
 
@@ -101,21 +95,6 @@ async def test_a_port_in_use_is_an_error_that_names_it(device):
             await SlcanTcpServer(device, port=int(where.rpartition(":")[2])).__aenter__()
 
 
-async def test_a_served_recording_ends_when_all_of_it_is_taken(counting_feed):
-    device = CanDevice(EndingFeed(counting_feed(), 200), SHAPE)
-    async with (
-        SlcanTcpServer(device, on_demand=True) as server,
-        Terminal(server.endpoint) as terminal,
-    ):
-        await terminal.ask(b"L\r")
-        running = asyncio.create_task(server.run())
-        text = b""
-        while text.count(b"t100") < 200:
-            text += await terminal.reader.read(65536)
-        await running
-    assert device.ledger.n_samples("U1") == 200 * 50
-
-
 async def test_a_device_that_nobody_reads_stays_bounded(device):
     device.produce(10_000)
     n_waiting = 0
@@ -127,22 +106,28 @@ async def test_a_device_that_nobody_reads_stays_bounded(device):
     assert int.from_bytes(frames[0].data[:4], "little") == 10_000 * 50
 
 
-async def test_a_patient_daq_loses_nothing_while_nobody_listens(counting_feed, stepped_clock):
+@pytest.mark.parametrize("patient", [True, False], ids=["patient", "on demand"])
+async def test_a_daq_that_waits_for_its_reader_loses_nothing_and_ends(
+    counting_feed, stepped_clock, patient
+):
     device = CanDevice(EndingFeed(counting_feed(), 300), SHAPE)
-    async with SlcanTcpServer(device, stepped_clock, patient=True) as server:
+    how = {"clock": stepped_clock, "patient": True} if patient else {"on_demand": True}
+    async with SlcanTcpServer(device, **how) as server:
         for _ in range(100):
             await asyncio.sleep(0)
         assert stepped_clock.monotonic_s() == 0.0
         async with Terminal(server.endpoint) as terminal:
             await terminal.ask(b"L\r")
+            running = asyncio.create_task(server.run())
             text = b""
             while text.count(b"t100") < 300:
                 text += await terminal.reader.read(65536)
-            await server.run()
+            await running
     heads = [line for line in text.split(b"\r") if line.startswith(b"t100")]
     first = [int.from_bytes(bytes.fromhex(h[5:13].decode()), "little") for h in heads]
     assert first == [50 * n for n in range(300)]
-    assert stepped_clock.monotonic_s() >= 299 * 50 / 600.0
+    assert device.ledger.n_samples("U1") == 300 * 50
+    assert not patient or stepped_clock.monotonic_s() >= 299 * 50 / 600.0
 
 
 async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
@@ -153,15 +138,11 @@ async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
         assert server.commands == {}
 
 
-def test_a_feed_with_other_channels_is_refused(counting_feed):
+def test_a_feed_that_does_not_fit_the_shape_is_refused(counting_feed):
     with pytest.raises(ConfigError, match=r"\(3, 2\) in the feed, \(2, 2\)"):
         CanDevice(counting_feed(n_channels=3), SHAPE)
-
-
-def test_counts_in_a_profile_of_engineering_units_are_refused_with_the_right_one(counting_feed):
-    shape = CanShape(channels=SHAPE.channels, slow=SHAPE.slow, floats=True)
     with pytest.raises(ConfigError, match=r'need the profile "padwatch_int16", not "padwatch_f'):
-        CanDevice(counting_feed(), shape)
+        CanDevice(counting_feed(), replace(SHAPE, floats=True))
 
 
 async def test_a_link_to_a_terminal_stays_when_its_number_changes(tmp_path, device):

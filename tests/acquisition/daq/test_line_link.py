@@ -4,26 +4,22 @@ import os
 from pathlib import Path
 
 import pytest
+from rigs.can import shape_of
 
 from acquisition.daq.can_device import CanDevice
-from acquisition.daq.can_shape import CanShape, DaqSignal
 from acquisition.daq.can_slcan import SlcanPtyServer
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import RtuRingServer
 from acquisition.errors import ConfigError, LinkError
 
-SHAPE = CanShape(
-    channels=(DaqSignal("a", "V"), DaqSignal("b", "V")),
-    slow=(DaqSignal("s", "MW"), DaqSignal("t", "MW")),
-)
-
 
 @pytest.fixture(params=["modbus", "can"])
-def serve(request, counting_feed):
+def serve(request, counting_feed, counts_calibration):
     def served(link: Path):
         if request.param == "modbus":
             return RtuRingServer(RingDevice(counting_feed()), link=link)
-        return SlcanPtyServer(CanDevice(counting_feed(), SHAPE), link=link)
+        shape = shape_of(counts_calibration(), fd=False)
+        return SlcanPtyServer(CanDevice(counting_feed(), shape), link=link)
 
     return served
 

@@ -150,6 +150,33 @@ class Hurry(SystemClock):
         await super().sleep(duration_s / 1000.0)
 
 
+def read(device: RingDevice, *sequences: int) -> None:
+    """Read slots as a source does, and let far more time pass than the ring is long."""
+    for sequence in sequences:
+        address = device.layout.slot_address(sequence)
+        device.read_registers(3, address, device.layout.slot_registers)
+    device.produce(1000)
+
+
+def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read() -> None:
+    pieces = ((7, 0, 200), (7, 350, 600), (8, 0, 600))
+    device = RingDevice(PiecewiseFeed(*pieces), settings=RingDeviceSettings(n_slots=8))
+    device.patient = True
+    device.produce(1000)
+    assert device.newest == 0  # a reader that has not begun would leave out what came before
+    for sequence, newest in ((0, 3), (3, 3), (2, 3), (1, 7)):  # slot 7 is four places on from 3
+        read(device, sequence)
+        assert device.newest == newest
+    read(device, 2, 3)
+    read(device, 7, 8, 9, 10)
+    assert (device.epoch, device.newest) == (7, 11)  # a restart waits for the last slot
+    read(device)
+    assert (device.epoch, device.newest) == (7, 11)
+    device.read_registers(3, device.layout.slot_address(11), device.layout.slot_registers)
+    device.produce(1)
+    assert (device.epoch, device.newest) == (8, 0)
+
+
 async def test_a_patient_server_loses_nothing_however_fast_its_clock(settings, counts_calibration):
     device = RingDevice(PiecewiseFeed(*PIECES), settings=settings)
     async with ModbusRingServer(device, Hurry(), patient=True) as server:

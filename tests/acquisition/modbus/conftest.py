@@ -5,7 +5,6 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 import pytest
-from rigs.bench import Bench
 from rigs.hostile_modbus import HostileLine, HostileServer
 from rigs.modbus import transport_of
 from rigs.polled import CALIBRATION, Follower, device_of, map_of
@@ -13,6 +12,7 @@ from rigs.queues import queue_plant
 
 from acquisition.clock import SystemClock
 from acquisition.daq.map_device import MapDevice
+from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
@@ -137,6 +137,39 @@ def plant(stepped_clock) -> Callable:
 def queues(counting_feed, counts_calibration, stepped_clock) -> Callable:
     """Serves queues of a layout, on a stepped clock; other settings as keywords."""
     return partial(queue_plant, counting_feed(), counts_calibration(), stepped_clock)
+
+
+class Bench:
+    """A device with some of everything that can be read."""
+
+    step_s = 1.0
+    ended = drained = False
+
+    def __init__(self) -> None:
+        self.memory = RegisterMemory(100, 300)
+        self.memory.write(100, bytes(range(200)))
+        self.bits = bytes([0b1010_0101, 0b11, 0xFF] * 100)
+        self.queues = {100: b"", 7: bytes(range(62)), 8: b"", 9: bytes(64)}
+        self.identification = {0: b"Acme", 1: b"DAQ-12", 2: b"1.4"}
+
+    def read_registers(self, function, address, count):  # noqa: ARG002
+        return self.memory.read(address, count)
+
+    def read_bits(self, function, address, count):
+        n_bytes = -(-count // 8)
+        return self.bits[address // 8 : address // 8 + n_bytes] if function == 2 else bytes(n_bytes)
+
+    def read_fifo(self, address):
+        return self.queues.get(address)
+
+    def produce(self, n_steps):
+        pass
+
+    def fault_names(self):
+        return []
+
+    def spoil(self, fault, count):
+        pass
 
 
 @pytest.fixture
