@@ -35,12 +35,11 @@ def recorded(
 
     def run(bug: str = "") -> list[Step]:
         folder = tmp_path_factory.mktemp("tape")
-        data = folder / "data"
-        data.mkdir()
+        (folder / "data").mkdir()
         with (folder / "deeds").open("wb") as file:
             pickle.dump([deed(torture_seed, n, assessment) for n in range(N_DEEDS)], file)
-        command = python("-m", "harness.writing", data / DATABASE, folder / "deeds", bug)
-        return record(command, data, folder / "tape", environment())
+        command = python("-m", "harness.enduring", folder / "deeds", folder, bug)
+        return record(command, folder / "data", folder / "tape", environment())
 
     return run
 

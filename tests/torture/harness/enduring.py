@@ -1,10 +1,11 @@
-"""A program that goes on when the disk fails, again and again: one process for each time.
+"""A program that appends transactions, and goes on when the disk fails.
 
-``python -m harness.enduring DEEDS [BUG]``: for each folder on its standard input, a process of its
-own stops until it is continued, then appends the transactions that are pickled in the file DEEDS to
-a store there. One that fails is tried again, as the service does. The numbers of those that are
-durable go into the file ``acks``, what failed into ``errors``. Says the number of each process, and
-when it has ended ``END`` and its exit code: 0 if all are durable, 3 if it gave up.
+``python -m harness.enduring DEEDS FOLDER [BUG]`` appends the transactions that are pickled in the
+file DEEDS to a store in FOLDER. One that fails is tried again, as the service does. The numbers of
+those that are durable go into the file ``acks``, what failed into ``errors``. The exit code is 0 if
+all are durable, 3 if it gave up. With ``-`` as FOLDER there is one process for each folder on the
+standard input, which stops until it is continued; the program says its number, and when it has
+ended ``END`` and its exit code.
 """
 
 import os
@@ -25,15 +26,18 @@ DATABASE = "padwatch.sqlite3"
 
 
 def main() -> None:
-    """Begin one process after the other."""
+    """Append them, here or in one process after the other."""
     with Path(sys.argv[1]).open("rb") as file:
         deeds: list[Deed] = pickle.load(file)  # noqa: S301  our own
+    folder, *bugs = sys.argv[2:]
+    if folder != "-":
+        sys.exit(_endure(Path(folder), deeds, bugs))
     for line in sys.stdin:
         sys.stdout.flush()
         pid = os.fork()
         if pid == 0:
             os.kill(os.getpid(), signal.SIGSTOP)
-            os._exit(_endure(Path(line.strip()), deeds, sys.argv[2:]))
+            os._exit(_endure(Path(line.strip()), deeds, bugs))
         print(pid, flush=True)
         _, status = os.waitpid(pid, 0)
         print("END", os.waitstatus_to_exitcode(status), flush=True)
@@ -46,7 +50,11 @@ def _endure(folder: Path, deeds: Sequence[Deed], bugs: Sequence[str]) -> int:
     store = _opened(path, errors)
     if store is None:
         return GAVE_UP
+    if "synchronous_normal" in bugs:
+        store._writer.execute("PRAGMA synchronous = NORMAL")
     for number, deed in enumerate(deeds):
+        if "acknowledged_before_commit" in bugs:
+            os.write(acks, f"{number}\n".encode())
         if not _is_done(store, deed, errors, bugs) and "promises_anyway" not in bugs:
             return GAVE_UP
         os.write(acks, f"{number}\n".encode())
@@ -67,7 +75,7 @@ def _opened(path: Path, errors: int) -> SqliteStore | None:
 def _is_done(store: SqliteStore, deed: Deed, errors: int, bugs: Sequence[str]) -> bool:
     for _ in range(ATTEMPTS):
         try:
-            if "in_two_parts" in bugs:
+            if "in_two_parts" in bugs or "two_transactions" in bugs:
                 store.append([deed.assessment], [deed.gap])
                 store.append([], [], [deed.alarm], [deed.film])
             deed.append_to(store)

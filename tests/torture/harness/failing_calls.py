@@ -21,17 +21,7 @@ PATIENCE_S = 120.0
 
 @dataclass(frozen=True)
 class Case:
-    """What fails.
-
-    Parameters
-    ----------
-    call
-        A system call.
-    error
-        What it says, such as ``EIO``.
-    number
-        Which one of its kind fails first, counted from 1.
-    """
+    """The n-th system call of a kind, counted from 1, fails with an error such as ``EIO``."""
 
     call: str
     error: str
@@ -71,11 +61,7 @@ class FailingCalls:
         _wait_until_stopped(pid)
         options = [word for one in inject for word in ("-e", f"inject={one}")]
         command = ["strace", "-f", "-o", str(folder / "tape"), *options, "-p", str(pid)]
-        strace = subprocess.Popen(
-            command,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        strace = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         try:
             assert strace.stderr is not None
             said = strace.stderr.readline()
@@ -108,7 +94,7 @@ def failing_calls(folder: Path, deeds: Sequence[Deed], *bugs: str) -> Iterator[F
     with (folder / "deeds").open("wb") as file:
         pickle.dump(list(deeds), file)
     server = subprocess.Popen(
-        python("-m", "harness.enduring", folder / "deeds", *bugs),
+        python("-m", "harness.enduring", folder / "deeds", "-", *bugs),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -27,9 +27,8 @@ from acquisition.daq.ring_device import RingDevice
 from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from harness.ledger_plant import LedgerFeed, LedgerPlant
+from harness.tape import environment, python
 from service.daq_program import run_daq
-
-ROOT = Path(__file__).parents[3]
 
 
 class OfferedLog(Ledger):
@@ -129,11 +128,11 @@ def ledger_daq(plant: LedgerPlant, folder: Path) -> Iterator[LedgerDaq]:
     """Run one, until the end of the block or of this process."""
     log = folder / "offered.txt"
     process = subprocess.Popen(
-        [sys.executable, "-m", "harness.ledger_daq", log, json.dumps(dataclasses.asdict(plant))],
+        python("-m", "harness.ledger_daq", log, json.dumps(dataclasses.asdict(plant))),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        env={"PYTHONPATH": f"{ROOT}:{ROOT / 'tests' / 'torture'}", "OPENBLAS_NUM_THREADS": "1"},
+        env=environment(),
     )
     try:
         assert process.stdout is not None

@@ -5,13 +5,13 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any, Self
 from urllib.parse import urlsplit
 
-ROOT = Path(__file__).parents[3]
+from harness.tape import environment, python
+
 PATIENCE_S = 120.0
 """Until a test gives up on a busy machine; nothing waits so long when all is well."""
 
@@ -104,21 +104,15 @@ class ServiceRig:
     def start(self) -> None:
         """Start it; returns at once."""
         assert self.process is None
-        environment = {
-            **os.environ,
-            "PYTHONPATH": f"{ROOT}:{ROOT / 'tests' / 'torture'}",
-            "PYTHONUNBUFFERED": "1",
-            **self._environment,
-        }
         role, *options = self._role
-        command = [sys.executable, "-m", self._program, role, str(self._plant_file), "--port", "0"]
+        command = python("-m", self._program, role, self._plant_file, "--port", 0)
         with self.log.open("a", encoding="utf-8") as log:
             self.process = subprocess.Popen(
                 [*self._before, *command, *options],
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
-                env=environment,
+                env=environment() | {"PYTHONUNBUFFERED": "1"} | self._environment,
             )
         self.started_s = time.monotonic()
         self.url = ""

@@ -85,8 +85,8 @@ def record(
     Parameters
     ----------
     command
-        Of a program with one thread, which writes ``ACK n`` to its standard output once the
-        transaction of that number is durable.
+        Of a program with one thread, which writes the number of a transaction into the file
+        ``acks``, outside the folder, once it is durable.
     """
     subprocess.run(
         [*STRACE, "-e", f"trace={CALLS}", "-o", str(tape), *command],
@@ -117,11 +117,6 @@ def _step(
     call: str, arguments: str, result: int, folder: Path, offsets: dict[str, int], known: set[str]
 ) -> Iterator[Step]:
     texts = [bytes.fromhex(text.replace("\\x", "")) for text in _TEXT.findall(arguments)]
-    if call == "write" and arguments.startswith("1<"):
-        word, number = texts[0].split()
-        assert word == b"ACK", texts
-        yield Acknowledged(int(number))
-        return
     if call == "openat":
         name = _within(texts[0].decode(), folder)
         if name is None or "O_CREAT" not in arguments:
@@ -144,6 +139,9 @@ def _step(
         return
     file = _FD.match(arguments)
     path = "" if file is None else bytes.fromhex(file[2].replace("\\x", "")).decode()
+    if call == "write" and Path(path).name == "acks":
+        yield Acknowledged(int(texts[0]))
+        return
     name = _within(path, folder)
     if name is None or name.endswith("-shm"):
         return  # what is shared by processes only; rebuilt after a crash
