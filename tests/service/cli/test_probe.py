@@ -67,8 +67,11 @@ def at(server: ModbusTcpServer) -> str:
     return f"127.0.0.1:{server.port}"
 
 
-async def test_registers_are_read_in_every_type_and_byte_order(probe, server) -> None:
-    result = await probe("modbus", at(server), "--address", "100", "--count", "2", "--json")
+async def test_registers_are_read_in_every_type_and_byte_order_and_the_likely_one_is_marked(
+    probe, server
+) -> None:
+    look = ("modbus", at(server), "--address", "100", "--count", "2")
+    result, table = await probe(*look, "--json"), await probe(*look)
 
     assert result.exit_code == 0, result.output
     first, last = json.loads(result.stdout)
@@ -84,12 +87,7 @@ async def test_registers_are_read_in_every_type_and_byte_order(probe, server) ->
     assert last["pairs"] == {}
     assert last["singles"]["uint16 AB"] == int.from_bytes(straight[:2], "big")
     assert last["singles"]["uint16 BA"] == int.from_bytes(straight[1::-1], "big")
-
-
-async def test_the_table_marks_the_float_that_makes_sense(probe, server) -> None:
-    result = await probe("modbus", at(server), "--address", "100", "--count", "2")
-
-    marked = [line for line in result.stdout.splitlines() if line.endswith("*")]
+    marked = [line for line in table.stdout.splitlines() if line.endswith("*")]
     assert [line.split()[-2] for line in marked] == ["92.25"]
 
 
