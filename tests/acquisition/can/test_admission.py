@@ -14,7 +14,6 @@ from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
 from acquisition.daq.can_bus import _message
 from acquisition.daq.can_dbc import daq_settings
-from acquisition.daq.can_faults import FrameFaults
 from acquisition.daq.can_frames import FrameEncoder
 
 N_EACH = 200
@@ -104,8 +103,3 @@ def test_no_code_of_the_adapter_can_send():
     for path in Path(acquisition.can.__file__).parent.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             assert not (isinstance(node, ast.Attribute) and node.attr in calls), path
-
-
-def test_a_fault_nobody_knows_is_refused_with_those_there_are():
-    assert {"drop", "flood"} <= set(FrameFaults().known)
-    assert "long_line" not in FrameFaults().known

@@ -6,7 +6,6 @@ import itertools
 import pytest
 from rigs.tiers import covering, fast_and_long
 
-from acquisition.clock import SystemClock
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_slcan import SlcanTcpServer
 from acquisition.delivery import Delivery
@@ -47,49 +46,39 @@ def straight(feed, calibration, n_samples: int = 50) -> list:
         return blocks
 
 
+@pytest.fixture
+def both_ways(eventful_feed, shape_of, source_of, counts_calibration, read_up_to):
+    """Blocks of a feed straight from the converter, those over the wire, and what was refused."""
+
+    async def read(feed: dict, shape: dict, n_samples: int = 50):
+        direct = straight(eventful_feed(**feed), counts_calibration(n_channels=4), n_samples)
+        shape = shape_of(**shape)
+        device = CanDevice(eventful_feed(**feed), shape, block_samples=n_samples)
+        async with SlcanTcpServer(device, on_demand=True) as server:
+            source = source_of(shape, server.endpoint, when_full="wait")
+            wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+            await server.run()
+        return direct, wired, source.refused_frames
+
+    return read
+
+
 @pytest.mark.parametrize("seed", fast_and_long(1, 2))
 @pytest.mark.parametrize("floats", [False, True], ids=["counts", "floats"])
 @pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
 async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
-    fd, floats, seed, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
+    fd, floats, seed, both_ways
 ):
-    direct = straight(eventful_feed(floats=floats, seed=seed), counts_calibration(n_channels=4))
-    shape = shape_of(fd=fd, floats=floats)
-    device = CanDevice(eventful_feed(floats=floats, seed=seed), shape)
-    async with SlcanTcpServer(device, on_demand=True) as server:
-        source = source_of(shape, server.endpoint, when_full="wait")
-        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
-        await server.run()
+    feed, shape = {"floats": floats, "seed": seed}, {"fd": fd, "floats": floats}
+    direct, wired, refused = await both_ways(feed, shape)
     assert fingerprint(wired) == fingerprint(direct)
     assert len({b.epoch for b in direct}) > 1
     assert any(a.stop_index < b.first_index for a, b in itertools.pairwise(direct))
-    assert source.refused_frames == {}
+    assert refused == {}
 
 
 @pytest.mark.parametrize(("n_samples", "kind"), covering([1, 3, 48, 51], list(KINDS)))
-async def test_blocks_of_any_length_come_through(
-    kind, n_samples, eventful_feed, shape_of, source_of, counts_calibration, read_up_to
-):
+async def test_blocks_of_any_length_come_through(kind, n_samples, both_ways):
     """Also where they end within a frame of five samples."""
-    feeds = [eventful_feed(n_blocks=200) for _ in range(2)]
-    direct = straight(feeds[0], counts_calibration(n_channels=4), n_samples)
-    shape = shape_of(**KINDS[kind])
-    device = CanDevice(feeds[1], shape, block_samples=n_samples)
-    async with SlcanTcpServer(device, on_demand=True) as server:
-        source = source_of(shape, server.endpoint, when_full="wait")
-        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+    direct, wired, _ = await both_ways({"n_blocks": 200}, KINDS[kind], n_samples)
     assert fingerprint(wired) == fingerprint(direct)
-
-
-async def test_a_paced_daq_serves_the_same_at_any_speed(
-    eventful_feed, shape_of, source_of, counts_calibration, read_up_to, stepped_clock
-):
-    direct = straight(eventful_feed(), counts_calibration(n_channels=4))
-    shape = shape_of()
-    device = CanDevice(eventful_feed(), shape)
-    async with SlcanTcpServer(device, stepped_clock) as server:
-        source = source_of(shape, server.endpoint, clock=SystemClock(), when_full="wait")
-        wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
-        await server.run()
-    assert fingerprint(wired) == fingerprint(direct)
-    assert stepped_clock.monotonic_s() > direct[-1].stop_index / 600.0

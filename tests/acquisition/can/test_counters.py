@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from rigs.tiers import covering
 
-from core.blocks import Rejection
-
 RATE_HZ = 600.0
 NS_PER_S = 1_000_000_000
 START_NS = 1_767_225_600 * NS_PER_S
@@ -133,12 +131,6 @@ def test_a_single_frame_with_a_wild_counter_moves_nothing(plant):
     assert plant.assembler.refused == Counter({"impossible_counter": 1})
 
 
-def test_a_far_jump_that_a_second_frame_confirms_loses_no_sample(plant):
-    plant = plant(32)
-    blocks = plant.take(range(10), 0.0) + plant.take(range(10**6, 10**6 + 10), 0.02)
-    assert summary(blocks) == [(0, 0, 10, ()), (0, 10**6, 10**6 + 10, ())]
-
-
 def test_frames_that_come_again_or_late_are_refused_and_counted(plant):
     plant = plant(16)
     blocks = plant.take([0, 1, 1, 2, 4, 3, 5, 5, 6, 2], 0.0)
@@ -146,20 +138,21 @@ def test_frames_that_come_again_or_late_are_refused_and_counted(plant):
     assert plant.assembler.refused == Counter({"duplicate_frame": 2, "out_of_order_frame": 2})
 
 
-def test_a_stall_of_the_host_is_no_loss(plant):
-    """Frames that waited in a buffer all arrive at once, after any time."""
-    plant = plant(16)
-    blocks = plant.take(range(10), 0.0)
-    blocks += plant.take(range(10, 3000), 5.0)
-    assert summary(blocks) == [(0, 0, 3000, ())]
-
-
-def test_a_frame_too_short_is_a_refused_sample_not_a_gap(plant):
-    plant = plant(16)
-    blocks = plant.take(range(5), 0.0)
-    blocks += plant.assembler.take([(256, None)], START_NS)
-    blocks += plant.take(range(6, 9), 0.0)
-    assert [b.rejected for b in blocks] == [(), (Rejection("wrong_length", 1),)]
+@pytest.mark.parametrize(
+    ("n_bits", "first", "at_s", "expected"),
+    [
+        # frames that waited in a buffer all arrive at once, after any time
+        (16, 10, 5.0, [(0, 0, 3000, ())]),
+        # a second frame confirms the jump
+        (32, 10**6, 0.02, [(0, 0, 10, ()), (0, 10**6, 10**6 + 2990, ())]),
+    ],
+)
+def test_neither_a_stall_of_the_host_nor_a_far_jump_loses_a_sample(
+    n_bits, first, at_s, expected, plant
+):
+    plant = plant(n_bits)
+    blocks = plant.take(range(10), 0.0) + plant.take(range(first, first + 2990), at_s)
+    assert summary(blocks) == expected
 
 
 def test_host_stamps_rise_with_the_index_and_follow_the_nominal_rate(plant):

@@ -87,6 +87,7 @@ async def test_a_bug_in_a_driver_is_not_hidden(fake_bus_source, fake_bus):
     [
         ({"interface": "socketcan", "channel": "can0"}, AcquisitionError, "socketcan can0: "),
         ({"interface": "nosuch", "channel": "x"}, ConfigError, "nosuch"),
+        ({"interface": "socketcan", "channel": "can0", "options": {"nosuch": 1}}, ConfigError, "can0"),
         ({"interface": "kvaser", "channel": "0"}, ConfigError, "kvaser"),
         ({"interface": "pcan", "channel": "PCAN_USBBUS1"}, ConfigError, "library"),
         ({"interface": "slcan", "channel": "/dev/ttyNONE"}, LinkError, "No such file"),
@@ -102,9 +103,3 @@ async def test_a_bug_in_a_driver_is_not_hidden(fake_bus_source, fake_bus):
 def test_a_bus_that_cannot_be_opened_says_why(link, kind, words):
     with pytest.raises(kind, match=words):
         open_bus(CanLinkSettings(**link), [1])
-
-
-def test_an_option_that_an_interface_does_not_know_is_a_config_error():
-    link = CanLinkSettings(interface="socketcan", channel="can0", options={"nosuch": 1})
-    with pytest.raises(ConfigError):
-        open_bus(link, None)

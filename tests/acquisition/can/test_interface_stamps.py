@@ -1,11 +1,13 @@
 """C8: times by the interface's own clock, led to the host's; what it says wrongly is not used."""
 
 import asyncio
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import can
 import numpy as np
 import pytest
+from rigs.standing_clock import StandingClock
 
 from acquisition.arrival import Arrival
 from acquisition.can.interface_clock import InterfaceClock
@@ -13,7 +15,6 @@ from acquisition.can.source import CanSource
 
 RATE_HZ = 600.0
 BLOCK = 50
-START_NS = 1_767_225_600_000_000_000
 UPTIME_S = 4711.0
 PATIENCE_S = 20.0
 DBC = 'VERSION ""\nBU_: N\nBO_ 544 M: 8 N\n' + "".join(
@@ -21,26 +22,10 @@ DBC = 'VERSION ""\nBU_: N\nBO_ 544 M: 8 N\n' + "".join(
 )
 
 
-class HandClock:
-    """The host's clocks, set by hand; whoever asks in a thread gets the same."""
-
-    def __init__(self) -> None:
-        self.s = 0.0
-
-    def now_ns(self) -> int:
-        return START_NS + round(self.s * 1e9)
-
-    def monotonic_s(self) -> float:
-        return self.s
-
-    async def sleep(self, duration_s: float) -> None:
-        await asyncio.sleep(duration_s)
-
-
 class Adapter:
     """A module that counts nothing, at an adapter with a clock of its own, on a real bus."""
 
-    def __init__(self, channel: str, clock: HandClock, drift: float = 0.0) -> None:
+    def __init__(self, channel: str, clock: StandingClock, drift: float = 0.0) -> None:
         self._bus = can.Bus(channel=channel, interface="virtual", preserve_timestamps=True)
         self._clock = clock
         self._drift = drift
@@ -63,15 +48,28 @@ class Adapter:
 
 
 @pytest.fixture
-def clock() -> HandClock:
-    return HandClock()
+def clock() -> StandingClock:
+    return StandingClock()
 
 
 @pytest.fixture
-def source_by(settings_of, clock, counts_calibration):
-    def build(stamps: str, channel: str) -> CanSource:
+def adapter_on(clock) -> Iterator[Callable[..., Adapter]]:
+    """Builds adapters on a virtual bus; the drift of their clock as keyword."""
+    with ExitStack() as closing:
+
+        def build(channel: str, **drift: float) -> Adapter:
+            adapter = Adapter(channel, clock, **drift)
+            closing.callback(adapter.close)
+            return adapter
+
+        yield build
+
+
+@pytest.fixture
+def source_on(settings_of, clock, counts_calibration):
+    def build(channel: str) -> CanSource:
         signals = {f"c{n}": f"M.s{n}" for n in range(4)}
-        settings = settings_of(DBC, signals, channel, stamps=stamps, stale_after_s=3600.0)
+        settings = settings_of(DBC, signals, channel, stamps="interface", stale_after_s=3600.0)
         return CanSource(settings, counts_calibration(n_channels=4, n_slow=0), clock)
 
     return build
@@ -88,18 +86,15 @@ async def taken(stream, n_samples: int) -> list:
 
 @pytest.mark.parametrize("drift", [-100e-6, 0.0, 100e-6])
 async def test_a_busy_host_neither_hides_nor_makes_losses_where_the_interface_stamps(
-    drift, source_by, clock
+    drift, source_on, adapter_on
 ):
     random = np.random.default_rng(20261122)
-    channel = f"busy host {drift}"
-    with ExitStack() as closing:
-        adapter = Adapter(channel, clock, drift)
-        closing.callback(adapter.close)
-        async with source_by("interface", channel).connect() as stream:
-            blocks = []
-            for _ in range(80):
-                adapter.send(late_s=float(random.uniform(0.003, 0.050)))
-                blocks += await taken(stream, adapter.n_samples)
+    channel, blocks = f"busy host {drift}", []
+    adapter = adapter_on(channel, drift=drift)
+    async with source_on(channel).connect() as stream:
+        for _ in range(80):
+            adapter.send(late_s=float(random.uniform(0.003, 0.050)))
+            blocks += await taken(stream, adapter.n_samples)
     assert blocks[-1].stop_index == 80 * BLOCK
     assert [r for b in blocks for r in b.rejected] == []
     assert {b.stamp_fault for b in blocks} == {None}
@@ -107,30 +102,24 @@ async def test_a_busy_host_neither_hides_nor_makes_losses_where_the_interface_st
 
 
 async def test_the_interface_clock_finds_a_single_lost_sample_though_the_host_is_busy(
-    source_by, clock
+    source_on, adapter_on
 ):
     random = np.random.default_rng(20261122)
-    channel = "lost sample"
-    blocks = []
+    channel, blocks = "lost sample", []
 
     async def read(stream) -> None:
         async for block in stream:
             blocks.append(block)
 
-    with ExitStack() as closing:
-        adapter = Adapter(channel, clock)
-        closing.callback(adapter.close)
-        async with (
-            source_by("interface", channel).connect() as stream,
-            asyncio.TaskGroup() as tasks,
-        ):
-            reading = tasks.create_task(read(stream))
-            n = 0
-            while n < 70 or blocks[-1].stop_index < adapter.n_samples - BLOCK:
-                adapter.send(float(random.uniform(0.003, 0.050)), n_lost=int(n == 50))
-                n += 1
-                await asyncio.sleep(0.03)
-            reading.cancel()
+    adapter = adapter_on(channel)
+    async with source_on(channel).connect() as stream, asyncio.TaskGroup() as tasks:
+        reading = tasks.create_task(read(stream))
+        n = 0
+        while n < 70 or blocks[-1].stop_index < adapter.n_samples - BLOCK:
+            adapter.send(float(random.uniform(0.003, 0.050)), n_lost=int(n == 50))
+            n += 1
+            await asyncio.sleep(0.03)
+        reading.cancel()
     n_stored = sum(b.n_samples for b in blocks)
     [rejected] = [r for b in blocks for r in b.rejected]
     assert rejected.reason == "uncounted_loss"
@@ -147,16 +136,13 @@ async def test_the_interface_clock_finds_a_single_lost_sample_though_the_host_is
         (lambda uptime_s: uptime_s + 100.0, "stamp_jumped"),
     ],
 )
-async def test_a_stamp_that_is_wrong_is_not_used_and_told(stamp_of, fault, source_by, clock):
-    channel = f"wrong stamp {fault}"
-    with ExitStack() as closing:
-        adapter = Adapter(channel, clock)
-        closing.callback(adapter.close)
-        async with source_by("interface", channel).connect() as stream:
-            blocks = []
-            for n in range(10):
-                adapter.send(0.0, stamp_of if n == 3 else lambda uptime_s: uptime_s)
-                blocks += await taken(stream, adapter.n_samples)
+async def test_a_stamp_that_is_wrong_is_not_used_and_told(stamp_of, fault, source_on, adapter_on):
+    channel, blocks = f"wrong stamp {fault}", []
+    adapter = adapter_on(channel)
+    async with source_on(channel).connect() as stream:
+        for n in range(10):
+            adapter.send(0.0, stamp_of if n == 3 else lambda uptime_s: uptime_s)
+            blocks += await taken(stream, adapter.n_samples)
     assert {b.stamp_fault for b in blocks} == {None, fault}
     assert blocks[-1].stamp_fault is None
     assert blocks[-1].clock.n_faults > 0

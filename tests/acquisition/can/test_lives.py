@@ -5,7 +5,6 @@ import pytest
 
 from acquisition.can.assembly import Assembler
 from acquisition.can.source import CanSource
-from acquisition.clock import SystemClock
 
 RATE_HZ = 600.0
 NS_PER_S = 1_000_000_000
@@ -17,16 +16,6 @@ BO_ 256 M: 8 N
  SG_ e : 32|16@1+ (1,0) [0|0] "" N
  SG_ x : 48|16@1- (1,0) [0|0] "V" N
 """
-
-
-class StoppedClock(SystemClock):
-    """Shows one time of day."""
-
-    def __init__(self, at_ns: int) -> None:
-        self._at_ns = at_ns
-
-    def now_ns(self) -> int:
-        return self._at_ns
 
 
 @pytest.fixture
@@ -42,13 +31,14 @@ def life(settings_of, assembler_by):
     return build
 
 
-def read(assembler: Assembler, first: int, stop: int, n_bits: int | None, epoch: int = 7):
-    """Epochs and indices of what comes of the device's samples."""
+def read(assembler: Assembler, first: int, stop: int, n_bits: int | None, begun_at: int = 0):
+    """Epochs and first index of samples of a device whose count began at one of its samples."""
     blocks = []
     for start in range(first, stop, 6):
-        words = [(n % (1 << (n_bits or 32)), n % 2**15) for n in range(start, start + 6)]
+        count = range(start - begun_at, start - begun_at + 6)
+        words = [(n % (1 << (n_bits or 32)), n % 2**15) for n in count]
         frames = [
-            (256, c.to_bytes(4, "little") + epoch.to_bytes(2, "little") + x.to_bytes(2, "little"))
+            (256, c.to_bytes(4, "little") + (7).to_bytes(2, "little") + x.to_bytes(2, "little"))
             for c, x in words
         ]
         blocks += assembler.take(frames, START_NS + round((start + 6) / RATE_HZ * NS_PER_S))
@@ -68,18 +58,18 @@ def test_each_life_is_a_count_of_its_own_unless_the_device_tells_all(n_bits, tel
 
 @pytest.mark.parametrize("begun_s", [0, 3600])
 async def test_the_life_of_a_source_begins_when_it_is_made(
-    begun_s, settings_of, counts_calibration, fake_bus
+    begun_s, settings_of, counts_calibration, fake_bus, stepped_clock
 ):
     settings = settings_of(DBC.format(n_bits=32), {"x": "M.x"})
-    begin_ns = START_NS + begun_s * NS_PER_S
+    stepped_clock.step(begun_s)
     calibration = counts_calibration(n_channels=1, n_slow=0)
-    source = CanSource(settings, calibration, StoppedClock(begin_ns), lambda *_: fake_bus)
+    source = CanSource(settings, calibration, stepped_clock, lambda *_: fake_bus)
     async with source.connect() as stream:
         for number in range(100):
             data = bytes(6) + number.to_bytes(2, "little")
             fake_bus.messages.put(can.Message(arbitration_id=256, is_extended_id=False, data=data))
         block = await anext(stream)
-    assert (block.epoch, block.first_index) == (begin_ns // NS_PER_S, 0)
+    assert (block.epoch, block.first_index) == (START_NS // NS_PER_S + begun_s, 0)
 
 
 def test_a_restart_that_nobody_tells_is_another_count_in_each_life(life):
@@ -87,19 +77,8 @@ def test_a_restart_that_nobody_tells_is_another_count_in_each_life(life):
     for begun_s in (0.0, 3600.0):
         assembler, at = life(begun_s, 32, True), round(begun_s * RATE_HZ)
         epochs, _ = read(assembler, at + 10**6, at + 10**6 + 600, 32)
-        again, _ = read_anew(assembler, at + 10**6 + 3000)
+        anew = at + 10**6 + 3000
+        again, _ = read(assembler, anew, anew + 600, 32, begun_at=anew)
         found.append((epochs, again))
     assert found[0][0] == found[1][0] == [7]
     assert found[0][1] != found[1][1]
-
-
-def read_anew(assembler: Assembler, at: int):
-    """Samples from 0 on, that come when those with the numbers from `at` on would."""
-    blocks = []
-    for start in range(0, 600, 6):
-        frames = [
-            (256, n.to_bytes(4, "little") + (7).to_bytes(2, "little") + n.to_bytes(2, "little"))
-            for n in range(start, start + 6)
-        ]
-        blocks += assembler.take(frames, START_NS + round((at + start) / RATE_HZ * NS_PER_S))
-    return sorted({block.epoch for block in blocks}), blocks[0].first_index

@@ -1,12 +1,13 @@
-"""C1, C2, C10: offered = stored + gap + rejected, whatever is lost on the bus."""
+"""C1, C2, C10: offered = stored + gap + rejected, whatever is lost or spoilt on the bus."""
 
 from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs.tiers import fast_and_long
+from rigs.tiers import covering, fast_and_long
 
+from acquisition.calibration import calibrate
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
@@ -15,6 +16,7 @@ from acquisition.daq.can_bus import _message
 from acquisition.daq.can_dbc import daq_settings
 from acquisition.daq.can_frames import FrameEncoder, shortened
 from core.blocks import Rejection
+from core.ring import Ring
 
 BLOCK = 50
 START_NS = 1_767_225_600_000_000_000
@@ -190,3 +192,25 @@ async def test_memory_stays_bounded_when_one_node_falls_silent(
     assert len(blocks) == 2
     assert blocks[1].rejected == (Rejection("incomplete_frames", 100 * BLOCK),)
     assert blocks[1].first_index == 101 * BLOCK
+
+
+@pytest.mark.parametrize(("share", "fd"), covering([0.02, 0.3, 1.0], [False, True]))
+def test_random_frames_of_a_mad_device_never_break_the_account(
+    share, fd, shape_of, assembler_of, counts_calibration, counting_feed
+):
+    """Some frames have random content, and so random counters, epochs and times."""
+    random = np.random.default_rng(20261121)
+    shape, calibration = shape_of(n_channels=12, fd=fd), counts_calibration(n_channels=12)
+    encoder, assembler = FrameEncoder(shape), assembler_of(shape)
+    feed, ring = counting_feed(n_channels=12), Ring(12, 6000)
+    arrived_ns = START_NS
+    for _ in range(150):
+        frames = []
+        for frame in encoder.frames(feed.advance(BLOCK)):
+            mad = random.random() < share
+            frames.append((frame.frame_id, random.bytes(len(frame.data)) if mad else frame.data))
+        arrived_ns += int(random.integers(0, 200_000_000))
+        for block in assembler.take(frames, arrived_ns):
+            ring.write(calibrate(block, calibration))
+        assert len(assembler._counted._pending) <= 65
+    assert sum(len(t.starts) for t in assembler._builder.tracks._tracks.values()) < 40_000

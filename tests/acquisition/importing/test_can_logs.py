@@ -14,6 +14,7 @@ from acquisition.importing.job import ImportJob, TimeAxis
 from acquisition.importing.reading import reading
 
 START_S = 1_767_225_600
+WRITERS = {"candump": can.CanutilsLogWriter, "blf": can.BLFWriter}
 
 
 @pytest.fixture
@@ -49,28 +50,24 @@ def all_frames(path: Path, job: ImportJob) -> list[FrameBatch]:
         return list(found.frames())
 
 
-@pytest.mark.parametrize(
-    ("kind", "writer"), [("candump", can.CanutilsLogWriter), ("blf", can.BLFWriter)]
-)
+@pytest.mark.parametrize("kind", WRITERS)
 @pytest.mark.usefixtures("confined")
 def test_data_frames_come_back_with_time_to_a_microsecond(
-    tmp_path: Path, log_job: Callable[..., ImportJob], kind: str, writer: type
+    tmp_path: Path, log_job: Callable[..., ImportJob], kind: str
 ) -> None:
     sent = messages()
-    with writer(tmp_path / "log") as log:
+    with WRITERS[kind](tmp_path / "log") as log:
         for message in sent:
             log(message)
     found = all_frames(tmp_path / "log", log_job(kind))
     sent = [message for message in sent if not message.is_remote_frame]
     assert len(found) == 3
-    ids = np.concatenate([batch.ids for batch in found])
-    extended = np.concatenate([batch.extended for batch in found])
-    lengths = np.concatenate([batch.lengths for batch in found])
-    data = np.concatenate([batch.data for batch in found])
-    times_ns = np.concatenate([batch.times_ns for batch in found])
+    columns = ("ids", "extended", "fd", "lengths", "data", "times_ns")
+    ids, extended, fd, lengths, data, times_ns = (
+        np.concatenate([getattr(batch, name) for batch in found]) for name in columns
+    )
     np.testing.assert_array_equal(ids, [m.arbitration_id for m in sent])
     np.testing.assert_array_equal(extended, [m.is_extended_id for m in sent])
-    fd = np.concatenate([batch.fd for batch in found])
     np.testing.assert_array_equal(fd, [m.is_fd for m in sent])
     again = [message for batch in found for message in batch.messages()]
     assert [bytes(m.data) for m in sent] == [m.data for m in again]
@@ -90,18 +87,11 @@ def test_a_blf_log_is_in_the_zone_of_the_mapping(
     assert batch.times_ns.tolist() == [(START_S + 10_800) * 10**9]
 
 
-@pytest.mark.parametrize(
-    ("kind", "writer", "buses"),
-    [("candump", can.CanutilsLogWriter, ("can0", "can1")), ("blf", can.BLFWriter, ("1", "2"))],
-)
+@pytest.mark.parametrize(("kind", "buses"), [("candump", ("can0", "can1")), ("blf", ("1", "2"))])
 def test_like_frames_of_two_buses_are_never_mixed(
-    tmp_path: Path,
-    log_job: Callable[..., ImportJob],
-    kind: str,
-    writer: type,
-    buses: tuple[str, str],
+    tmp_path: Path, log_job: Callable[..., ImportJob], kind: str, buses: tuple[str, str]
 ) -> None:
-    with writer(tmp_path / "log") as log:
+    with WRITERS[kind](tmp_path / "log") as log:
         for n in range(100):
             channel = f"can{n % 2}" if kind == "candump" else n % 2
             log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes([n]), channel=channel))

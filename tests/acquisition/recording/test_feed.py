@@ -34,12 +34,14 @@ def all_pieces(feed: RecordedFeed, lengths: Iterable[int]) -> list[RawBlock]:
 def test_pieces_of_any_length_bring_every_sample_once_at_its_index(
     record: Record, numbered: Numbered, length: int
 ) -> None:
-    stretches = [(0, 200), (263, 400), (400, 450)]  # after a gap; then directly on it
-    blocks = [numbered(a, b - a) for a, b in stretches] + [numbered(30, 100, epoch=2)]
+    # what was rejected is as missing as a gap; then directly on it
+    stretches = [(0, 200, ()), (263, 400, (Rejection("torn", 50),)), (400, 450, ())]
+    blocks = [numbered(a, b - a, rejected=rejected) for a, b, rejected in stretches]
+    blocks.append(numbered(30, 100, epoch=2))
     feed = RecordedFeed(open_recording(record(blocks)))
     pieces = all_pieces(feed, itertools.repeat(length))
     found = [(p.epoch, n) for p in pieces for n in range(p.first_index, p.stop_index)]
-    assert found == [(1, n) for a, b in stretches for n in range(a, b)] + [
+    assert found == [(1, n) for a, b, _ in stretches for n in range(a, b)] + [
         (2, n) for n in range(30, 130)
     ]
     for piece in pieces:
@@ -73,6 +75,8 @@ def through_delivery(raws: list[RawBlock], calibration: UnitCalibration) -> list
 def test_the_length_of_pieces_may_change_at_any_time(record: Record, numbered: Numbered) -> None:
     blocks = [numbered(50 * n, 50) for n in range(20)]
     feed = RecordedFeed(open_recording(record(blocks)))
+    with pytest.raises(ValueError, match="0 samples asked for"):
+        feed.advance(0)
     pieces = all_pieces(feed, itertools.cycle([7, 200, 1, 64]))
     index = [n for p in pieces for n in range(p.first_index, p.stop_index)]
     assert index == list(range(1000))
@@ -86,15 +90,3 @@ def test_only_the_channels_of_the_unit_are_given(record: Record, numbered: Numbe
     piece = RecordedFeed(recording, select(recording.manifest, unit, {})).advance(50)
     np.testing.assert_array_equal(piece.counts, [np.arange(1, 51)])
     assert (piece.ok, piece.slow) == ((False,), ())
-
-
-def test_what_was_rejected_is_as_missing_as_a_gap(record: Record, numbered: Numbered) -> None:
-    blocks = [numbered(0, 50), numbered(100, 50, rejected=(Rejection("torn", 50),))]
-    feed = RecordedFeed(open_recording(record(blocks)))
-    assert [p.first_index for p in all_pieces(feed, itertools.repeat(200))] == [0, 100]
-
-
-def test_a_piece_has_at_least_one_sample(record: Record, numbered: Numbered) -> None:
-    feed = RecordedFeed(open_recording(record([numbered(0, 50)])))
-    with pytest.raises(ValueError, match="0 samples asked for"):
-        feed.advance(0)

@@ -104,11 +104,11 @@ def test_a_manifest_in_which_one_character_is_another_is_refused(folder: Path, p
     assert refusal(folder)
 
 
-@pytest.mark.parametrize("checksum", [None, "0" * 64])
-def test_a_manifest_that_lost_its_checksum_is_refused(folder: Path, checksum: str | None) -> None:
+def test_a_manifest_that_lost_its_checksum_is_refused(folder: Path) -> None:
     path = folder / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"checksum": checksum}))
-    assert "damaged, or edited by hand" in refusal(folder)
+    for checksum in (None, "0" * 64):
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"checksum": checksum}))
+        assert "damaged, or edited by hand" in refusal(folder)
 
 
 def test_a_manifest_cannot_lead_out_of_its_folder(folder: Path) -> None:

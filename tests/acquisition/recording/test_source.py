@@ -1,10 +1,13 @@
-"""A recording as a source: its end, its pace, and which channels of it."""
+"""A recording as a source: its end, its pace, which channels of it, and what its files raise."""
 
+import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from acquisition.calibration import calibrate
@@ -18,6 +21,11 @@ from core.machine import Channel, Measurand, Unit
 
 Record = Callable[[Iterable[RawBlock]], Path]
 Numbered = Callable[..., RawBlock]
+FOREIGN = [
+    kind
+    for _, kind in inspect.getmembers(pa.lib, inspect.isclass)
+    if issubclass(kind, pa.ArrowException | OSError)
+] + [OSError, PermissionError, TimeoutError]
 
 
 def machine(*channels: str, measurand: Measurand = Measurand.GAP_UM, **changes: object) -> Unit:
@@ -127,4 +135,20 @@ async def test_a_recording_that_vanishes_is_an_error_of_its_own(
     (recording.folder / "samples.parquet").unlink()
     async with RecordingSource(recording, stepped_clock).connect() as blocks:
         with pytest.raises(ConfigError, match=r"samples\.parquet: No such file"):
+            await anext(blocks)
+
+
+@pytest.mark.parametrize("call", ["__init__", "read_row_group"])
+@pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
+async def test_no_exception_of_pyarrow_or_the_disk_leaves_under_its_own_name(
+    record: Record, numbered: Numbered, stepped_clock, monkeypatch, kind: type, call: str
+) -> None:
+    recording = open_recording(record([numbered(50 * n, 50) for n in range(5)]))
+
+    def fails(*_: object, **__: object) -> None:
+        raise kind("as seen in the field")
+
+    monkeypatch.setattr(pq.ParquetFile, call, fails)
+    async with RecordingSource(recording, stepped_clock).connect() as blocks:
+        with pytest.raises(ConfigError, match=r"\.parquet: .*as seen in the field"):
             await anext(blocks)

@@ -237,10 +237,12 @@ def test_everything_at_once_does_not_depend_on_the_pieces_it_is_asked_for_in(
         exchanged=(("TJB_ux", "TJB_uy"),),
     )
     pieces = (1, 7, 2041, 2047, 4096, 1000)
-    whole = build_unit(scenario).advance(sum(pieces))
-    unit = build_unit(scenario)
+    unit, one_piece = build_unit(scenario), build_unit(scenario)
+    whole = one_piece.advance(sum(pieces))
 
     cut = np.concatenate([unit.advance(n).counts for n in pieces], axis=1)
 
     assert np.array_equal(cut, whole.counts)
+    next_slow = [u.advance(n).slow for u, n in ((unit, 1), (one_piece, 100))]
+    assert next_slow[0] == pytest.approx(next_slow[1], nan_ok=True, rel=0)
     assert not np.array_equal(build_unit(scenario, 2).advance(5000).counts, cut[:, :5000])

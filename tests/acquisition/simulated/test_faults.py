@@ -28,30 +28,20 @@ def spoiled(kind: FaultKind, start: int = START, pieces: int = 1) -> CountArray:
 
 
 @pytest.mark.parametrize("start", [0, START])
-def test_a_dead_channel_gives_no_voltage_at_all(start: int) -> None:
+def test_a_dead_channel_gives_nothing_and_a_stuck_one_its_last_value_but_for_one_count(
+    start: int,
+) -> None:
     assert not spoiled(FaultKind.DEAD, start)[start:].any()
-
-
-@pytest.mark.parametrize("start", [0, START])
-def test_a_stuck_channel_stays_at_its_last_value_but_for_one_count(start: int) -> None:
     counts = spoiled(FaultKind.STUCK, start, pieces=10)
-    last = counts[max(start - 1, 0)] if start else 1000
-
+    last = counts[start - 1] if start else 1000
     assert set(counts[start:] - last) == {-1, 0, 1}
 
 
-def test_a_clipped_channel_loses_the_upper_half_of_its_signal() -> None:
-    counts = spoiled(FaultKind.CLIPPED)[START:]
-
-    assert 0.2 < np.mean(counts == 32767) < 0.8
-    assert counts.min() > 31_000
-
-
-def test_a_loose_contact_hits_both_rails_now_and_then() -> None:
-    counts = spoiled(FaultKind.RAIL_HITS)[START:]
-
-    assert (counts == 32767).sum() == 5
-    assert (counts == -32768).sum() == 5
+def test_a_clipped_channel_loses_its_upper_half_and_a_loose_contact_hits_both_rails() -> None:
+    clipped, loose = (spoiled(k)[START:] for k in (FaultKind.CLIPPED, FaultKind.RAIL_HITS))
+    assert 0.2 < np.mean(clipped == 32767) < 0.8
+    assert clipped.min() > 31_000
+    assert [(loose == rail).sum() for rail in (32767, -32768)] == [5, 5]
 
 
 @pytest.mark.parametrize("kind", FaultKind)

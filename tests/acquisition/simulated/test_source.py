@@ -15,13 +15,16 @@ from core.blocks import SampleBlock
 BuildUnit = Callable[..., SimulatedUnit]
 
 
-async def take(source: SampleSource, n_blocks: int) -> list[SampleBlock]:
+async def take(
+    source: SampleSource, n_blocks: int, between: Callable[[], None] = lambda: None
+) -> list[SampleBlock]:
     blocks: list[SampleBlock] = []
     async with source.connect() as stream:
         async for block in stream:
             blocks.append(block)
             if len(blocks) == n_blocks:
                 break
+            between()
     return blocks
 
 
@@ -42,28 +45,20 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
     assert np.array_equal(np.concatenate([b.samples for b in blocks], axis=1), expected.samples)
 
 
-async def test_a_paced_source_delivers_samples_when_they_have_happened(
-    build_unit: BuildUnit, calibration: UnitCalibration, stepped_clock: Any, full_load: Scenario
+@pytest.mark.parametrize(("busy_s", "finished_s"), [(0.0, 2.5), (2.0, 8.5)])
+async def test_a_paced_source_delivers_samples_once_they_have_happened_and_loses_none(
+    build_unit: BuildUnit,
+    calibration: UnitCalibration,
+    stepped_clock: Any,
+    full_load: Scenario,
+    busy_s: float,
+    finished_s: float,
 ) -> None:
+    """Also to a reader that is busy for longer than a block lasts."""
     in_halves = replace(calibration, block_samples=300)
     source = SimulatedSource(build_unit(full_load), in_halves, stepped_clock)
 
-    await take(source, 4)
+    blocks = await take(source, 5, lambda: stepped_clock.step(busy_s))
 
-    assert stepped_clock.monotonic_s() == pytest.approx(2.0)
-
-
-async def test_a_slow_reader_of_a_paced_source_loses_nothing(
-    build_unit: BuildUnit, calibration: UnitCalibration, stepped_clock: Any, full_load: Scenario
-) -> None:
-    in_halves = replace(calibration, block_samples=300)
-    source = SimulatedSource(build_unit(full_load), in_halves, stepped_clock)
-    indices = []
-    async with source.connect() as stream:
-        async for block in stream:
-            indices.append(block.first_index)
-            stepped_clock.step(2.0)
-            if len(indices) == 5:
-                break
-
-    assert indices == [0, 300, 600, 900, 1200]
+    assert [block.first_index for block in blocks] == [0, 300, 600, 900, 1200]
+    assert stepped_clock.monotonic_s() == pytest.approx(finished_s)

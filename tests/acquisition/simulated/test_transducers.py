@@ -115,19 +115,20 @@ def test_the_converter_rounds_to_counts_and_clips_at_its_rails(
     assert counts.tolist() == [[0, 0, 1, -1, *rails]] * 12
 
 
-def test_a_channel_of_no_bearing_is_refused(machine: Unit, quiet: Scenario) -> None:
-    stray = Channel("stator_core", Measurand.VELOCITY_MM_S)
-    with pytest.raises(ConfigError, match="'stator_core' belongs to no bearing"):
-        SimulatedPlant(replace(machine, channels=(*machine.channels, stray)), quiet, seed=1)
-
-
-@pytest.mark.parametrize(("place", "measurand"), [(0, "velocity_mm_s"), (2, "gap_um")])
-def test_a_channel_that_measures_what_its_place_does_not_have_is_refused(
-    machine: Unit, quiet: Scenario, place: int, measurand: str
+@pytest.mark.parametrize(
+    ("place", "channel", "measurand", "words"),
+    [
+        (12, "stator_core", "velocity_mm_s", "'stator_core' belongs to no bearing"),
+        (0, "UJB_ux", "velocity_mm_s", "cannot measure velocity_mm_s"),
+        (2, "UJB_vx", "gap_um", "cannot measure gap_um"),
+    ],
+)
+def test_a_channel_that_no_bearing_has_is_refused(
+    machine: Unit, quiet: Scenario, place: int, channel: str, measurand: str, words: str
 ) -> None:
     channels = list(machine.channels)
-    channels[place] = Channel(channels[place].id, Measurand(measurand))
-    with pytest.raises(ConfigError, match=f"cannot measure {measurand}"):
+    channels[place : place + 1] = [Channel(channel, Measurand(measurand))]
+    with pytest.raises(ConfigError, match=words):
         SimulatedPlant(replace(machine, channels=tuple(channels)), quiet, seed=1)
 
 

@@ -26,17 +26,6 @@ def test_an_ordinary_day_is_the_same_in_every_version(
     assert sums == [3341452830, 3235138598]
 
 
-def test_slow_readings_depend_on_the_sample_and_not_on_the_pieces(
-    build_unit: BuildUnit, part_load: Scenario
-) -> None:
-    one, other = build_unit(part_load), build_unit(part_load)
-    for n in (5000, 3000, 500):
-        one.advance(n)
-    other.advance(8500)
-
-    assert one.advance(1).slow == pytest.approx(other.advance(100).slow, nan_ok=True, rel=0)
-
-
 def test_blocks_follow_on_each_other_in_index_and_time(
     build_unit: BuildUnit, full_load: Scenario
 ) -> None:
@@ -136,8 +125,5 @@ def test_settings_that_do_not_fit_together_are_refused(
     for fitted, scenario, message in wrong:
         with pytest.raises(ConfigError, match=message):
             SimulatedUnit(machine, fitted, scenario, seed=1, start_ns=0)
-
-
-def test_an_empty_block_cannot_be_asked_for(build_unit: BuildUnit, quiet: Scenario) -> None:
     with pytest.raises(ValueError, match="at least 1 sample, got 0"):
-        build_unit(quiet).advance(0)
+        SimulatedUnit(machine, calibration, quiet, seed=1, start_ns=0).advance(0)
