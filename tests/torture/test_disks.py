@@ -6,8 +6,7 @@ import os
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -33,50 +32,30 @@ STRACE = (
 )
 
 
-@dataclass(frozen=True)
-class SmallDisk:
-    """A file system of its own."""
-
-    folder: Path
-
-    @property
-    def _ballast(self) -> Path:
-        return self.folder / "ballast"
-
-    def fill(self) -> None:
-        """Leave nothing to others."""
-        handle = os.open(self._ballast, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-        try:
-            for size in (len(CHUNK), 512):
-                while _written(handle, CHUNK[:size]):
-                    pass
-        finally:
-            os.close(handle)
-
-    def free(self) -> None:
-        """Give back what was taken."""
-        self._ballast.unlink()
+@contextmanager
+def filled(disk: Path) -> Iterator[None]:
+    """Leave nothing of a disk to others, for a while."""
+    ballast = disk / "ballast"
+    for size in (len(CHUNK), 512):
+        with suppress(OSError), ballast.open("ab", buffering=0) as file:
+            while file.write(CHUNK[:size]):
+                pass
+    yield
+    ballast.unlink()
 
 
 @contextmanager
-def small_disk(folder: Path, mib: float) -> Iterator[SmallDisk]:
-    """Mount one on a folder; skips the test where that is not permitted."""
+def small_disk(folder: Path, mib: float) -> Iterator[Path]:
+    """Mount a file system of its own on a folder; skips the test where that is not permitted."""
     folder.mkdir(parents=True, exist_ok=True)
     libc = ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
     size = f"size={round(mib * 2**20)}".encode()
     if libc.mount(b"padwatch", os.fsencode(folder), b"tmpfs", 0, size) != 0:
         pytest.skip(f"a disk cannot be mounted here: {os.strerror(ctypes.get_errno())}")
     try:
-        yield SmallDisk(folder)
+        yield folder
     finally:
         libc.umount2(os.fsencode(folder), 2)  # also if something is still open there
-
-
-def _written(handle: int, data: bytes) -> bool:
-    try:
-        return os.write(handle, data) > 0
-    except OSError:
-        return False
 
 
 @pytest.mark.timeout(3600)
@@ -85,9 +64,7 @@ def test_a_full_disk_costs_nothing_that_was_promised(
 ) -> None:
     with (
         small_disk(tmp_path / "small", DISK_MIB) as disk,
-        Bench(
-            *(plant, daq, tmp_path, STORE_ALARM, torture.period_s), data=disk.folder / "data"
-        ) as bench,
+        Bench(*(plant, daq, tmp_path, STORE_ALARM, torture.period_s), data=disk / "data") as bench,
     ):
         bench.begin()
         bench.watch.wait_for_result()
@@ -104,17 +81,16 @@ def test_a_full_disk_costs_nothing_that_was_promised(
     assert not torture.is_whole or max(resumed_s) <= RESUMED_WITHIN_S
 
 
-def _filled_and_freed(bench: Bench, disk: SmallDisk) -> float:
+def _filled_and_freed(bench: Bench, disk: Path) -> float:
     """Fill the disk, look at the service, make room; seconds until results are stored again."""
-    disk.fill()
-    alarm = until(lambda: bench.active(NOT_STORED))[0]["id"]
-    bench.wait_for_newer()
-    comment = {"actor": "Anna", "text": "is somebody there?"}
     with bench.rig.api() as api:
-        with pytest.raises(RefusedError, match="Nothing was done") as refused:
-            api.post(f"/api/v1/alarms/{alarm}/comment", comment)
-        assert refused.value.status == 503
-        disk.free()
+        with filled(disk):
+            alarm = until(lambda: bench.active(NOT_STORED))[0]["id"]
+            bench.wait_for_newer()
+            comment = {"actor": "Anna", "text": "is somebody there?"}
+            with pytest.raises(RefusedError, match="Nothing was done") as refused:
+                api.post(f"/api/v1/alarms/{alarm}/comment", comment)
+            assert refused.value.status == 503
         freed_s = time.monotonic()
         until(lambda: api.get("/readyz")["status"] == "ok")
     resumed_s = time.monotonic() - freed_s

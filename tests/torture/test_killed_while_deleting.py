@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.deeds import HOP_NS, T0_NS, Build, value
-from harness.deleting import LATER_NS
 from harness.summary import Torture
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
@@ -21,6 +20,21 @@ from service.store.sqlite import SqliteStore
 N_KILLS = 100
 N = 1500
 HOUR_NS = 3_600_000_000_000
+LATER_NS = 1 << 62
+
+DELETE_EVERYTHING = f"""
+import sys
+from pathlib import Path
+from service.store.retention.limits import RetentionLimits
+from service.store.sqlite import SqliteStore
+
+store = SqliteStore(Path(sys.argv[1]))
+print("begun", flush=True)
+for series in store.retention.series():
+    while store.retention.delete(series, RetentionLimits(readings_ns=0, minutes_ns=0), {LATER_NS}):
+        pass
+print("done", flush=True)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +80,7 @@ def test_killed_while_deleting_every_hour_says_what_it_said(
 
 def is_cut_short(path: Path, after_s: float) -> bool:
     """Begin to delete, and kill it after a while; whether it had not come to its end."""
-    program = python("-m", "harness.deleting", path)
+    program = python("-c", DELETE_EVERYTHING, path)
     process = subprocess.Popen(program, stdout=subprocess.PIPE, env=environment())
     assert process.stdout is not None
     assert process.stdout.readline() == b"begun\n"

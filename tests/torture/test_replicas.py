@@ -1,6 +1,8 @@
 """Any process of a plant over PostgreSQL is killed, or the database restarted: nothing is lost."""
 
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -9,9 +11,9 @@ import pytest
 from harness.checker import check
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.nats_server import nats_cluster, nats_server_command
+from harness.nats_server import NatsServer, nats_cluster, nats_server_command
 from harness.postgres_server import PostgresServer, why_not
-from harness.replicas import Replicas, chain, chance, replicas
+from harness.replicas import Replicas, replicas
 from harness.service_rig import until
 from harness.summary import Torture
 from harness.watch import silent_healthy_s
@@ -39,57 +41,35 @@ def plant(seed: int) -> LedgerPlant:
     return LedgerPlant(seed=seed, load=2.0)
 
 
-@pytest.fixture
-def whole(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Replicas]:
-    """The whole chain: it takes six programs and three servers of a stream."""
-    if nats_server_command() is None:
-        pytest.skip("needs nats-server")
-    with (
-        PostgresServer() as postgres,
-        nats_cluster(tmp_path / "nats") as nodes,
-        chain(plant, tmp_path, daq, postgres, nodes) as found,
-    ):
-        yield found
-
-
-@pytest.fixture
-def running(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Iterator[Replicas]:
-    with PostgresServer() as postgres, replicas(plant, tmp_path, daq, postgres) as found:
-        yield found
+@pytest.fixture(params=["a single process", "the whole chain"])
+def running(
+    request: pytest.FixtureRequest, plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path
+) -> Iterator[Replicas]:
+    """Processes of a plant; the whole chain takes five and three servers of a stream."""
+    with ExitStack() as stack:
+        nodes: Sequence[NatsServer] = ()
+        if request.param == "the whole chain":
+            if nats_server_command() is None:
+                pytest.skip("needs nats-server")
+            nodes = stack.enter_context(nats_cluster(tmp_path / "nats"))
+        postgres = stack.enter_context(PostgresServer())
+        yield stack.enter_context(replicas(plant, tmp_path, daq, postgres, nodes))
 
 
 @pytest.mark.timeout(3600)
-def test_whatever_is_killed_beside_a_single_process_nothing_is_lost(
-    running: Replicas, seed: int, torture: Torture
-) -> None:
-    does = {role: partial(running.kill, role) for role in ("run", "serve")}
-    does["postgres"] = running.restart_postgres
-    kill_in_turn(running, does, seed, torture.figure)
-
-
-@pytest.mark.timeout(3600)
-def test_whatever_is_killed_of_the_whole_chain_nothing_is_lost(
-    whole: Replicas, seed: int, torture: Torture
-) -> None:
-    does = {role: partial(whole.kill, role) for role in ("acquire", "analyse", "serve")}
-    does |= {"node": whole.kill_node, "postgres": whole.restart_postgres}
-    kill_in_turn(whole, does, seed, torture.figure)
-
-
-def kill_in_turn(
-    running: Replicas,
-    does: Mapping[str, Callable[[int], None]],
-    seed: int,
-    figure: Callable[[str], None],
-) -> None:
+def test_whatever_is_killed_nothing_is_lost(running: Replicas, seed: int, torture: Torture) -> None:
     """Kill each kind so often, at random moments; then look at all that is left."""
+    does = {role: partial(running.kill, role) for role in running.rigs}
+    does["postgres"] = running.restart_postgres
+    if running.nodes:
+        does["node"] = running.kill_node
     rng = np.random.default_rng(seed)
     running.start()
     order = rng.permutation(list(does) * N_KILLS).tolist()
     for number, kind in enumerate(order):
         running.wait_for_result()
         running.act(number)
-        chance(rng, LIFE_S, LONGEST_S)
+        time.sleep(min(rng.exponential(LIFE_S), LONGEST_S))
         does[kind](number)
         print(f"{number + 1} of {len(order)}: {kind}", flush=True)
     for rig in running.serving:
@@ -103,7 +83,7 @@ def kill_in_turn(
     found = check(running.plant, running.plant_file, offered, running.lives, watch)
     silent_s = sum(silent_healthy_s(running.plant, offered, w.looks) for w in running.watches)
     rows = "".join(f"\n  {name:<32}{value}" for name, value in found.counts.items())
-    figure(
+    torture.figure(
         f"killed or restarted, {N_KILLS} times each: {', '.join(does)}{rows}"
         f"\n  promised to operators           {len(watch.promised)}"
         f"\n  answers to clients              {watch.n_answers}"

@@ -42,26 +42,19 @@ async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete
         await rig.until(lambda: rig.tape.n_written == 250)  # old enough, if not long enough
 
 
-async def test_how_far_a_unit_is_recorded_is_not_hidden_by_one_whose_name_begins_alike(
+async def test_two_units_are_recorded_side_by_side_also_if_their_names_begin_alike(
     running: Any, root: Path
 ) -> None:
     async with running(root, ("pump", "pump-b")) as rig:
         rig.send(0, 20, "pump")
-        rig.send(0, 200, "pump-b")  # four recordings, all of which sort behind those of "pump"
+        rig.send(3, 200, "pump-b")  # four recordings, all of which sort behind those of "pump"
+        rig.send(0, 9, "fan")
+    one, *others = rig.recordings()
 
-    assert last_end(root, "pump") == (1, 200)
-    assert last_end(root, "pump-b") == (1, 2000)
-
-
-async def test_two_units_are_recorded_side_by_side(running: Any, root: Path) -> None:
-    async with running(root, ("U1", "U2")) as rig:
-        rig.send(0, 20)
-        rig.send(3, 30, "U2")
-        rig.send(0, 9, "U3")
-    one, two = rig.recordings()
-
-    assert (one.manifest.unit, two.manifest.unit) == ("U1", "U2")
-    assert (samples(one), samples(two)) == (numbers(0, 20), numbers(3, 30))
+    assert (one.manifest.unit, {other.manifest.unit for other in others}) == ("pump", {"pump-b"})
+    assert samples(one) == numbers(0, 20)
+    assert [number for other in others for number in samples(other)] == numbers(3, 200)
+    assert (last_end(root, "pump"), last_end(root, "pump-b")) == ((1, 200), (1, 2000))
 
 
 @pytest.mark.parametrize("reason", [Shed.ANALYSIS_BEHIND, Shed.DISK_FULL])

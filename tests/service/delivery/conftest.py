@@ -120,21 +120,16 @@ class WebServer:
             await self.came.wait_for(lambda: len(self.requests) >= n_requests)
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        try:
-            head = (await reader.readuntil(b"\r\n\r\n")).decode().split("\r\n")
-            headers = dict(line.lower().split(": ", 1) for line in head[1:-2])
-            body = await reader.readexactly(int(headers["content-length"]))
-            request = Request(head[0], headers, body)
-            behave = self.behaviours[min(len(self.requests), len(self.behaviours) - 1)]
-            async with self.came:
-                self.requests.append(request)
-                self.came.notify_all()
-            await behave(request, writer)
-            await writer.drain()
-        except (ConnectionError, asyncio.IncompleteReadError):
-            pass
-        finally:
-            writer.close()
+        head = (await reader.readuntil(b"\r\n\r\n")).decode().split("\r\n")
+        headers = dict(line.lower().split(": ", 1) for line in head[1:-2])
+        body = await reader.readexactly(int(headers["content-length"]))
+        request = Request(head[0], headers, body)
+        behave = self.behaviours[min(len(self.requests), len(self.behaviours) - 1)]
+        async with self.came:
+            self.requests.append(request)
+            self.came.notify_all()
+        await behave(request, writer)
+        await writer.drain()
 
 
 @asynccontextmanager
@@ -149,7 +144,7 @@ async def serving(
         async def one() -> None:
             try:
                 await serve(reader, writer)
-            except ConnectionError:
+            except (ConnectionError, asyncio.IncompleteReadError):
                 pass  # the client has had enough
             finally:
                 writer.close()
@@ -173,19 +168,16 @@ async def serving(
 @pytest.fixture(scope="session")
 def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A certificate of 127.0.0.1 with its key, in one file; nobody vouches for it but itself."""
-    folder = tmp_path_factory.mktemp("tls")
-    key, certificate = folder / "key.pem", folder / "certificate.pem"
+    both = tmp_path_factory.mktemp("tls") / "both.pem"
     subprocess.run(
         [
             *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"),
-            *("-nodes", "-keyout", key, "-out", certificate, "-days", "2", "-subj", "/CN=test"),
+            *("-nodes", "-keyout", both, "-out", both, "-days", "2", "-subj", "/CN=test"),
             *("-addext", "subjectAltName=IP:127.0.0.1"),
         ],
         check=True,
         capture_output=True,
     )
-    both = folder / "both.pem"
-    both.write_text(key.read_text() + certificate.read_text())
     return both
 
 

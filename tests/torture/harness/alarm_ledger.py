@@ -83,7 +83,9 @@ def _check_unit(
                 for event in chain
                 if event.change in (AlarmChange.RAISED, AlarmChange.RETURNED)
             ]
-            _compare(found, list(_expected(alarm, values)), told)
+            wanted, there = Counter(_expected(alarm, values)), Counter(told)
+            found.alarms += [f"not told: {one}" for one in wanted - there]
+            found.alarms += [f"told for nothing: {one}" for one in there - wanted]
             stops = [case.index_of(time_ns) for time_ns, _ in values]
             raised = [case.index_of(ns) for _, change, ns in told if change is AlarmChange.RAISED]
             for spell in _demanded(mine, stops, plant):
@@ -104,12 +106,6 @@ def _expected(alarm: str, values: Sequence[tuple[int, float | None]]) -> Iterato
         elif is_active and value < ALERT_UM_PK - DEADBAND_UM:
             is_active = False
             yield alarm, AlarmChange.RETURNED, time_ns
-
-
-def _compare(found: "Findings", expected: Sequence[Told], told: Sequence[Told]) -> None:
-    wanted, there = Counter(expected), Counter(told)
-    found.alarms += [f"not told: {one}" for one in wanted - there]
-    found.alarms += [f"told for nothing: {one}" for one in there - wanted]
 
 
 def _demanded(spells: Sequence[Spell], stops: Sequence[int], plant: LedgerPlant) -> Iterator[Spell]:

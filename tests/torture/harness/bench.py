@@ -100,42 +100,41 @@ class Bench:
         time.sleep(seconds)
         self.rig.signal(signal.SIGCONT)
 
+    def get(self, path: str) -> Any:
+        """Ask the service something."""
+        with self.rig.api() as api:
+            return api.get(f"/api/v1/{path}")
+
     def states(self) -> set[str]:
         """Return the states of the links, as the service sees them."""
-        with self.rig.api() as api:
-            return {unit["source"]["state"] for unit in api.get("/api/v1/units")}
+        return {unit["source"]["state"] for unit in self.get("units")}
 
     def active(self, kind: str) -> list[dict[str, Any]]:
         """Return the active alarms of a kind."""
-        with self.rig.api() as api:
-            found = api.get("/api/v1/alarms")["alarms"]
+        found = self.get("alarms")["alarms"]
         return [one for one in found if one["kind"] == kind and one["level"] is not None]
 
     def raised(self) -> Counter[str]:
         """Count by kind how often alarms were raised."""
-        with self.rig.api() as api:
-            events = api.get("/api/v1/alarms/events?limit=1000")["events"]
+        events = self.get("alarms/events?limit=1000")["events"]
         return Counter(event["kind"] for event in events if event["change"] == "raised")
 
     def clock(self) -> dict[str, Any]:
         """Return the clock of the first unit's device, as the service sees it."""
-        with self.rig.api() as api:
-            found: dict[str, Any] = api.get("/api/v1/units/U1")["source"]["clock"]
+        found: dict[str, Any] = self.get("units/U1")["source"]["clock"]
         return found
 
     def gaps(self) -> list[dict[str, Any]]:
         """Return the recorded gaps of the first unit."""
         ever = "start=2020-01-01T00:00:00Z&end=2100-01-01T00:00:00Z"
-        with self.rig.api() as api:
-            found: list[dict[str, Any]] = api.get(f"/api/v1/units/U1/gaps?{ever}")
+        found: list[dict[str, Any]] = self.get(f"units/U1/gaps?{ever}")
         return found
 
     def wait_for_newer(self) -> str:
         """Wait until a newer result is shown as current; returns its time."""
 
         def newest() -> str:
-            with self.rig.api() as api:
-                units = api.get("/api/v1/overview")["units"]
+            units = self.get("overview")["units"]
             return max(bearing["time"] or "" for unit in units for bearing in unit["bearings"])
 
         shown = newest()
@@ -147,8 +146,7 @@ class Bench:
         begun_s = time.monotonic()
 
         def is_well() -> bool:
-            with self.rig.api() as api:
-                sources = [unit["source"] for unit in api.get("/api/v1/units")]
+            sources = [unit["source"] for unit in self.get("units")]
             return all(s["state"] == "connected" and s["data_age_s"] < FRESH_S for s in sources)
 
         until(is_well)

@@ -57,11 +57,6 @@ class NatsServer:
         """Whether it was started, and neither stopped nor killed since."""
         return self._process is not None
 
-    @property
-    def pid(self) -> int:
-        """Of its process."""
-        return self._running.pid
-
     def start(self) -> None:
         """Start it where it was before, with all that it had kept."""
         command = nats_server_command()

@@ -89,11 +89,6 @@ class PostgresServer:
         host = self.folder if by == "socket" else "127.0.0.1"
         return f"host={host} port={self.port} user=postgres dbname={database}"
 
-    @property
-    def pid(self) -> int:
-        """Of the process that is the parent of all others."""
-        return int((self.data / "postmaster.pid").read_text().split()[0])
-
     def start(self) -> None:
         """Start, and wait until it answers."""
         options = " ".join(f"-c {name}='{value}'" for name, value in self._settings.items())

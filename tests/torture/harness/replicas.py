@@ -7,8 +7,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from harness.kill_cycles import act
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
@@ -24,6 +22,15 @@ replicas = 3
 max_gb = 1.0
 silent_after_s = 5.0
 """
+
+SERVING = {"serve1": ("serve",), "serve2": ("serve",)}
+SINGLE = {"run": ("run",), **SERVING}
+CHAIN = {
+    "acquire": ("acquire",),
+    "analyse1": ("analyse", "--partition", "1/2"),
+    "analyse2": ("analyse", "--partition", "2/2"),
+    **SERVING,
+}
 
 STORE = """
 [store]
@@ -51,8 +58,8 @@ class Replicas:
     postgres: PostgresServer
     rigs: Mapping[str, list[ServiceRig]]
     watches: list[Watch]
+    nodes: Sequence[NatsServer]
     lives: dict[str, list[int]] = field(default_factory=dict)
-    nodes: Sequence[NatsServer] = ()
 
     @property
     def serving(self) -> list[ServiceRig]:
@@ -153,60 +160,30 @@ def _start(rigs: Sequence[ServiceRig]) -> None:
 
 @contextmanager
 def replicas(
-    plant: LedgerPlant, folder: Path, daq: LedgerDaq, postgres: PostgresServer
-) -> Iterator[Replicas]:
-    """One `padwatch run` over PostgreSQL, and two `padwatch serve`."""
-    roles = {"run": ("run",), "serve1": ("serve",), "serve2": ("serve",)}
-    with _processes(plant, folder, daq, postgres, roles) as found:
-        yield found
-
-
-@contextmanager
-def chain(
     plant: LedgerPlant,
     folder: Path,
     daq: LedgerDaq,
     postgres: PostgresServer,
     nodes: Sequence[NatsServer],
 ) -> Iterator[Replicas]:
-    """`padwatch acquire`, two `padwatch analyse` and two `padwatch serve`, over three nodes."""
-    servers = ", ".join(f'"{node.url}"' for node in nodes)
-    roles = {
-        "acquire": ("acquire",),
-        "analyse1": ("analyse", "--partition", "1/2"),
-        "analyse2": ("analyse", "--partition", "2/2"),
-        "serve1": ("serve",),
-        "serve2": ("serve",),
-    }
-    stream = STREAM.format(servers=servers)
-    with _processes(plant, folder, daq, postgres, roles, stream) as found:
-        found.nodes = nodes
-        yield found
+    """Processes over PostgreSQL, each with a folder of its own, as on a host of its own.
 
-
-@contextmanager
-def _processes(
-    plant: LedgerPlant,
-    folder: Path,
-    daq: LedgerDaq,
-    postgres: PostgresServer,
-    roles: Mapping[str, tuple[str, ...]],
-    stream: str = "",
-) -> Iterator[Replicas]:
-    """Processes by name, each with a folder of its own, as on a host of its own."""
-    extra = stream + STORE.format(conninfo=postgres.create("plant"))
+    Parameters
+    ----------
+    nodes
+        Of a stream between those that acquire and those that analyse; one process does both if
+        there are none.
+    """
+    extra = STORE.format(conninfo=postgres.create("plant"))
+    if nodes:
+        extra += STREAM.format(servers=", ".join(f'"{node.url}"' for node in nodes))
     rigs: dict[str, list[ServiceRig]] = defaultdict(list)
     with ExitStack() as running:
-        for name, role in roles.items():
+        for name, role in (CHAIN if nodes else SINGLE).items():
             own = plant.write(folder / f"{name}.toml", folder / name, daq.ports, extra)
             rig = ServiceRig(own, role=role, log=f"{name}.log")
             rigs[role[0]].append(running.enter_context(rig))
         watches = [Watch(plant, daq.offered) for _ in rigs["serve"]]
         for watch in watches:
             running.callback(watch.end)
-        yield Replicas(plant, folder / "serve1.toml", daq, postgres, rigs, watches)
-
-
-def chance(rng: np.random.Generator, mean_s: float, most_s: float) -> None:
-    """Let a random time pass."""
-    time.sleep(min(rng.exponential(mean_s), most_s))
+        yield Replicas(plant, folder / "serve1.toml", daq, postgres, rigs, watches, nodes)

@@ -177,8 +177,7 @@ def soak(bench: Bench, seconds: float, checked: Sequence[str]) -> Soaked:
         usages.append(look(service, log))
     passed_s = time.monotonic() - begun_s
     device_s = sum(device.cpu_times()[:2]) - device_s
-    with bench.rig.api() as api:
-        sources = {unit["id"]: unit["source"] for unit in api.get("/api/v1/overview")["units"]}
+    sources = {unit["id"]: unit["source"] for unit in bench.get("overview")["units"]}
     return Soaked(
         seconds=passed_s,
         ready_s=ready_s,
