@@ -6,12 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from core.quality import Level
-from service.store.buckets import (
-    DAY_NS,
-    NICE_WIDTHS_NS,
-    bucket_width_ns,
-    bucketed,
-)
+from service.store.buckets import DAY_NS, NICE_WIDTHS_NS, bucket_width_ns, bucketed
 from service.store.summaries import Summaries
 
 T0 = 1_767_225_600_000_000_000

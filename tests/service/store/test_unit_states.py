@@ -10,17 +10,12 @@ from service.store.unit_states_port import UnitBeat, UnitReport
 REPORT = UnitReport("U1", 1, 10**18, "connected", None, 10**18, "signs", 7, b"state")
 
 
-def test_a_report_is_read_as_it_was_written(store: SqliteStore) -> None:
+def test_a_report_is_read_as_it_was_written_and_a_beat_leaves_the_state(store: SqliteStore) -> None:
     store.unit_states.report("one", [REPORT])
 
     assert store.unit_states.beats() == [UnitBeat("U1", "one", 1, 10**18, "signs", 7)]
     assert store.unit_states.states(["U1", "U9"]) == {"U1": ("one", 7, b"state")}
-
-
-def test_a_beat_without_a_state_leaves_the_state_as_it_was(store: SqliteStore) -> None:
-    store.unit_states.report("one", [REPORT])
     store.unit_states.report("one", [replace(REPORT, n_beats=2, signs="newer", state=None)])
-
     assert store.unit_states.beats() == [UnitBeat("U1", "one", 2, 10**18, "newer", 7)]
     assert store.unit_states.states(["U1"]) == {"U1": ("one", 7, b"state")}
 

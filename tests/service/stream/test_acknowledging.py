@@ -1,4 +1,4 @@
-"""What is acknowledged is stored, and where a unit goes on with it; bugs in this are seen."""
+"""What is acknowledged is stored, and where a unit goes on with it, also through kills."""
 
 import asyncio
 import sqlite3
@@ -9,9 +9,11 @@ from typing import Any
 
 import nats
 import pytest
-from harness import stream_rig
+from harness import service_rig, stream_rig
 from harness.nats_server import NatsServer
+from harness.service_rig import ServiceRig
 from harness.stream_rig import (
+    LEDGER,
     analysing,
     blocks,
     found_in,
@@ -248,3 +250,50 @@ async def test_a_position_that_is_not_stored_with_its_results_is_caught(
     sent = await on_the_stream(plant, server)
     wanted = found_in(await single_process(written_plant(tmp_path, server, "single"), sent))
     assert (found_in(database) == wanted) == (not position_apart)
+
+
+N_PER_UNIT = 120
+
+
+async def publish_stretch(plant: PlantFile, first: int, last: int) -> None:
+    """Publish a stretch of every unit's blocks."""
+    pairs = zip(*(blocks(plant, u, N_PER_UNIT, 3) for u in LEDGER.units), strict=True)
+    sent = (block for pair in pairs for block in pair)
+    await stream_rig.publish(plant, (b for b in sent if first <= number_of(b.start_ns) < last))
+
+
+def number_of(start_ns: int) -> int:
+    return round((start_ns - stream_rig.T0) / 1e9)
+
+
+@pytest.mark.timeout(300)
+async def test_results_are_those_of_a_single_process_through_kills_of_the_analysis_and_of_nats(
+    tmp_path: Path, server: NatsServer
+) -> None:
+    plant_file = written_plant(tmp_path, server)
+    plant = load_plant_file(plant_file)
+    database = tmp_path / "plant" / "padwatch.sqlite3"
+    with ServiceRig(plant_file, role=("analyse",), log="analyse.log") as rig:
+        rig.start()
+        await publish_stretch(plant, 0, 66)
+        service_rig.until(lambda: min(positions(database).values(), default=0) > 50)
+        server.kill()
+        rig.kill()
+        server.start()
+        await publish_stretch(plant, 66, N_PER_UNIT)
+        rig.start()
+        last = 2 * N_PER_UNIT
+        service_rig.until(lambda: max(positions(database).values(), default=0) == last)
+        service_rig.until(lambda: min(positions(database).values(), default=0) >= last - 1)
+        assert rig.stop() == 0, rig.newest_log()
+    sent = await on_the_stream(plant, server)
+    assert len(sent) == last
+    wanted = found_in(await single_process(written_plant(tmp_path, server, "single"), sent))
+    found = found_in(database)
+    assert {name: len(rows) for name, rows in found.items()} == {
+        name: len(rows) for name, rows in wanted.items()
+    }
+    assert found == wanted
+    assert len(wanted["assessment"]) > 30
+    assert len(wanted["alarm_event"]) > 5
+    assert wanted["gap"]

@@ -35,9 +35,7 @@ class Clock(StandingClock):
         self.s += duration_s
 
 
-def recording(
-    folder: Path, start_ns: int, unit: str = "U1", step_ns: int = 10**9, **files: str
-) -> Path:
+def recording(folder: Path, start_ns: int, unit: str = "U1", step_ns: int = 10**9) -> Path:
     """Ten blocks of a second, one every so often; channel a is the number of the sample."""
     limits = {"full_scale_v": 10.0, "unit_per_v": 1.0, "ok_min_v": -10.0, "ok_max_v": 10.0}
     channels = tuple(
@@ -51,8 +49,6 @@ def recording(
             counts = np.array([index, -index])[:, first : first + 50]
             stamp = start_ns + first // 50 * step_ns
             writer.write(RawBlock(1, first, stamp, RATE_HZ, counts, (True, True), ()))
-    for name, text in files.items():
-        (folder / name).with_suffix(".json").write_text(text)
     return folder
 
 

@@ -6,6 +6,7 @@ import pytest
 from harness.places import PostgresPlace
 from harness.postgres_server import PostgresServer
 from rigs.assessments import assessment
+from rigs.memory_folder import memory_folder
 
 from service.origin import Origin
 from service.store import schema
@@ -14,9 +15,9 @@ from service.store.postgres import PostgresStore, connection
 from service.store.postgres.address import PostgresAddress
 
 
-def refused(address: PostgresAddress, folder: Path) -> str:
+def refused(address: PostgresAddress) -> str:
     """Try to open a store; what is said."""
-    with pytest.raises(StoreError) as refusal:
+    with memory_folder() as folder, pytest.raises(StoreError) as refusal:
         PostgresStore(address, folder / "head.json")
     said = str(refusal.value)
     assert "\n" not in said
@@ -25,20 +26,18 @@ def refused(address: PostgresAddress, folder: Path) -> str:
 
 
 def test_a_server_that_does_not_run_is_named(tmp_path: Path) -> None:
-    said = refused(PostgresAddress(f"host={tmp_path} dbname=padwatch user=p"), tmp_path)
+    said = refused(PostgresAddress(f"host={tmp_path} dbname=padwatch user=p"))
 
     assert said.startswith(f"PostgreSQL database padwatch at {tmp_path}: ")
     assert said.endswith("see whether PostgreSQL runs and can be reached; it is tried again")
 
 
-def test_a_database_or_a_role_that_is_not_there_is_said(
-    postgres_server: PostgresServer, tmp_path: Path
-) -> None:
+def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server: PostgresServer) -> None:
     there = postgres_server.conninfo("nothing_like_it")
 
-    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there), tmp_path)
+    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there))
     there = there.replace("user=postgres", "user=nobody_here")
-    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there), tmp_path)
+    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there))
 
 
 @pytest.mark.parametrize(
@@ -57,48 +56,44 @@ def test_a_wrong_password_is_refused_and_not_shown(
     path.chmod(mode)
     there = postgres_place.server.conninfo(postgres_place.database, by="tcp")
 
-    assert complaint in refused(PostgresAddress(there, path), tmp_path)
-    assert "No such file" in refused(PostgresAddress(there, tmp_path / "none"), tmp_path)
+    assert complaint in refused(PostgresAddress(there, path))
+    assert "No such file" in refused(PostgresAddress(there, tmp_path / "none"))
 
 
 def test_a_database_of_another_program_is_refused_and_left_as_it_is(
-    own_place: PostgresPlace, tmp_path: Path
+    own_place: PostgresPlace,
 ) -> None:
     own_place.execute("CREATE TABLE precious (a int)")
 
-    said = refused(own_place.address, tmp_path)
+    said = refused(own_place.address)
 
     assert "is not a padwatch database; create one for padwatch alone" in said
     tables = "SELECT table_name FROM information_schema.tables WHERE table_schema = 'public'"
     assert own_place.execute(tables) == [("precious",)]
 
 
-def test_a_database_of_a_newer_padwatch_is_refused(
-    postgres_place: PostgresPlace, tmp_path: Path
-) -> None:
+def test_a_database_of_a_newer_padwatch_is_refused(postgres_place: PostgresPlace) -> None:
     newest = len(schema.MIGRATIONS)
     postgres_place.execute("UPDATE padwatch SET schema_number = ?", (newest + 1,))
 
-    said = refused(postgres_place.address, tmp_path)
+    said = refused(postgres_place.address)
 
     assert f"has schema {newest + 1}, this padwatch knows up to {newest}; run the padwatch" in said
 
 
-def test_live_and_replayed_results_never_share_a_database(
-    postgres_place: PostgresPlace,
-) -> None:
+def test_live_and_replayed_results_never_share_a_database(postgres_place: PostgresPlace) -> None:
     with pytest.raises(StoreError, match="holds live results and is not opened for replay ones"):
         postgres_place.open(Origin.REPLAY)
 
 
 def test_a_migration_that_fails_leaves_the_database_as_it_was(
-    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     newest = len(schema.MIGRATIONS)
     more = (*schema.MIGRATIONS, "CREATE TABLE half (a TEXT) STRICT; CREATE TABLE half (a TEXT);")
     with monkeypatch.context() as upgrade:
         upgrade.setattr(schema, "MIGRATIONS", more)
-        assert 'relation "half" already exists' in refused(postgres_place.address, tmp_path)
+        assert 'relation "half" already exists' in refused(postgres_place.address)
 
     assert postgres_place.execute("SELECT schema_number FROM padwatch") == [(newest,)]
     assert postgres_place.execute("SELECT to_regclass('half')") == [(None,)]
@@ -106,57 +101,51 @@ def test_a_migration_that_fails_leaves_the_database_as_it_was(
 
 
 def test_a_server_that_loses_results_at_a_power_cut_is_refused(
-    postgres_server: PostgresServer, tmp_path: Path
+    postgres_server: PostgresServer,
 ) -> None:
     with PostgresServer(postgres_server, fsync="off") as careless:
         careless.create("padwatch")
         address = PostgresAddress(careless.conninfo("padwatch"))
-        said = refused(address, tmp_path)
+        said = refused(address)
 
     assert "would lose results at a power cut: set fsync = on" in said
 
 
 def test_a_server_that_is_too_old_is_refused(
-    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "OLDEST_VERSION", 990_000)  # as if time had gone on
 
-    assert "which is too old: padwatch needs 99 or newer" in refused(
-        postgres_place.address, tmp_path
-    )
+    assert "which is too old: padwatch needs 99 or newer" in refused(postgres_place.address)
 
 
-def test_a_database_in_another_encoding_is_refused(
-    own_server: PostgresServer, tmp_path: Path
-) -> None:
+def test_a_database_in_another_encoding_is_refused(own_server: PostgresServer) -> None:
     own_server.execute("CREATE DATABASE latin TEMPLATE template0 ENCODING 'LATIN1' LOCALE 'C'")
 
-    said = refused(PostgresAddress(own_server.conninfo("latin")), tmp_path)
+    said = refused(PostgresAddress(own_server.conninfo("latin")))
 
     assert "has the encoding LATIN1: create it with ENCODING 'UTF8'" in said
 
 
-def test_a_role_that_may_not_write_is_refused(
-    postgres_place: PostgresPlace, tmp_path: Path
-) -> None:
+def test_a_role_that_may_not_write_is_refused(postgres_place: PostgresPlace) -> None:
     there = postgres_place.address.conninfo.replace("user=postgres", "user=looker")
     postgres_place.execute("DROP ROLE IF EXISTS looker")
     postgres_place.execute("CREATE ROLE looker LOGIN")
 
-    said = refused(PostgresAddress(there), tmp_path)
+    said = refused(PostgresAddress(there))
 
     assert "permission denied" in said
     assert "give it the rights" in said
 
 
-def test_a_standby_is_refused(own_place: PostgresPlace, tmp_path: Path) -> None:
+def test_a_standby_is_refused(own_place: PostgresPlace) -> None:
     server = own_place.server
     own_place.open().close()
     server.stop()
     (server.data / "standby.signal").touch()
     try:
         server.start()
-        said = refused(own_place.address, tmp_path)
+        said = refused(own_place.address)
     finally:
         server.stop()
         (server.data / "standby.signal").unlink()

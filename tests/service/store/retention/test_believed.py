@@ -1,10 +1,7 @@
 """Ages count from a moment that a day of results lies behind, in both databases."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import closing
+from collections.abc import Sequence
 
-import pytest
-from harness.places import Place
 from rigs.assessments import assessment
 from rigs.old_results import HOUR_NS, SECOND_NS, T0, asked
 from rigs.rolled_trends import gather_all
@@ -15,12 +12,6 @@ from service.store.retention.limits import DAY_NS, RetentionLimits
 from service.store.sql_store import SqlStore
 
 YEAR_NS = 365 * DAY_NS
-
-
-@pytest.fixture
-def store(store_place: Place) -> Iterator[SqlStore]:
-    with closing(store_place.open()) as opened:
-        yield opened
 
 
 def measure(store: SqlStore, times_ns: Sequence[int], bearing: str = "UJB") -> None:

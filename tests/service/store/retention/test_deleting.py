@@ -55,12 +55,7 @@ DAMAGES = [
 
 @pytest.mark.parametrize(("width_s", "damage"), covering([60, 600, 3600], DAMAGES))
 def test_what_is_rolled_up_wrongly_is_gathered_anew_before_it_is_deleted(
-    rolled: SqliteStore,
-    plain: SqliteStore,
-    path: Path,
-    execute: Execute,
-    width_s: int,
-    damage: str,
+    rolled: SqliteStore, plain: SqliteStore, path: Path, execute: Execute, width_s: int, damage: str
 ) -> None:
     hour_ns = T0 + 2 * HOUR_NS
     where = f"width_s = {width_s} AND start_ns >= {hour_ns} AND start_ns < {hour_ns + HOUR_NS}"

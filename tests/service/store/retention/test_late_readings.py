@@ -1,6 +1,5 @@
 """Whatever comes late, and in whatever order things are done, hours say what was read."""
 
-import sqlite3
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from rigs.old_results import (
     require_same_hours,
 )
 from rigs.rolled_trends import gather_all, n_rows
+from rigs.store_fixtures import Execute
 from rigs.tiers import fast_and_long
 
 from service.store.retention import deleting
@@ -136,7 +136,7 @@ def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
 def test_planted_bugs_are_found(
     rolled: SqliteStore,
     plain: SqliteStore,
-    path: Path,
+    execute: Execute,
     monkeypatch: pytest.MonkeyPatch,
     module: object,
     name: str,
@@ -144,10 +144,7 @@ def test_planted_bugs_are_found(
 ) -> None:
     """Late readings that overwrite their hour, and deleting unseen what was not rolled up."""
     monkeypatch.setattr(module, name, bug)
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute(
-            "DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,)
-        )
+    execute("DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,))
     delete_all(rolled)
     gather_all(rolled)
     delete_all(rolled)

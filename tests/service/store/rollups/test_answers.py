@@ -1,25 +1,14 @@
 """Trends out of roll-ups are those out of single readings, whatever is asked."""
 
-import sqlite3
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rigs.rolled_trends import require_same
 from rigs.tiers import fast_and_long
-from rigs.varied_results import (
-    HOUR_NS,
-    MINUTE_NS,
-    NAMES,
-    SECOND_NS,
-    T0,
-    WHOLE,
-    N,
-)
+from rigs.varied_results import HOUR_NS, MINUTE_NS, NAMES, SECOND_NS, T0, WHOLE, N
 
 from core.condition.operating_state import OperatingState
 from core.quality import Level
@@ -92,12 +81,11 @@ def count_roll_ups(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
 
 
 def test_a_whole_range_of_gathered_hours_reads_no_single_reading(
-    rolled: SqliteStore, plain: SqliteStore, tmp_path: Path
+    rolled: SqliteStore, plain: SqliteStore
 ) -> None:
     day = replace(WHOLE, start_ns=T0 // HOUR_NS * HOUR_NS, end_ns=T0 // HOUR_NS * HOUR_NS + HOUR_NS)
     wanted = plain.trend(replace(day, max_points=2))
-    with closing(sqlite3.connect(tmp_path / "rolled.sqlite3")) as other, other:
-        other.execute("DELETE FROM assessment WHERE time_ns < ?", (day.end_ns,))
+    rolled._writer.execute("DELETE FROM assessment WHERE time_ns < ?", (day.end_ns,))
 
     require_same(rolled.trend(replace(day, max_points=2)), wanted)
 

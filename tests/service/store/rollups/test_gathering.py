@@ -1,6 +1,5 @@
 """However readings come, late, in pieces or before a crash, they are gathered to the same."""
 
-import sqlite3
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -8,16 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from harness.places import SqlitePlace
 from rigs.assessments import assessment
-from rigs.rolled_trends import LATER_NS, gather_all, require_same
-from rigs.varied_results import (
-    HOUR_NS,
-    MINUTE_NS,
-    T0,
-    WHOLE,
-    N,
-    dump,
-)
+from rigs.rolled_trends import LATER_NS, gather_all, n_rows, require_same
+from rigs.varied_results import HOUR_NS, MINUTE_NS, T0, WHOLE, N, dump
 
 from core.assessment import Assessment
 from service.store.port import StoreError
@@ -29,10 +22,7 @@ LONG = pytest.mark.long
 
 
 def test_what_comes_piece_by_piece_is_gathered_like_what_comes_at_once(
-    plain: SqliteStore,
-    rolled: SqliteStore,
-    results: list[Assessment],
-    tmp_path: Path,
+    plain: SqliteStore, rolled: SqliteStore, results: list[Assessment], tmp_path: Path
 ) -> None:
     with closing(SqliteStore(tmp_path / "pieces.sqlite3")) as store:
         for first in range(0, N, 37):
@@ -57,10 +47,7 @@ def test_a_bounded_number_of_readings_is_gathered_at_a_time(
 
 @pytest.mark.parametrize("late_min", [3, 200, *(pytest.param(n, marks=LONG) for n in (70, 254))])
 def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
-    rolled: SqliteStore,
-    plain: SqliteStore,
-    tmp_path: Path,
-    late_min: int,
+    rolled: SqliteStore, plain: SqliteStore, tmp_path: Path, late_min: int
 ) -> None:
     late = assessment(T0 + late_min * MINUTE_NS + 1, speed_rpm=1e6, eccentricity_ratio=0.35)
     later = [replace(late, time_ns=late.time_ns + i) for i in range(1, 4)]  # of the same hour
@@ -78,18 +65,17 @@ def test_a_late_reading_is_in_every_trend_at_once_and_its_hour_is_gathered_anew(
     gather_all(rolled)
     require_same(rolled.trend(WHOLE), plain.trend(WHOLE))
     assert max(v for v in rolled.trend(WHOLE).series["speed_rpm"].maximum if v is not None) == 1e6
-    with closing(sqlite3.connect(tmp_path / "rolled.sqlite3")) as reader:
-        assert reader.execute("SELECT count(*) FROM rollup_redo").fetchone() == (0,)
+    assert n_rows(tmp_path / "rolled.sqlite3", "rollup_redo") == 0
 
 
 def test_a_crash_while_gathering_leaves_nothing_half_done(
     plain: SqliteStore, tmp_path: Path
 ) -> None:
-    with closing(sqlite3.connect(tmp_path / "plain.sqlite3")) as other, other:
-        other.execute(
-            "CREATE TRIGGER crash BEFORE INSERT ON rollup_mark"
-            " BEGIN SELECT RAISE(ABORT, 'power cut'); END"
-        )
+    place = SqlitePlace(tmp_path / "plain.sqlite3")
+    place.execute(
+        "CREATE TRIGGER crash BEFORE INSERT ON rollup_mark"
+        " BEGIN SELECT RAISE(ABORT, 'power cut'); END"
+    )
     before = plain.trend(WHOLE)
 
     (series,) = plain.rollups.due(LATER_NS)
@@ -97,9 +83,8 @@ def test_a_crash_while_gathering_leaves_nothing_half_done(
         plain.rollups.gather(series, LATER_NS)
 
     require_same(plain.trend(WHOLE), before)
-    with closing(sqlite3.connect(tmp_path / "plain.sqlite3")) as other, other:
-        assert other.execute("SELECT count(*) FROM rollup_cell").fetchone() == (0,)
-        other.execute("DROP TRIGGER crash")
+    assert n_rows(place.path, "rollup_cell") == 0
+    place.unguard("crash", "rollup_mark")
     gather_all(plain)
     require_same(plain.trend(WHOLE), before)
 
@@ -111,8 +96,7 @@ def test_a_reading_from_the_future_does_not_make_all_others_late(
     plain.append([assessment(T0 + 1000 * HOUR_NS, speed_rpm=1.0)], [])
     gather_all(plain, now_ns)
 
-    with closing(sqlite3.connect(tmp_path / "plain.sqlite3")) as reader:
-        assert reader.execute("SELECT until_ns FROM rollup_mark").fetchone()[0] <= now_ns
+    assert n_rows(tmp_path / "plain.sqlite3", "rollup_mark", f"until_ns <= {now_ns}") == 1
 
 
 @pytest.mark.parametrize("width", [0.05, 2.5, 0.1])
