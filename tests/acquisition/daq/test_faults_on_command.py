@@ -127,10 +127,6 @@ async def test_a_reply_from_a_wrong_map_is_read_again_and_never_believed(
             index = np.arange(block.first_index, block.stop_index)
             np.testing.assert_array_equal(block.samples[0], index)
     assert (block.stop_index, block.rejected) == (250, ())
-
-
-@pytest.mark.parametrize("fault", ["shift_map", "word_order"])
-async def test_a_map_that_stays_wrong_is_a_config_error(fault, server, source):
     server.inject(fault, 100)
     with pytest.raises(ConfigError, match="block ring: "):
         async with source.connect():

@@ -44,14 +44,6 @@ def test_the_ledger_books_what_was_offered_lost_or_not(counting_feed):
     assert ledger.n_samples("U8") == 50
 
 
-def test_a_frozen_device_takes_nothing_from_its_feed(counting_feed):
-    feed = counting_feed()
-    device = RingDevice(feed)
-    device.frozen = True
-    device.produce(5)
-    assert (device.newest, feed.n_samples) == (0, 50)
-
-
 def test_a_restarted_device_has_an_empty_ring_and_counts_from_zero(counting_feed):
     device = RingDevice(counting_feed())
     device.produce(5)

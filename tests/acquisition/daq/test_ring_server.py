@@ -124,11 +124,3 @@ async def test_another_modbus_client_reads_the_same_registers_and_changes_none(p
     reply = await client.read_holding_registers(device.layout.end_address, count=1)
     assert reply.isError()
     assert reply.exception_code == 2
-
-
-async def test_a_cut_drops_every_connection_and_takes_new_ones(plain_client):
-    client, _, server = plain_client
-    assert client.connected
-    server.cut()
-    async with AsyncModbusTcpClient("127.0.0.1", port=server.port, retries=0) as again:
-        assert not (await again.read_holding_registers(0, count=16)).isError()

@@ -26,18 +26,17 @@ from acquisition.registers.register_map import RegisterMap
 from core.blocks import SampleBlock
 
 
-async def blocks_until(stream, stop_index: int) -> list[SampleBlock]:
-    """Blocks up to the one that ends at an index."""
-    blocks = [await anext(stream)]
-    while blocks[-1].stop_index != stop_index:
-        blocks.append(await anext(stream))
-    return blocks
-
-
 @pytest.fixture
 def read_until() -> Callable[..., Awaitable[list[SampleBlock]]]:
     """Takes blocks of a stream up to the one that ends at an index."""
-    return blocks_until
+
+    async def take(stream, stop_index: int) -> list[SampleBlock]:
+        blocks = [await anext(stream)]
+        while blocks[-1].stop_index != stop_index:
+            blocks.append(await anext(stream))
+        return blocks
+
+    return take
 
 
 @pytest.fixture(params=[1, 2], ids=["v1", "v2"])

@@ -14,13 +14,6 @@ def counted(removes: bool = True) -> CountedSamples:
     return CountedSamples(RATE_HZ, removes=removes, epoch=7)
 
 
-def test_consecutive_counts_are_consecutive_samples_across_the_wrap() -> None:
-    samples = counted()
-    places = [samples.place((WRAP - 3 + n) % WRAP, n / RATE_HZ) for n in range(6)]
-
-    assert places == [Place(7, WRAP - 3 + n) for n in range(6)]
-
-
 @given(
     st.integers(0, WRAP - 1),
     st.lists(st.tuples(st.integers(0, 20 * WRAP), st.floats(0.0, 0.3)), min_size=1, max_size=20),

@@ -78,18 +78,6 @@ async def test_a_busy_device_may_be_asked_again_on_the_same_connection(linked, b
     assert await link.read(100, 1) == b"\0\1"
 
 
-async def test_a_half_open_link_is_noticed_by_the_time_out_and_says_so(linked, bench_server):
-    link = linked(timeout_s=0.1)
-    await link.open()
-    bench_server.inject("silent")
-    with pytest.raises(LinkError, match=f"{link.where}: no answer within 0.1 s"):
-        await link.read(100, 1)
-    with pytest.raises(LinkError, match="closed"):
-        await link.read(100, 1)
-    await link.open()
-    assert await link.read(100, 1) == b"\0\1"
-
-
 def requests_of_pymodbus() -> list[type[ModbusPDU]]:
     """Every request that pymodbus can send."""
     kinds: list[type[ModbusPDU]] = [ModbusPDU]

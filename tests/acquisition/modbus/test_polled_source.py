@@ -27,37 +27,13 @@ async def test_each_poll_is_a_sample_with_its_slow_values_in_as_few_reads_as_pla
     assert server.function_codes == {3: 120 * 3}
 
 
-async def test_polls_that_are_overdue_are_a_jump_of_the_index_and_never_made_up(plant) -> None:
-    async with plant() as (source, _, server, clock), source.connect() as stream:
-        first = await anext(stream)
-        clock.step(4.5)
-        second = await anext(stream)
-        third = await anext(stream)
-        n_reads = server.function_codes[3]
-
-    assert [b.first_index for b in (first, second, third)] == [0, 5, 6]
-    assert float(second.samples[0, 0]) == 105.0
-    assert n_reads == 3 * 3
-
-
-@pytest.mark.parametrize("cut", [True, False])
-async def test_the_index_goes_on_across_connections(plant, cut: bool) -> None:
-    async with plant() as (source, _, server, clock):
-        [before] = await take(source, 1)
-        if cut:
-            server.cut()
-        clock.step(10.0)
-        [after] = await take(source, 1)
-
-    assert (before.first_index, after.first_index) == (0, 10)
-    assert after.epoch == before.epoch
-    assert float(after.samples[0, 0]) == 110.0
-
-
-async def test_a_device_whose_heartbeat_stands_still_is_not_connected(plant) -> None:
-    registers = map_of(heartbeat=Cell(address=60))
+@pytest.mark.parametrize("heartbeat", [Cell(address=60), None])
+async def test_a_device_whose_heartbeat_or_without_one_everything_stands_still_is_not_connected(
+    plant, heartbeat
+) -> None:
+    registers = map_of(heartbeat=heartbeat)
     async with plant(registers, stale_after_s=5.0) as (source, device, _, clock):
-        await take(source, 3)
+        assert len(await take(source, 20)) == 20
         device.frozen = True
         with pytest.raises(LinkError, match="data stand still"):
             await take(source, 20)
@@ -66,14 +42,6 @@ async def test_a_device_whose_heartbeat_stands_still_is_not_connected(plant) -> 
         device.frozen = False
         clock.step(1.0)
         assert len(await take(source, 2)) == 2
-
-
-async def test_without_a_heartbeat_anything_that_changes_is_life(plant) -> None:
-    async with plant(stale_after_s=5.0) as (source, device, *_):
-        assert len(await take(source, 20)) == 20
-        device.frozen = True
-        with pytest.raises(LinkError, match="data stand still"):
-            await take(source, 20)
 
 
 async def test_the_device_stamps_its_polls_if_it_can(plant) -> None:

@@ -11,33 +11,28 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_pace import out_of_step_s
 
 
-async def test_a_device_that_stands_still_is_not_connected(
-    device, server, source_at, stepped_clock
+@pytest.mark.parametrize(
+    ("trouble", "complaint"), [("frozen", "stand still"), ("writes nothing", "no usable slot")]
+)
+async def test_a_device_that_stands_still_or_counts_but_writes_nothing_is_not_connected(
+    trouble, complaint, device, server, source_at, stepped_clock
 ):
     source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0, stale_after_s=5.0)
     async with source.connect() as stream:
         await anext(stream)
-        device.frozen = True
-        with pytest.raises(LinkError, match="stand still"):
+        device.frozen = trouble == "frozen"
+        if not device.frozen:
+            device.memory.before_read = lambda at, _: at or device.produce(1, faults.dropped)
+        with pytest.raises(LinkError, match=complaint):
             await anext(stream)
-    with pytest.raises(LinkError, match="stand still"):
-        async with source.connect():
-            pass
-    device.frozen = False
-    device.produce(1)
-    async with source.connect() as stream:
-        assert (await anext(stream)).first_index == 50
-
-
-async def test_a_device_that_counts_but_writes_nothing_is_not_connected(
-    device, server, source_at, stepped_clock
-):
-    source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0, stale_after_s=5.0)
-    async with source.connect() as stream:
-        await anext(stream)
-        device.memory.before_read = lambda address, _: address or device.produce(1, faults.dropped)
-        with pytest.raises(LinkError, match="no usable slot"):
-            await anext(stream)
+    if device.frozen:
+        with pytest.raises(LinkError, match=complaint):
+            async with source.connect():
+                pass
+        device.frozen = False
+        device.produce(1)
+        async with source.connect() as stream:
+            assert (await anext(stream)).first_index == 50
 
 
 @pytest.mark.parametrize(

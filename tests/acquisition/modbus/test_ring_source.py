@@ -159,18 +159,3 @@ async def test_more_slow_values_than_fit_one_read_arrive_in_order(
         async with source.connect() as stream:
             block = await anext(stream)
     assert [reading.value for reading in block.slow.values()] == list(range(80))
-
-
-async def test_slow_values_belong_to_their_samples_whenever_the_reader_looks(
-    counting_feed, source_at, read_until
-):
-    feed = counting_feed(n_channels=3)
-    device = RingDevice(feed)
-    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
-        await anext(stream)
-        for degrees in (46.0, 47.0, 48.0):
-            feed.slow = (degrees, float("nan"))
-            device.produce(1)
-        blocks = await read_until(stream, 200)
-    assert [block.slow["slow0"].value for block in blocks] == [46.0, 47.0, 48.0]
-    assert all(block.slow["slow1"].value is None for block in blocks)

@@ -50,16 +50,14 @@ async def test_a_line_is_only_used_when_it_is_silent(hostile_line, link_on):
     link.close()
 
 
-async def test_a_port_that_is_not_there_is_a_link_error_that_names_it(link_on):
-    with pytest.raises(LinkError, match="/dev/nowhere: No such file or directory"):
-        await link_on("/dev/nowhere").open()
-
-
-async def test_a_file_that_is_no_port_is_a_link_error(link_on, tmp_path):
-    path = tmp_path / "plain"
-    path.write_bytes(b"")
-    with pytest.raises(LinkError, match=r"plain: .*configure port"):
-        await link_on(path).open()
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [("nowhere", "nowhere: No such file or directory"), ("plain", r"plain: .*configure port")],
+)
+async def test_what_is_no_port_is_a_link_error_that_names_it(name, complaint, link_on, tmp_path):
+    (tmp_path / "plain").write_bytes(b"")
+    with pytest.raises(LinkError, match=complaint):
+        await link_on(tmp_path / name).open()
 
 
 async def test_two_programs_cannot_read_one_line(hostile_line, link_on):

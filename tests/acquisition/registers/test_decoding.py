@@ -3,10 +3,7 @@
 import math
 import struct
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from acquisition.registers.cells import ByteOrder, Cell, NumberType
 from acquisition.registers.decoding import MapDecoder, ValueState
@@ -65,38 +62,6 @@ def test_a_known_float_is_found_in_the_byte_orders_of_the_manuals(order, content
     assert one(MapValue(id="v", cell=cell), bytes.fromhex(content))[0] == pytest.approx(123.456)
 
 
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(sorted(STRUCT)),
-            st.sampled_from([order.value for order in ByteOrder]),
-            st.integers(-30000, 30000),
-            st.integers(0, 3),
-        ),
-        min_size=1,
-        max_size=20,
-    )
-)
-def test_any_map_finds_each_of_its_numbers(cells: list[tuple[str, str, int, int]]) -> None:
-    values, memory, address = [], {}, 0
-    for n, (type_, order, number, gap) in enumerate(cells):
-        number = abs(number) if type_.startswith("u") else number
-        address += gap
-        cell = Cell(address=address, type=NumberType(type_), byte_order=ByteOrder(order))
-        values.append(MapValue(id=f"v{n}", cell=cell))
-        data = registers_of(number, type_, order)
-        memory |= {address + i // 2: data[i : i + 2] for i in range(0, len(data), 2)}
-        address += cell.n_places
-    decoder = MapDecoder(RegisterMap(values=tuple(values)))
-
-    content = b"".join(memory[a] for r in decoder.plan.requests for a in range(r.start, r.stop))
-    reading = decoder.read(content)
-
-    expected = [abs(n) if t.startswith("u") else n for t, _, n, _ in cells]
-    np.testing.assert_array_equal(reading.values, expected)
-    assert set(reading.states) == {ValueState.OK}
-
-
 SKF = MapValue(
     id="v",
     cell=Cell(address=609, type=NumberType.INT16),
@@ -111,10 +76,6 @@ def test_an_skf_value_is_its_mantissa_times_its_scale_register() -> None:
 
     assert found == pytest.approx(-16384 / 32767 * 200)
     assert state is ValueState.OK
-
-
-def test_a_scale_register_of_zero_gives_no_value_instead_of_zero() -> None:
-    assert one(SKF, words(12345, 0))[1] is ValueState.INVALID
 
 
 VM600 = MapValue(
@@ -142,7 +103,8 @@ def test_a_vm600_reading_at_the_end_of_its_scale_is_clipped(raw, expected, state
     assert found == (pytest.approx(expected), state)
 
 
-def test_a_vm600_rack_that_gives_no_range_gives_no_value() -> None:
+def test_without_a_scale_or_a_range_there_is_no_value_instead_of_zero() -> None:
+    assert one(SKF, words(12345, 0))[1] is ValueState.INVALID
     assert one(VM600, words(7, 0, 0, 0, 0))[1] is ValueState.INVALID
 
 

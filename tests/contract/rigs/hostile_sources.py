@@ -25,27 +25,21 @@ from rigs.wrong_replies import (
 MAX_HONEST = 5
 
 
-class _OnLyingTcp:
+class _Lying:
     link = "tcp"
     timeout_s = TIMEOUT_S
 
-    def _serve(self, device) -> HostileServer:
-        self.ear = HostileServer(device)
-        return self.ear
-
-
-class _OnLyingRtu:
-    link = "rtu"
-    timeout_s = TIMEOUT_S
-
-    def _serve(self, device) -> HostileLine:
-        self.ear = HostileLine(device, Path(self._folder.name) / "line")
+    def _serve(self, device) -> HostileServer | HostileLine:
+        if self.link == "tcp":
+            self.ear = HostileServer(device)
+        else:
+            self.ear = HostileLine(device, Path(self._folder.name) / "line")
         return self.ear
 
 
 def _kind(rig: type, **more: object) -> type:
-    link = _OnLyingRtu if "Rtu" in rig.__name__ else _OnLyingTcp
-    return type(f"Lying{rig.__name__}", (link, rig), more)
+    link = "rtu" if "Rtu" in rig.__name__ else "tcp"
+    return type(f"Lying{rig.__name__}", (_Lying, rig), {"link": link} | more)
 
 
 def _ring(rig: type, version: int) -> type:
