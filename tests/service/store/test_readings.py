@@ -1,5 +1,6 @@
 """What was appended is read back, to the last bit."""
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -202,24 +203,16 @@ def test_a_closed_store_says_so(store: SqliteStore) -> None:
 
 
 def test_a_result_of_all_quantities_takes_no_page_of_its_own(path: Path) -> None:
-    store = SqliteStore(path)
+    SqliteStore(path).close()
+    before = path.stat().st_size
     everything = {
         q.name: Reading(1.0, u_random=0.1, u_systematic=0.1) if q.has_uncertainty else 1.0
         for q in CATALOGUE
     }
-    before = n_bytes(store)
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(at(i), **everything) for i in range(400)], [])
 
-    store.append([assessment(at(i), **everything) for i in range(400)], [])
-
-    assert (n_bytes(store) - before) / 400 < 2500
-
-
-def n_bytes(store: SqliteStore) -> int:
-    n_pages, size = (
-        store._writer.execute(f"PRAGMA {name}").fetchone()[0]
-        for name in ("page_count", "page_size")
-    )
-    return int(n_pages * size)
+    assert (path.stat().st_size - before) / 400 < 2500
 
 
 def test_what_a_clock_shows_for_the_second_time_is_no_repetition(store: SqliteStore) -> None:

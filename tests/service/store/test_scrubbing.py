@@ -3,6 +3,7 @@
 import asyncio
 from contextlib import closing, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -137,7 +138,8 @@ async def test_a_disk_that_stands_still_makes_the_loop_rest_but_not_fall_silent(
     stepped_clock: Any,
 ) -> None:
     beats = Heartbeats(stepped_clock)
-    loop = Scrubbing(SlowDisk(stepped_clock), stepped_clock)
+    slow_disk: Any = SimpleNamespace(look_on=lambda: stepped_clock.step(30.0))
+    loop = Scrubbing(slow_disk, stepped_clock)
     slept_s = []
 
     async def sleep(duration_s: float) -> None:
@@ -153,14 +155,3 @@ async def test_a_disk_that_stands_still_makes_the_loop_rest_but_not_fall_silent(
 
     assert max(slept_s) <= LOOK_S
     assert sum(slept_s) > PATIENCE_S
-
-
-class SlowDisk:
-    """Whose every look takes half a minute."""
-
-    def __init__(self, clock: Any) -> None:
-        self._clock = clock
-
-    def look_on(self) -> bool:
-        self._clock.step(30.0)
-        return False

@@ -6,14 +6,13 @@ from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import pytest
 from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Life, Message, MovingUnit
 from harness.stream_rig import analysing, blocks
 
-from acquisition.clock import Clock
 from core.alarms.alarm import AlarmKind
 from service.live import LinkState
 from service.settings.loading import load_plant_file
@@ -31,13 +30,6 @@ N_BLOCKS = 9
 TICKS_PER_S = 2
 
 
-class Stepped(Clock, Protocol):
-    """A clock that goes on when it is told."""
-
-    def step(self, duration_s: float) -> None:
-        """Let time pass."""
-
-
 class Back(StrEnum):
     """What there is on the stream after a restart."""
 
@@ -52,7 +44,7 @@ class Process:
 
     life: Life
     silence: Silence
-    clock: Stepped
+    clock: Any
     is_reached: bool = True
     waiting: Collection[str] = ()
 
@@ -90,7 +82,7 @@ class Process:
 class Place:
     """Where one process after the other analyses the unit."""
 
-    def __init__(self, folder: Path, clock: Stepped) -> None:
+    def __init__(self, folder: Path, clock: Any) -> None:
         ports = dict.fromkeys(LEDGER.units, 9)
         self._unit = MovingUnit(LEDGER.write(folder / "plant.toml", folder / "data", ports), clock)
         self._clock = clock
@@ -117,14 +109,11 @@ class Place:
             elif back is Back.NO_WINDOW:
                 life.progress.reaches_back(N_BLOCKS + 1)
             yield process
-            await analysis.captures.close()
-            await analysis.evidence.close()
-            await analysis.tape.close()
-            analysis.recordings.close()
+            await life.close()
 
 
 @pytest.fixture
-def place(tmp_path: Path, stepped_clock: Stepped) -> Place:
+def place(tmp_path: Path, stepped_clock: Any) -> Place:
     return Place(tmp_path, stepped_clock)
 
 

@@ -1,13 +1,11 @@
 """Index and folders are brought together, whatever has happened to either."""
 
 import shutil
-import sqlite3
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from service.store.port import StoreError
 from service.store.waveform_port import WaveformKind, WaveformState
 from service.waveforms.folders import put_out_of_sight
 from service.waveforms.inspection import again
@@ -141,13 +139,3 @@ def test_a_removal_that_a_kill_has_interrupted_is_finished(rig: Any) -> None:
     assert [file.name for file in rig.files()] == [other.name]
     assert rig.caretaker.found.n_missing == 0
     assert rig.caretaker.found.n_removed == {"continuous": 1}
-
-
-def test_an_index_that_cannot_be_written_loses_nothing(rig: Any) -> None:
-    folder = rig.make(0)
-    with sqlite3.connect(rig.root / "padwatch.sqlite3", isolation_level=None) as other:
-        other.execute("DROP TABLE waveform")
-        with pytest.raises(StoreError):
-            rig.caretaker.look()
-
-    assert folder.is_dir()

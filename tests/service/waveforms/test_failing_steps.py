@@ -206,9 +206,10 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
     )
     parts.trouble = None
     look = health_of([], parts, parts, parts, parts, recordings=keeper)
-    rig.make(0)
+    folder = rig.make(0)
     index.is_away = True
     keeper.look()
+    assert rig.names() == [folder.name]  # nothing is lost
     rig.clock.s += 55.0
     keeper.look()
     assert look().recording_error is None

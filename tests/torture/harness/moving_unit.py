@@ -51,6 +51,13 @@ class Life:
             self.analysis.recorder.put(Findings(position=self.progress.position()))
         await self.analysis.recorder.flush()
 
+    async def close(self) -> None:
+        """Let go of all files and threads, storing nothing more."""
+        await self.analysis.captures.close()
+        await self.analysis.evidence.close()
+        await self.analysis.tape.close()
+        self.analysis.recordings.close()
+
 
 class MovingUnit:
     """The only unit of a plant.
@@ -90,11 +97,7 @@ class MovingUnit:
             await life.take(wanted[:n], rng)
             if n is None:
                 await life.store()
-            analysis = life.analysis
-            await analysis.captures.close()
-            await analysis.evidence.close()
-            await analysis.tape.close()
-            analysis.recordings.close()
+            await life.close()
             return life.progress.refused
 
     async def begun(self, newest: int, stack: ExitStack) -> Life:

@@ -1,5 +1,6 @@
 """The mark beside a database: as it was written, and what it says of the database that is there."""
 
+import re
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -49,19 +50,24 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when() -> None
     )
 
 
-def test_an_older_database_that_has_come_as_far_again_is_told() -> None:
-    found = only(compared(mark(), mark(nonce="another"), "host"))
+@pytest.mark.parametrize(
+    ("changes", "kind", "said"),
+    [
+        ({"nonce": "another"}, Kind.ROLLED_BACK, "transaction 150 is another one"),
+        (
+            {"store": "00" * 16, "n_commits": 7},
+            Kind.REPLACED,
+            "150 transactions.*7 are in this one",
+        ),
+    ],
+)
+def test_an_older_database_that_has_come_as_far_again_and_another_one_are_told(
+    changes: dict[str, object], kind: Kind, said: str
+) -> None:
+    found = only(compared(mark(), mark(**changes), "host"))
 
-    assert found.kind is Kind.ROLLED_BACK
-    assert "transaction 150 is another one" in found.detail
-
-
-def test_another_database_is_told() -> None:
-    found = only(compared(mark(), mark(store="00" * 16, n_commits=7), "host"))
-
-    assert found.kind is Kind.REPLACED
-    assert "150 transactions" in found.detail
-    assert "7 are in this one" in found.detail
+    assert found.kind is kind
+    assert re.search(said, found.detail)
 
 
 def test_a_mark_that_is_much_older_than_the_database_is_told() -> None:
@@ -78,17 +84,21 @@ def test_a_mark_that_says_nothing_is_told(why: str) -> None:
     assert why in found.detail
 
 
-def test_a_copied_machine_is_told() -> None:
-    assert only(compared(mark(), mark(), "clone")).kind is Kind.OTHER_HOST
-
-
 @pytest.mark.parametrize(
-    ("before", "now"), [("host", "host"), ("", "host"), ("host", ""), ("", "")]
+    ("before", "now", "kinds"),
+    [
+        ("host", "host", []),
+        ("host", "clone", [Kind.OTHER_HOST]),
+        ("", "host", []),
+        ("host", "", []),
+        ("", "", []),
+    ],
 )
-def test_the_same_machine_and_those_without_a_name_are_not_taken_for_others(
-    before: str, now: str
+def test_a_copied_machine_is_told_unless_one_of_them_has_no_name(
+    before: str, now: str, kinds: list[Kind]
 ) -> None:
-    assert compared(mark(host=before), mark(host=before), now) == []
+    found = compared(mark(host=before), mark(host=before), now)
+    assert [finding.kind for finding in found] == kinds
 
 
 def test_a_time_that_is_none_stops_nobody() -> None:
