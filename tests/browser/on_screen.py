@@ -1,7 +1,7 @@
 """What tests of several pages ask of a page."""
 
-import copy
 import re
+from collections.abc import Callable
 
 import pytest
 from playwright.async_api import Locator, Page, expect
@@ -38,11 +38,16 @@ async def log_in(page: Page, name: str, password: str = PASSWORD) -> None:
     await page.keyboard.press("Enter")
 
 
-async def freeze(page: Page, url: str) -> dict:
-    """Let the page receive one real answer of the service again and again."""
-    overview = await (await page.request.get(f"{url}api/v1/overview")).json()
+async def freeze(page: Page, url: str, is_wanted: Callable[[dict], bool] = bool) -> dict:
+    """Let the page receive one real answer of the service, as it is wanted, again and again.
+
+    What a test changes in it is received, too.
+    """
+    address = f"{url}api/v1/overview"
+    while not is_wanted(overview := await (await page.request.get(address)).json()):
+        await page.wait_for_timeout(500)
     await page.route("**/api/v1/overview", lambda route: route.fulfill(json=overview))
-    return copy.deepcopy(overview)
+    return overview
 
 
 async def number_with(reading: Locator, unit: str) -> float:

@@ -47,16 +47,19 @@ OWN_TABLES = re.compile(r"^\[(?:analysis|alarms)\]\n(?:[^\[\n].*\n|\n)*", re.MUL
 
 PASSWORD = "the river is high in may"  # noqa: S105 - of accounts that exist in tests alone
 
+RECORDED = "U1-20260101T000000.000Z-order1_shaft_x"
+"""Name of the one recording of the guarded plant."""
+
 TO_SET_UP = "to make the first account"
 """In what the service says before its address, where somebody must log in and nobody can."""
 
 
-class Plant:
-    """Unit U1 of a demo plant: its DAQ and the service that watches it."""
+class Plant(ExitStack):
+    """Unit U1 of a demo plant, its DAQ and service: processes that end when it is left."""
 
     def __init__(self, folder: Path, example: Path = DEMO) -> None:
+        super().__init__()
         self._folder, self._example = folder, example
-        self._processes = ExitStack()
         self._daq: subprocess.Popen[str] | None = None
         self._service: subprocess.Popen[str] | None = None
         self._daq_port = free_port()
@@ -111,14 +114,8 @@ class Plant:
         service = plant.service.model_copy(update={"data_folder": folder})
         return plant.model_copy(update={"service": service})
 
-    def __enter__(self) -> "Plant":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._processes.close()
-
     def _start(self, *arguments: str) -> "subprocess.Popen[str]":
-        log = self._processes.enter_context((self._folder / f"{arguments[0]}.log").open("a"))
+        log = self.enter_context((self._folder / f"{arguments[0]}.log").open("a"))
         process = subprocess.Popen(
             [*PADWATCH, *arguments],
             stdin=subprocess.PIPE,
@@ -127,7 +124,7 @@ class Plant:
             text=True,
             cwd=self._folder,
         )
-        self._processes.callback(stop, process)
+        self.callback(stop, process)
         return process
 
     def _plant_file(self) -> Path:

@@ -1,8 +1,6 @@
 """An alarm's evidence, from the running plant to the printed page."""
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from playwright.async_api import expect
@@ -15,27 +13,21 @@ LIMIT = "alarms.shaft_order1_um_pk = { alert = 1.0, deadband = 0.1 }\n"
 OIL = 'oil_temperature = "ujb_oil_temperature"\n'
 
 
-@pytest.fixture
-def alarmed_plant(new_plant, tmp_path: Path) -> Iterator[object]:
-    """A plant whose shaft moves further than it may."""
-    text = DEMO.read_text(encoding="utf-8").replace(OIL, OIL + LIMIT, 1)
+@pytest.mark.long
+async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
+    new_plant, page, complaints, tmp_path
+) -> None:
     example = tmp_path / "example.toml"
+    text = DEMO.read_text(encoding="utf-8").replace(OIL, OIL + LIMIT, 1)
     example.write_text(text, encoding="utf-8")
     new_plant._example = example
     new_plant.settings += CAPTURE
     new_plant.start_daq()
     new_plant.start_service()
-    return new_plant
-
-
-@pytest.mark.long
-async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
-    alarmed_plant, page, complaints
-) -> None:
-    await page.goto(f"{alarmed_plant.url}#/alarms")
+    await page.goto(f"{new_plant.url}#/alarms")
     row = page.locator(ROW)
     await expect(row).to_be_visible()
-    links = f"{alarmed_plant.url}api/v1/alarms/{ALARM}/evidence"
+    links = f"{new_plant.url}api/v1/alarms/{ALARM}/evidence"
     for _ in range(600):
         [listed] = (await (await page.request.get(links)).json())["occurrences"]
         if (listed["state"], listed["samples"]) == ("complete", "complete"):
@@ -53,7 +45,7 @@ async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
     printed = await report.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page\b(?!s)", printed)) == 1
 
-    await page.goto(f"{alarmed_plant.url}#/recordings")
+    await page.goto(f"{new_plant.url}#/recordings")
     recording = page.locator("[data-recording]").first
     await expect(recording).to_contain_text("UJB: Shaft vibration 1×, x")
     await recording.get_by_role("button", name="Check").press("Enter")
@@ -62,5 +54,5 @@ async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
     reported = page.locator(f"[data-report='{ALARM} 1']")
     await expect(reported).to_contain_text("kept")
     address = await reported.get_by_role("link", name="report").get_attribute("href")
-    assert (await page.request.get(f"{alarmed_plant.url.rstrip('/')}{address}")).ok
+    assert (await page.request.get(f"{new_plant.url.rstrip('/')}{address}")).ok
     assert complaints == []

@@ -18,7 +18,6 @@ from core.speed import SpeedSource
 STATIC = Path(__file__).parents[2] / "service" / "dashboard" / "static"
 SOURCE, FILM_WORDS = STATIC / "words.js", STATIC / "film_words.js"
 ALARM_WORDS = STATIC / "alarm_words.js"
-ONLY_THE_PAGE_KNOWS = {"service_not_reachable"}
 ENTRY = re.compile(r"^  (\w+): (.+),$", re.MULTILINE)
 WORDS_AND_SENTENCE = re.compile(r"\[\"[^\"]{2,25}\", \"[A-Z][^\"]+[.]\"\]")
 """A few words that fit a table's cell, and a sentence for the bearing page."""
@@ -32,7 +31,7 @@ def entries(table: str, source: Path = SOURCE) -> dict[str, str]:
 
 def test_every_reason_has_words_and_a_sentence_and_nothing_else_has() -> None:
     reasons = entries("REASONS")
-    assert reasons.keys() == {reason.value for reason in Reason} | ONLY_THE_PAGE_KNOWS
+    assert reasons.keys() == {reason.value for reason in Reason} | {"service_not_reachable"}
     assert [name for name, said in reasons.items() if not WORDS_AND_SENTENCE.fullmatch(said)] == []
 
 

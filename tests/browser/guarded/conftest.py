@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from real_plant import Plant
+from real_plant import RECORDED, Plant
 
 RECORDING = Path(__file__).parents[2] / "recordings" / "part_load"
 
@@ -28,21 +28,14 @@ def receiver_port() -> Iterator[int]:
         yield held.getsockname()[1]
 
 
-@pytest.fixture(scope="session")
-def recording() -> str:
-    """Name of the plant's one recording."""
-    return "U1-20260101T000000.000Z-order1_shaft_x"
-
-
 @pytest.fixture(scope="package")
 def plant(
     chromium: str,  # noqa: ARG001 - skip before start
     tmp_path_factory: pytest.TempPathFactory,
     receiver_port: int,
-    recording: str,
 ) -> Iterator[Plant]:
     folder = tmp_path_factory.mktemp("guarded")
-    shutil.copytree(RECORDING, folder / "var" / "demo" / "captures" / recording)
+    shutil.copytree(RECORDING, folder / "var" / "demo" / "captures" / RECORDED)
     with Plant(folder) as running:
         running.settings += RECEIVER.format(port=receiver_port)
         running.add_accounts()

@@ -4,9 +4,9 @@ import re
 
 from on_screen import NO_NUMBER, await_orbit
 from playwright.async_api import expect
+from real_plant import RECORDED
 
 LOST = re.compile("not connected|No samples come")
-ORBITS = "#/units/U1/bearings/UJB/orbits"
 
 
 async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, page) -> None:
@@ -30,12 +30,12 @@ async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, 
 
 
 async def test_a_recording_is_played_although_its_unit_is_not_connected(
-    plant, page, complaints, recording
+    plant, page, complaints
 ) -> None:
-    await page.goto(plant.url + ORBITS)
+    await page.goto(plant.url + "#/units/U1/bearings/UJB/orbits")
     await expect(page.locator(".player .sentence")).to_contain_text("No sample of this unit")
     await expect(page.locator("#orbit-source option")).to_have_count(2)
-    await page.locator("#orbit-source").select_option(recording)
+    await page.locator("#orbit-source").select_option(RECORDED)
     await await_orbit(page)
 
     await page.locator("#orbit-at").fill("50")
@@ -44,6 +44,6 @@ async def test_a_recording_is_played_although_its_unit_is_not_connected(
 
     await page.reload()  # the address names the recording
     await await_orbit(page)
-    await expect(page.locator("#orbit-source")).to_have_value(recording)
+    await expect(page.locator("#orbit-source")).to_have_value(RECORDED)
     await expect(page.locator(".player .facts")).to_contain_text("2026-01-01 00:00:0")
     assert complaints == []

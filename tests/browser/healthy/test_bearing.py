@@ -4,7 +4,7 @@ import json
 import re
 
 from on_screen import CHARTS, await_charts, tab_to
-from playwright.async_api import Page, Request, Route, expect
+from playwright.async_api import Page, Route, expect
 
 BEARING = "#/units/U1/bearings/UJB"
 SAYS = "wanted => (document.activeElement.value || document.activeElement.textContent) === wanted"
@@ -110,12 +110,7 @@ async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(plant, page, co
 async def test_a_closed_budget_asks_nothing(plant, browser) -> None:
     page = await browser.new_page()  # its clock is that of all pages of its context
     asked: list[str] = []
-
-    def note(request: Request) -> None:
-        if "/budgets/" in request.url:
-            asked.append(request.url)
-
-    page.on("request", note)
+    page.on("request", lambda request: "/budgets/" in request.url and asked.append(request.url))
     await page.clock.install()
     await open_bearing(page, plant.url)
     assert asked == []

@@ -5,7 +5,6 @@ import re
 from playwright.async_api import expect
 
 ROW = "[data-source=U1]"
-FILM = "#/units/U1/bearings/UJB/film"
 NOT_WATCHED = "This film is not watched: operating states need power_channel and rated_power_mw."
 
 
@@ -57,7 +56,7 @@ async def test_a_source_in_good_health_says_what_arrives_from_where(
 async def test_a_film_that_is_not_watched_says_why_in_place_of_every_chart(
     plant, page, complaints
 ) -> None:
-    await page.goto(plant.url + FILM)
+    await page.goto(plant.url + "#/units/U1/bearings/UJB/film")
     await expect(page.locator(".film-verdict .sentence")).to_have_text(NOT_WATCHED)
     for name in ("baseline-map", "against-eccentricity_ratio", "against-oil_temperature_c"):
         await expect(page.locator(f"[data-chart={name}] .sentence")).to_have_text(NOT_WATCHED)

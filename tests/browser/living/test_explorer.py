@@ -3,7 +3,6 @@
 import csv
 import re
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -44,7 +43,7 @@ async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, co
     assert complaints == []
 
 
-async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page, tmp_path) -> None:
+async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page) -> None:
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
 
@@ -71,10 +70,8 @@ async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page
 
     async with page.expect_download() as started:
         await page.get_by_role("link", name="U1 LJB as CSV").click()
-    path = tmp_path / "trend.csv"
-    await (await started.value).save_as(path)
-
-    rows = list(csv.DictReader(Path(path).read_text().splitlines()))
+    path = await (await started.value).path()
+    rows = list(csv.DictReader(path.read_text().splitlines()))
     assert len(rows) > 100
     assert "stiffness_xx_n_per_m_mean [N/m]" in rows[0]
 

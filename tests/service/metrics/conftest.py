@@ -38,12 +38,10 @@ PATIENCE_S = 240.0
 
 LOOK_EVERY_S = 0.2
 
-STRANGE = "text/plain;version=x.y;escaping=<b>, application/openmetrics-text;version=zzz"
-
 ACCEPTS = {
     "plain": "*/*",
     "openmetrics": "application/openmetrics-text;version=1.0.0,text/plain;version=0.0.4;q=0.5",
-    "strange": STRANGE,
+    "strange": "text/plain;version=x.y;escaping=<b>, application/openmetrics-text;version=zzz",
 }
 
 RECEIVER = """

@@ -17,8 +17,9 @@ from service.replica.metrics import unit_metrics as replica_unit_metrics
 from service.stream.consumer_metrics import consumer_metrics
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
-DASHBOARD = DEPLOY / "grafana" / "padwatch.json"
-RULES = DEPLOY / "prometheus" / "padwatch-rules.yml"
+DASHBOARD = json.loads((DEPLOY / "grafana" / "padwatch.json").read_text("utf-8"))
+GROUPS = yaml.safe_load((DEPLOY / "prometheus" / "padwatch-rules.yml").read_text("utf-8"))
+RULES = [rule for group in GROUPS["groups"] for rule in group["rules"]]
 
 TARGET = {"job", "instance"}
 """Labels that Prometheus itself puts on everything it has asked for."""
@@ -107,24 +108,9 @@ def exposed(told: Any) -> Exposed:
     return found
 
 
-@pytest.fixture(scope="module")
-def dashboard() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(DASHBOARD.read_text(encoding="utf-8"))
-    return found
-
-
-@pytest.fixture(scope="module")
-def rules() -> list[dict[str, Any]]:
-    document = yaml.safe_load(RULES.read_text(encoding="utf-8"))
-    assert set(document) == {"groups"}
-    return [rule for group in document["groups"] for rule in group["rules"]]
-
-
-def test_the_dashboard_asks_only_for_what_is_told(
-    exposed: Exposed, dashboard: dict[str, Any]
-) -> None:
+def test_the_dashboard_asks_only_for_what_is_told(exposed: Exposed) -> None:
     asked = set()
-    for panel in dashboard["panels"]:
+    for panel in DASHBOARD["panels"]:
         for target in panel.get("targets", ()):
             names, labels = check(target["expr"], exposed)
             asked |= names
@@ -134,22 +120,20 @@ def test_the_dashboard_asks_only_for_what_is_told(
     assert len(own) > 30
 
 
-def test_choices_of_the_dashboard_are_labels_that_are_told(
-    exposed: Exposed, dashboard: dict[str, Any]
-) -> None:
-    choices = {choice["name"]: choice for choice in dashboard["templating"]["list"]}
+def test_choices_of_the_dashboard_are_labels_that_are_told(exposed: Exposed) -> None:
+    choices = {choice["name"]: choice for choice in DASHBOARD["templating"]["list"]}
     for name, choice in choices.items():
         if choice["type"] == "query":
             found = re.fullmatch(r"label_values\((.+), (\w+)\)", choice["definition"])
             assert found is not None, name
             _, labels = check(found[1], exposed)
             assert found[2] in labels
-    used = set(re.findall(r"\$\{?(\w+)", json.dumps(dashboard["panels"])))
+    used = set(re.findall(r"\$\{?(\w+)", json.dumps(DASHBOARD["panels"])))
     assert used - {"__rate_interval"} == set(choices)
 
 
-def test_the_dashboard_fits_together(dashboard: dict[str, Any]) -> None:
-    panels = dashboard["panels"]
+def test_the_dashboard_fits_together() -> None:
+    panels = DASHBOARD["panels"]
 
     assert len({panel["id"] for panel in panels}) == len(panels)
     taken: set[tuple[int, int]] = set()
@@ -163,11 +147,10 @@ def test_the_dashboard_fits_together(dashboard: dict[str, Any]) -> None:
         assert panel["type"] == "row" or panel["description"].endswith(".")
 
 
-def test_alert_rules_ask_only_for_what_is_told(
-    exposed: Exposed, rules: list[dict[str, Any]]
-) -> None:
-    assert len({rule["alert"] for rule in rules}) == len(rules)
-    for rule in rules:
+def test_alert_rules_ask_only_for_what_is_told(exposed: Exposed) -> None:
+    assert set(GROUPS) == {"groups"}
+    assert len({rule["alert"] for rule in RULES}) == len(RULES)
+    for rule in RULES:
         _, labels = check(rule["expr"], exposed)
         assert set(rule) <= {"alert", "expr", "for", "labels", "annotations"}
         assert re.fullmatch(r"Padwatch[A-Za-z]+", rule["alert"])
@@ -178,8 +161,8 @@ def test_alert_rules_ask_only_for_what_is_told(
         assert set(re.findall(r"\$labels\.(\w+)", words)) <= labels, rule["alert"]
 
 
-def test_a_link_without_results_is_an_alert(exposed: Exposed, rules: list[dict[str, Any]]) -> None:
-    [silent] = [rule for rule in rules if rule["alert"] == "PadwatchSilentHealthy"]
+def test_a_link_without_results_is_an_alert(exposed: Exposed) -> None:
+    [silent] = [rule for rule in RULES if rule["alert"] == "PadwatchSilentHealthy"]
 
     names, _ = check(silent["expr"], exposed)
 

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -111,15 +112,10 @@ async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) 
 
 async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clock: Any) -> None:
     """As that of a CAN bus does; it says nothing of the task that reads the source."""
-    heard: list[float] = []
-
-    class Heard(Unheard):
-        def beat(self, after_s: float = 0.0) -> None:
-            heard.append(after_s)
-
+    pulse = Mock(spec=Unheard)
     polls = PollClock(stepped_clock)
-    polls.listen(Heard())
+    polls.listen(pulse)
     assert await asyncio.to_thread(polls.monotonic_s) == stepped_clock.monotonic_s()
-    assert heard == []
+    pulse.beat.assert_not_called()
     polls.monotonic_s()
-    assert heard == [0.0]
+    pulse.beat.assert_called_once_with(0.0)

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from typing import Any
 
-import pytest
 from prometheus_client import Metric
 
 from core.alarms.operation import Shelve
@@ -86,8 +85,7 @@ def test_films_count_under_the_word_that_was_said_last() -> None:
     assert len(found[0].samples) == len(bearings) * len(Verdict)  # every word, from the start on
 
 
-@pytest.fixture
-def views() -> list[ReceiverView]:
+def test_recipients_of_one_mail_are_added_up_and_never_named() -> None:
     """Two recipients of one mail, and a webhook that is in the plant file no longer."""
     carrier: Any = None
 
@@ -101,10 +99,11 @@ def views() -> list[ReceiverView]:
         )
 
     gone = ReceiverView("old-hook", None, None, Backlog("old-hook", 9, 0, 9, None, None))
-    return [view("shift:a@plant.example", 2, 3, 1), view("shift:b@plant.example", 0, None, 4), gone]
-
-
-def test_recipients_of_one_mail_are_added_up_and_never_named(views: list[ReceiverView]) -> None:
+    views = [
+        view("shift:a@plant.example", 2, 3, 1),
+        view("shift:b@plant.example", 0, None, 4),
+        gone,
+    ]
     found = list(delivery_metrics(views, NOW_NS))
 
     assert of(found, "delivery_waiting_messages") == {("shift",): 2.0}
@@ -112,10 +111,3 @@ def test_recipients_of_one_mail_are_added_up_and_never_named(views: list[Receive
     assert of(found, "delivery_failed_attempts") == {("shift",): 2.0}
     assert of(found, "delivery_wait_seconds") == {("shift",): 3 * 3600.0}
     assert "@" not in str(found)
-
-
-def test_of_an_outbox_that_cannot_be_read_no_zero_is_told() -> None:
-    found = list(delivery_metrics(None, NOW_NS))
-
-    assert [sample.value for family in found for sample in family.samples] == [0.0]
-    assert found[0].name == "padwatch_outbox_readable"

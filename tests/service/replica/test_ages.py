@@ -3,12 +3,11 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.clock import Clock
 from core.account import SampleAccount
 from core.assessment import Assessment
 from core.blocks import SampleBlock
@@ -25,16 +24,9 @@ BEARING = UNIT.bearing[0].id
 BLOCK = SampleBlock(UNIT.id, 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,), {})
 
 
-class Stepped(Clock, Protocol):
-    """A clock that goes on when it is told."""
-
-    def step(self, duration_s: float) -> None:
-        """Let time pass."""
-
-
 @pytest.mark.parametrize(("behind_s", "is_current"), [(0.0, True), (29.0, True), (31.0, False)])
 def test_what_has_waited_for_the_analysis_is_as_old_in_a_replica(
-    stepped_clock: Clock,
+    stepped_clock: Any,
     assessment: Callable[..., Assessment],
     behind_s: float,
     is_current: bool,
@@ -59,7 +51,7 @@ def test_what_has_waited_for_the_analysis_is_as_old_in_a_replica(
 
 
 @pytest.fixture
-def replica(stepped_clock: Clock) -> ReplicaLive:
+def replica(stepped_clock: Any) -> ReplicaLive:
     """One that has been told once of a unit whose samples arrive."""
     made = ReplicaLive([UNIT.id], stepped_clock, STALE_AFTER_S)
     made.hear(UNIT.id, "one", 1, signs(0.0, stepped_clock.monotonic_s()))
@@ -75,7 +67,7 @@ def signs(data_age_s: float, said_s: float | None) -> UnitSigns:
 
 @pytest.mark.parametrize("held_up_s", [0.0, 4.0, 40.0])
 def test_a_report_that_the_database_has_kept_back_makes_nothing_younger(
-    stepped_clock: Stepped, replica: ReplicaLive, held_up_s: float
+    stepped_clock: Any, replica: ReplicaLive, held_up_s: float
 ) -> None:
     stepped_clock.step(1.0)
     said_s = stepped_clock.monotonic_s()
@@ -89,7 +81,7 @@ def test_a_report_that_the_database_has_kept_back_makes_nothing_younger(
 
 
 def test_another_process_is_believed_from_its_second_report_on(
-    stepped_clock: Stepped, replica: ReplicaLive
+    stepped_clock: Any, replica: ReplicaLive
 ) -> None:
     said_s = stepped_clock.monotonic_s()
     stepped_clock.step(3.0)  # kept back, of which nobody can know yet

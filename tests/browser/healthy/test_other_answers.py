@@ -1,0 +1,85 @@
+"""Pages over other answers than a healthy unit gives: none at all, and those of twenty units."""
+
+import copy
+from typing import Any
+
+from on_screen import A_NUMBER, CHARTS, NO_NUMBER, assert_fits, await_older
+from playwright.async_api import Route, expect
+
+BEARING = "#/units/U1/bearings/LJB"
+STIFFNESS = "[data-reading=stiffness_xx_n_per_m] .number"
+N_UNITS = 20
+LOST = 7
+SIZE = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+
+
+async def test_a_service_out_of_reach_comes_back_without_a_reload(plant, page) -> None:
+    await page.goto(plant.url + BEARING)
+    await expect(page.locator(STIFFNESS)).to_have_text(A_NUMBER)
+    await page.evaluate("window.neverReloaded = true")
+    await page.context.set_offline(True)
+    try:
+        await expect(page.locator("#failure")).to_contain_text("Service not reachable")
+        await await_older(page, 2)  # counted here alone
+        said = page.locator("#failure-age")
+        await expect(said).to_contain_text("No number is shown")
+        assert await page.evaluate(NO_NUMBER)
+        await expect(page.locator(".state .mark")).to_have_text("Bad: service not reachable")
+        await page.goto(plant.url + "#/alarms")
+        await expect(page.locator("#alarms")).to_contain_text("Alarms unknown")
+    finally:
+        await page.context.set_offline(False)
+
+    await expect(page.locator("#banner")).to_be_hidden()
+    await expect(page.locator("#alarms")).to_contain_text("No alarms")
+    await page.goto(plant.url + BEARING)
+    await expect(page.locator(STIFFNESS)).to_have_text(A_NUMBER)
+    for name in CHARTS:
+        caption = page.locator(f"[data-chart={name}] figcaption")
+        await expect(caption).to_be_visible()
+        await expect(caption.locator(".mark")).to_be_hidden()
+    assert await page.evaluate("window.neverReloaded")
+
+
+async def test_a_list_of_alarms_says_how_old_it_is(plant, page) -> None:
+    await page.goto(plant.url + "#/alarms")
+    await expect(page.locator("#alarms")).to_contain_text("No alarms")
+    await page.route("**/api/v1/**", lambda route: route.abort())
+    mark = page.locator(".alarms-head .mark")
+    await expect(mark).to_contain_text("what has happened since is not")
+
+
+def unit_of(unit: dict[str, Any], number: int) -> dict[str, Any]:
+    another = copy.deepcopy(unit) | {"id": f"U{number}", "name": f"Unit {number}"}
+    if number == LOST:
+        another["source"]["state"] = "not_connected"
+    return another
+
+
+async def twenty_of_one(route: Route) -> None:
+    """The overview of a plant of one unit, with that unit twenty times."""
+    asked = {**route.request.headers, "if-none-match": '"none"'}
+    answer = await route.fetch(headers=asked)
+    overview = await answer.json()
+    unit = overview["units"][0]
+    overview["units"] = [unit_of(unit, number) for number in range(1, N_UNITS + 1)]
+    await route.fulfill(json=overview)
+
+
+async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(plant, page) -> None:
+    await page.route("**/api/v1/overview", twenty_of_one)
+    await page.goto(plant.url)
+    await expect(page.locator(".unit-tile")).to_have_count(N_UNITS)
+    stiffness = page.locator("[data-unit=U20] [data-bearing=UJB] .number").first
+    await expect(stiffness).not_to_have_text("—")
+    width, height = await page.evaluate(SIZE)
+    assert (width, height) == (1280, 800)
+    lost = page.locator(f"[data-unit=U{LOST}] .tile-head .mark").filter(visible=True)
+    await expect(lost).to_have_text("Not connected")
+    await expect(lost).to_have_attribute("data-look", "bad")
+    well = page.locator("[data-unit=U8] .tile-head .mark").filter(visible=True)
+    await expect(well).to_have_count(0)
+    await page.set_viewport_size({"width": 360, "height": 780})
+    await assert_fits(page)
+    await page.get_by_role("link", name="Unit 8").click()
+    await expect(page.locator("h1")).to_contain_text("Unit 8")
