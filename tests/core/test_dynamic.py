@@ -98,12 +98,6 @@ def test_probe_noise_that_is_taken_off_leaves_no_bias(
     np.testing.assert_allclose(corrected, STIFFNESS, atol=0.003 * STIFFNESS[0, 0])
 
 
-def test_the_estimated_floor_is_that_of_the_probes(recording: Recording) -> None:
-    result = found(recording(probe_um=PROBE_UM, n_segments=100), DynamicSettings())
-
-    np.testing.assert_allclose(result.probe_noise_um2_per_hz, 0.05, rtol=0.1)
-
-
 def test_the_floor_of_few_segments_is_not_low(recording: Recording) -> None:
     few = (recording(seed, probe_um=PROBE_UM, n_segments=6) for seed in range(20))
 

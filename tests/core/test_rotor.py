@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core.film import Film
-from core.rotor import bearing_response, force_map, forward_force, receptance, rotor_matrices
+from core.rotor import bearing_response, force_map, forward_force, rotor_matrices
 from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
 
 PARAMETERS = RotorParameters()
@@ -48,14 +48,6 @@ def test_film_and_bracket_are_related_whatever_excites_the_rotor(
         film_force = (film.stiffness_n_per_m + 1j * omega * film.damping_n_s_per_m) @ shaft
         bracket_force = (bracket.stiffness_n_per_m - bracket.mass_kg * omega**2) * bearing
         assert bracket_force == pytest.approx(film_force, rel=1e-11)
-
-
-def test_a_static_force_is_carried_by_the_springs_alone() -> None:
-    matrices = rotor_matrices(PARAMETERS, FILMS, 92.3)
-
-    assert receptance(matrices, 0.0).real @ matrices.stiffness == pytest.approx(
-        np.eye(10), abs=1e-12
-    )
 
 
 def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_and_the_right_way() -> None:

@@ -7,7 +7,6 @@ from scipy import signal
 from core.arrays import FloatArray
 from core.blocks import SampleBlock
 from core.cross_spectrum import CrossSpectrum, average
-from core.lines import bin_phasors, tapered
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.quality import GOOD, Reading
 from core.segments import SegmentTransform
@@ -48,17 +47,6 @@ def assert_same(ours: CrossSpectrum, samples: FloatArray, tolerance: float) -> N
     assert np.max(np.abs(ours.matrix - matrix) / scale) < tolerance
     own = np.diagonal(ours.power, axis1=1, axis2=2)
     np.testing.assert_allclose(own, power, rtol=tolerance)
-
-
-def test_averaged_segments_are_welch_and_csd_to_rounding(samples: FloatArray) -> None:
-    n_lines = int(SETTINGS.max_frequency_hz * 8192 / RATE_HZ)
-    starts = range(0, N_SAMPLES - 8191, SETTINGS.hop_samples)
-    phasors = np.array([bin_phasors(tapered(samples[:, s : s + 8192]), n_lines) for s in starts])
-    frequency_hz = RATE_HZ / 8192 * np.arange(1, n_lines + 1)
-
-    ours = average(frequency_hz, phasors, np.ones((len(starts), 4), dtype=bool))
-
-    assert_same(ours, samples, 1e-9)
 
 
 def test_samples_in_single_precision_cost_no_more_than_their_own_rounding(

@@ -37,15 +37,6 @@ def test_a_channel_that_stopped_moving_gives_no_number(
     assert readings["order1_k_eff_yy_n_per_m"].value == pytest.approx(1.18e9 / 3, rel=5e-3)
 
 
-def test_a_channel_that_dies_within_a_segment_is_noticed_in_that_segment(
-    in_counts: Unit, results: Results, signals
-) -> None:
-    rows = signals(14.0)
-    rows[2, 7000:] = 0.0
-    readings = results(rows, in_counts)[-1].readings
-    assert readings["order1_bearing_x_um_pk"].quality == bad(Reason.DEAD)
-
-
 def test_nothing_need_move_while_the_machine_stands(in_counts: Unit, results: Results) -> None:
     readings = results(np.full((4, 9000), 2000.0), in_counts, speed_rpm=0.0)[-1].readings
     assert readings["gap_x_um"].value == 2000.0

@@ -99,11 +99,6 @@ def test_what_returns_within_the_window_is_fleeting() -> None:
     assert figures(events).n_fleeting == 1
 
 
-def test_a_span_without_length_has_no_rates() -> None:
-    with pytest.raises(ValueError, match="must be after"):
-        figures([], 0.0)
-
-
 def test_what_is_active_for_more_than_a_day_is_stale_unless_hidden() -> None:
     def alarm(subject: str, **other: object) -> Alarm:
         identity = AlarmIdentity("U1", subject, AlarmKind.SHAFT_X)
@@ -121,7 +116,9 @@ def test_what_is_active_for_more_than_a_day_is_stale_unless_hidden() -> None:
     assert [each.identity.subject for each in found] == ["oldest", "old"]
 
 
-def test_what_counts_as_chattering_makes_sense() -> None:
+def test_spans_without_length_and_chattering_without_sense_are_refused() -> None:
+    with pytest.raises(ValueError, match="must be after"):
+        figures([], 0.0)
     for wrong in ((1, 60), (3, 0)):
         with pytest.raises(ValueError, match="must be"):
             ChatterRule(*wrong)

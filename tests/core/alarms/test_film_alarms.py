@@ -24,16 +24,13 @@ def changes(alarms: UnitAlarms, conditions: Mapping[str, Condition], now_ns: int
     return [event.change.value for told in news for event in told.events]
 
 
-def test_each_bearing_has_an_alarm_for_its_film_in_each_direction(alarms: UnitAlarms) -> None:
+def test_films_have_an_alarm_in_each_direction_if_asked_for(alarms: UnitAlarms, unit: Unit) -> None:
     ids = [alarm.identity.id for alarm in alarms.alarms]
     assert [id_ for id_ in ids if "stiffness" in id_] == [FILM_X, "U1:UJB:stiffness_y"]
-
-
-def test_no_film_is_watched_unless_asked_for(unit: Unit) -> None:
-    alarms = UnitAlarms(unit, UnitRules())
-    assert not [a for a in alarms.alarms if "stiffness" in a.identity.id]
+    unwatched = UnitAlarms(unit, UnitRules())
+    assert not [a for a in unwatched.alarms if "stiffness" in a.identity.id]
     with pytest.raises(KeyError):
-        alarms.films({FILM_X: LOST}, 0)
+        unwatched.films({FILM_X: LOST}, 0)
 
 
 def test_a_loss_of_stiffness_is_announced_at_once_with_its_size(alarms: UnitAlarms) -> None:

@@ -56,19 +56,6 @@ def test_an_acknowledgement_of_the_last_occurrence_does_not_swallow_the_next(lif
     assert alarm.ask(Acknowledge("B. Name", 2)) == []
 
 
-def test_what_gets_worse_must_be_seen_again_and_what_gets_better_need_not(life: Make) -> None:
-    alarm = life()
-    alarm.find(ALERT, 0)
-    alarm.ask(Acknowledge("A. Name", 1))
-
-    assert alarm.find(DANGER, 1) == ["escalated"]
-    assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
-    alarm.ask(Acknowledge("A. Name", 2))
-    assert alarm.find(ALERT, 2) == ["eased"]
-    assert alarm.alarm.state is AlarmState.ACKNOWLEDGED
-    assert alarm.alarm.level is AlarmLevel.ALERT
-
-
 def test_a_lost_probe_keeps_an_alarm_active_and_says_that_it_is_not_known(life: Make) -> None:
     alarm = life()
     alarm.find(DANGER, 0)
@@ -81,17 +68,6 @@ def test_a_lost_probe_keeps_an_alarm_active_and_says_that_it_is_not_known(life: 
     assert (last_known.level, last_known.value, last_known.limit) == (2, 210.0, 200.0)
     assert alarm.events[-1].reason == "sensor_failure"
     assert alarm.find(WITHIN, 10**12 + 1) == ["condition_known", "returned"]
-
-
-def test_a_short_excursion_raises_nothing_and_a_short_return_ends_nothing(life: Make) -> None:
-    alarm = life(on=10, off=20)
-
-    assert alarm.find(ALERT, 0) == alarm.find(ALERT, 9) == alarm.find(WITHIN, 10) == []
-    assert alarm.find(ALERT, 11) == []
-    assert alarm.find(ALERT, 21) == ["raised"]
-    assert alarm.find(WITHIN, 22) == alarm.find(WITHIN, 41) == alarm.find(ALERT, 42) == []
-    assert alarm.find(WITHIN, 43) == []
-    assert alarm.find(WITHIN, 63) == ["returned"]
 
 
 def test_a_clock_that_is_put_back_brings_no_delay_forward(life: Make) -> None:

@@ -146,15 +146,6 @@ def test_an_unseen_attitude_is_not_compared(healthy: StiffnessHistory) -> None:
     assert np.mean(found.place >= 0) < 0.01
 
 
-def test_readings_stray_further_where_position_counts_for_more(healthy: StiffnessHistory) -> None:
-    extra = np.random.default_rng(6).normal(0.0, 1.0, len(healthy) // 40 + 1).repeat(40)
-    excess = np.maximum(healthy.eccentricity_ratio - 0.4, 0.0) * 0.6 * extra[: len(healthy)]
-    cells = learned(with_ln_k(healthy, healthy.ln_k + excess)).table.cells
-    far = [c.scatter for c in cells if c.support is Support.OWN and c.cell[0] >= 9]
-    near = [c.scatter for c in cells if c.support is Support.OWN and c.cell[0] <= 7]
-    assert np.median(far) > 1.8 * np.median(near)
-
-
 def test_less_is_known_of_the_far_side_of_the_outermost_cell(healthy: StiffnessHistory) -> None:
     baseline = learned(healthy)
     known = [cell for cell in baseline.table.cells if cell.support is Support.OWN]

@@ -10,14 +10,6 @@ from core.uncertainty import BearingAccuracy
 from core.vector_budget import COHERENCE, SPREAD
 
 
-def test_the_spread_of_the_polls_is_the_random_part(rack) -> None:
-    scatter = 0.05
-    newest = watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=scatter))[-1]
-
-    k_eff = newest.readings["order1_k_eff_xx_n_per_m"]
-    assert k_eff.u_random == pytest.approx(k_eff.value * scatter * np.sqrt(2.0 / 60.0), rel=0.25)
-
-
 def test_the_stated_random_part_is_true(rack) -> None:
     results = [
         watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.05, seed=seed))[-1].readings
