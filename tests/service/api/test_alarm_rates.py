@@ -66,15 +66,6 @@ async def test_a_link_that_comes_and_goes_is_counted_and_called_chattering(servi
     assert (listed["id"], listed["is_chattering"]) == (LINK, True)
 
 
-async def test_a_link_that_is_lost_once_an_hour_does_not_chatter(service: Any) -> None:
-    await lose_link(service, 4, every_s=3600.0)
-
-    found = await service.json(RATES)
-    [listed] = (await service.json("/api/v1/alarms"))["alarms"]
-
-    assert (found["all"]["chattering"], listed["is_chattering"]) == ({}, False)
-
-
 async def test_what_stands_for_more_than_a_day_is_stale(service: Any) -> None:
     service.alarms.link("U1", False, "no route to host")
     service.clock.step(11 * SECOND)
@@ -88,9 +79,13 @@ async def test_what_stands_for_more_than_a_day_is_stale(service: Any) -> None:
     assert (await service.json(RATES, unit="U2"))["stale"] == []
 
 
-async def test_rates_of_a_span_count_what_happened_in_it(service: Any) -> None:
-    await lose_link(service, 3, every_s=3600.0)  # from midnight, 2026-01-01
+async def test_a_link_that_is_lost_once_an_hour_is_counted_by_span_and_does_not_chatter(
+    service: Any,
+) -> None:
+    await lose_link(service, 4, every_s=3600.0)  # from midnight, 2026-01-01
 
+    whole = (await service.json(RATES))["all"]
+    [listed] = (await service.json("/api/v1/alarms"))["alarms"]
     span = {"start": "2026-01-01T01:00:00Z", "end": "2026-01-01T02:00:00Z"}
     found = await service.json(RATES, unit="U1", **span)
 
@@ -100,6 +95,7 @@ async def test_rates_of_a_span_count_what_happened_in_it(service: Any) -> None:
     )
     assert found["all"]["n_alarms"] == 1
     assert found["all"]["per_day"] == pytest.approx(24.0)
+    assert (whole["chattering"], listed["is_chattering"]) == ({}, False)
     assert set(found["units"]) == {"U1"}
 
 
@@ -134,11 +130,6 @@ async def test_a_comment_has_words_on_one_line(read_only: Any, as_problem: AsPro
 
         assert response.status_code == 422, text
         assert "text" in as_problem(response)["errors"][0]["parameter"]
-
-
-async def test_an_alarm_that_is_not_there_is_not_found(read_only: Any) -> None:
-    for id_ in ("U1:nothing:link_lost", "U9:link:link_lost", "plant:store:results_lost", "x"):
-        assert id_ in (await read_only.problem(f"/api/v1/alarms/{id_}", 404))["detail"]
 
 
 @pytest.fixture

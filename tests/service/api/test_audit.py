@@ -16,26 +16,6 @@ async def entries(service: Any, **wanted: object) -> list[dict[str, Any]]:
     return found
 
 
-async def test_a_comment_on_an_alarm_is_told_with_its_peer(service: Any) -> None:
-    service.alarms.link("U1", False, "no route")
-    service.clock.s += 60.0
-    service.clock.ns += 60_000_000_000
-    service.alarms.tick()
-    [alarm] = [a.identity.id for a in service.alarms.alarms if a.level is not None]
-    answer = await service.client.post(
-        f"/api/v1/alarms/{alarm}/comment", json={"actor": "A. Name", "text": "<b>=1+1</b>"}
-    )
-    [told] = await entries(service)
-
-    assert answer.status_code == 200, answer.text
-    assert (told["actor"], told["source"], told["peer"]) == ("A. Name", "api", "127.0.0.1")
-    assert (told["action"], told["object"]) == ("alarm.commented", alarm)
-    assert told["reason"] == "<b>=1+1</b>"
-    assert told["before"]["state"] == told["after"]["state"]
-    assert told["previous_hash"] == "0" * 64
-    assert len(told["hash"]) == 64
-
-
 async def test_refused_actions_are_told_with_the_reason(service: Any) -> None:
     wrong = await service.client.post(UNKNOWN, json={"actor": ""})
     foreign = await service.client.post(

@@ -21,31 +21,22 @@ async def test_a_service_that_works_is_alive_and_ready(read_only: Any) -> None:
     }
 
 
-async def test_a_disk_that_does_not_take_results_makes_it_unready_but_not_dead(
-    running: Any,
-) -> None:
-    running.live.store_error = "disk I/O error"
-    running.live.n_unstored = 3
-
-    response = await running.get("/readyz")
-
-    assert response.status_code == 503
-    assert response.json()["status"] == "not ready"
-    assert response.json()["checks"]["store"] == "disk I/O error"
-    assert (await running.get("/livez")).status_code == 200
-    overview = await running.json("/api/v1/overview")
-    assert overview["store"] == {"error": "disk I/O error", "n_unstored": 3}
-
-
-async def test_a_loop_that_is_stuck_or_dead_is_named_and_makes_the_service_unready(
+async def test_a_full_disk_and_a_dead_loop_are_named_and_make_it_unready_but_not_dead(
     running: Any,
 ) -> None:
     running.live.set_link("U1", LinkState.NOT_CONNECTED, "timed out")
     assert (await running.json("/readyz"))["status"] == "ok"  # a DAQ that is away is no reason
+    running.live.store_error, running.live.n_unstored = "disk I/O error", 3
+    full = await running.get("/readyz")
+    overview = await running.json("/api/v1/overview")
+    assert (await running.get("/livez")).status_code == 200
+    running.live.store_error = None
     running.loops |= {"record": None, "alarms": "has ended"}
-
     response = await running.get("/readyz")
 
+    assert (full.status_code, full.json()["status"]) == (503, "not ready")
+    assert full.json()["checks"]["store"] == "disk I/O error"
+    assert overview["store"] == {"error": "disk I/O error", "n_unstored": 3}
     assert response.status_code == 503
     assert response.json()["status"] == "not ready"
     assert response.json()["checks"]["loop record"] == "alive"

@@ -54,6 +54,8 @@ async def test_an_unknown_alarm_is_not_found(read_only: Any, as_problem: AsProbl
 
         assert answer.status_code == 404
         assert as_problem(answer)["title"] == "Unknown alarm"
+    for alarm in ("U1:nothing:link_lost", "U9:link:link_lost", "plant:store:results_lost", "x"):
+        assert alarm in (await read_only.problem(f"{ALARMS}/{alarm}", 404))["detail"]
 
 
 async def test_no_page_of_another_site_acknowledges_but_the_dashboard_itself_does(
@@ -140,5 +142,6 @@ async def test_what_cannot_be_stored_is_said_and_kept(
     with sqlite3.connect(service.store._path) as connection:
         connection.execute("DROP TRIGGER no")
     connection.close()
+    monkeypatch.setattr(in_process, "STORED_WITHIN_S", 30.0)
     assert (await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})).status_code == 200
     assert service.store.alarms()[0].is_acknowledged

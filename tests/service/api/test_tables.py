@@ -50,6 +50,11 @@ async def test_the_audit_trail_is_the_same_as_csv(service: Any) -> None:
 
     [row] = await rows_of(service, "/api/v1/audit")
 
+    assert (entry["actor"], entry["source"], entry["peer"]) == ("A. Name", "api", "127.0.0.1")
+    assert (entry["action"], entry["object"]) == ("alarm.commented", alarm)
+    assert entry["reason"] == "=1+1"
+    assert entry["before"]["state"] == entry["after"]["state"]
+    assert (entry["previous_hash"], len(entry["hash"])) == ("0" * 64, 64)
     assert (row["number"], row["object"]) == ("1", alarm)
     for name in ("actor", "action", "peer", "hash", "previous_hash"):
         assert row[name] == entry[name]
