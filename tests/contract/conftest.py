@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 from rigs.can import CanFdRig, CanRig
 from rigs.modbus import ModbusRig, ModbusRtuRig
-from rigs.recording import RecordingRig, UnitsRecordingRig
+from rigs.recording import RecordingRig, SimulatedRig, UnitsRecordingRig
 from rigs.registers import REGISTER_RIGS
-from rigs.simulated import SimulatedRig
 
 WIRED = [CanRig, CanFdRig, ModbusRig, ModbusRtuRig, *REGISTER_RIGS]
 ALL = [*WIRED, SimulatedRig, RecordingRig, UnitsRecordingRig]

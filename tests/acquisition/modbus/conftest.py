@@ -141,8 +141,7 @@ def queues(counting_feed, counts_calibration, stepped_clock) -> Callable:
 class Bench:
     """A device with some of everything that can be read."""
 
-    step_s = 1.0
-    ended = drained = False
+    drained = False
 
     def __init__(self) -> None:
         self.memory = RegisterMemory(100, 300)
@@ -160,15 +159,6 @@ class Bench:
 
     def read_fifo(self, address):
         return self.queues.get(address)
-
-    def produce(self, n_steps):
-        pass
-
-    def fault_names(self):
-        return []
-
-    def spoil(self, fault, count):
-        pass
 
 
 @pytest.fixture

@@ -28,20 +28,16 @@ def test_gaps_are_exact_however_often_the_counter_has_wrapped(first: int, steps)
         assert samples.place(index % WRAP, now_s) == Place(7, index)
 
 
-def test_a_device_that_counts_anew_begins_an_epoch() -> None:
+@pytest.mark.parametrize(
+    ("first", "passed_s", "then"), [(30_000, 0.1, 0), (1000, 10 * WRAP / RATE_HZ, 21_000)]
+)
+def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, then) -> None:
+    """At once, or after a long absence."""
     samples = counted()
-    samples.place(30_000, 0.0)
+    samples.place(first, 0.0)
 
-    assert samples.place(0, 0.1) == Place(8, 0)
-    assert samples.place(1, 0.1) == Place(8, 1)
-
-
-def test_after_a_long_absence_a_counter_that_time_does_not_explain_is_a_new_epoch() -> None:
-    samples = counted()
-    samples.place(1000, 0.0)
-    passed_s = 10 * WRAP / RATE_HZ
-
-    assert samples.place(1000 + 20_000, passed_s) == Place(8, 21_000)
+    assert samples.place(then, passed_s) == Place(8, then)
+    assert samples.place(then + 1, passed_s) == Place(8, then + 1)
 
 
 @pytest.mark.parametrize(("passed_s", "is_ambiguous"), [(1.0, False), (55.0, True), (1e6, True)])

@@ -25,14 +25,14 @@ def lose_the_link_after(p, n_answers: int) -> None:
     p.device.read_fifo = answer_or_cut
 
 
-async def until_lost(stream) -> list[SampleBlock]:
+async def until_lost(stream, said: str | None = None) -> list[SampleBlock]:
     blocks = []
 
     async def take() -> None:
         async for block in stream:
             blocks.append(block)
 
-    with pytest.raises(LinkError):
+    with pytest.raises(LinkError, match=said):
         await take()
     return blocks
 
@@ -72,7 +72,7 @@ async def test_what_was_read_over_too_slow_a_link_is_kept_too(queues) -> None:
             return answer(address)
 
         p.device.read_fifo = slowly
-        before = await until_lost(stream)
+        before = await until_lost(stream, "too slow for 600 samples per second")
     assert len(before) > 1
     assert gaps([*first, *before]) == []
     assert_right([*first, *before])

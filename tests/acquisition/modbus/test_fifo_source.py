@@ -156,19 +156,6 @@ async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
             assert (await anext(stream)).first_index == STEP
 
 
-async def test_a_link_slower_than_the_device_is_told(queues, monkeypatch) -> None:
-    async with queues(depth_samples=100_000) as p, p.source.connect() as stream:
-        answer = p.device.read_fifo
-
-        def slowly(address: int):
-            p.run(1)
-            return answer(address)
-
-        monkeypatch.setattr(p.device, "read_fifo", slowly)
-        with pytest.raises(LinkError, match="too slow for 600 samples per second"):
-            await up_to(stream, 10**9)
-
-
 @pytest.mark.parametrize(
     ("fault", "error", "said"),
     [

@@ -74,12 +74,9 @@ async def test_what_a_serial_port_raises_is_renamed(kind, hostile_line, monkeypa
     link.close()
 
 
-async def test_a_name_that_does_not_resolve_is_a_link_error_with_the_reason(link_to):
+async def test_a_name_that_does_not_resolve_or_cannot_exist_is_told_with_the_reason(link_to):
     with pytest.raises(LinkError, match=r"nowhere\.invalid:502: .*(?i:name|address)"):
         await link_to(502, host="nowhere.invalid", timeout_s=10.0).open()
-
-
-async def test_a_name_that_cannot_exist_is_a_config_error(link_to):
     with pytest.raises(ConfigError, match="label"):
         await link_to(502, host="a" * 64 + ".example").open()
 

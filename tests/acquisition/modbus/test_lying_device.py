@@ -11,24 +11,16 @@ from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.transport import LinkSettings, TcpTransport
 
 
-def sent(make):
-    """Lie: these bytes instead of the reply."""
-
-    async def lie(request, reply, writer):
-        writer.write(make(request, reply))
-
-    return lie
-
-
 @pytest.mark.parametrize(
     ("code", "error"),
     [(1, ConfigError), (2, ConfigError), (3, ConfigError)]
     + [(code, LinkError) for code in (0, 4, 5, 6, 10, 11, 0xEE)],
 )
 async def test_an_exception_reply_says_whether_trying_again_helps(code, error, hostile, source_at):
-    hostile.lie = sent(
-        lambda request, _: request[:4] + b"\0\3" + request[6:7] + bytes([0x83, code])
-    )
+    async def refuse(request, reply, writer):  # noqa: ARG001
+        writer.write(request[:4] + b"\0\3" + request[6:7] + bytes([0x83, code]))
+
+    hostile.lie = refuse
     with pytest.raises(error, match=f"exception {code} "):
         async with source_at(hostile.port).connect():
             pass

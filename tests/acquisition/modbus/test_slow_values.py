@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
+from rigs.registers import SlowFeed
 
 from acquisition.calibration import SlowCalibration, UnitCalibration
 from acquisition.clock import SystemClock
@@ -16,7 +17,6 @@ from acquisition.joined_source import JoinedSource, only_slow, without_slow
 from acquisition.modbus.polled_slow_values import PolledSlowValues
 from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.transport import TcpTransport
-from acquisition.raw import RawBlock
 from acquisition.registers.cells import Cell, NumberType
 from acquisition.registers.register_map import MapValue, RegisterMap
 from core.blocks import SampleBlock
@@ -25,18 +25,6 @@ from core.quality import GOOD, Level, Reading, Reason
 OIL = SlowCalibration("oil", 0.0, 100.0)
 POWER = SlowCalibration("power", 0.0, 1000.0)
 REGISTERS = RegisterMap(values=(MapValue(id="oil", cell=Cell(address=0, type=NumberType.FLOAT32)),))
-
-
-class Oil:
-    """A feed of one temperature."""
-
-    def __init__(self) -> None:
-        self.value, self._n = 45.0, 0
-
-    def advance(self, n_samples: int) -> RawBlock:
-        first, self._n = self._n, self._n + n_samples
-        counts = np.zeros((0, n_samples), dtype=np.int16)
-        return RawBlock(0, first, 0, 1.0, counts, (), (self.value,))
 
 
 class Waves:
@@ -74,7 +62,7 @@ class PollingClock:
 def plant() -> Callable:
     @asynccontextmanager
     async def build(clock=None, **settings):
-        feed = Oil()
+        feed = SlowFeed((45.0,))
         device = MapDevice(feed, REGISTERS, (), UnitCalibration("U1", 1.0, (), (OIL,)))
         server = ModbusTcpServer(device)
         async with server:
@@ -103,7 +91,7 @@ async def test_values_of_the_other_device_join_the_blocks_from_the_first_one_on(
         first = await anext(stream)
         found = []
         for value in (55.0, None):
-            feed.value = 500.0 if value is None else value
+            feed.slow = (500.0 if value is None else value,)
             device.produce(2)
             found.append(await until(stream, lambda oil, value=value: oil.value == value))
 
@@ -170,7 +158,7 @@ async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, steppe
         stepped_clock.step(6.0)
         lost = await until(stream, lambda oil: oil.value is None)
         await server.__aenter__()
-        feed.value = 46.0
+        feed.slow = (46.0,)
         device.produce(2)
         back = await until(stream, lambda oil: oil.value is not None)
 

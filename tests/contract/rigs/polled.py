@@ -32,11 +32,8 @@ class Waves:
 
 
 def map_of(**settings) -> RegisterMap:
-    wave = MapValue(
-        id="wave",
-        cell=Cell(address=10, type=NumberType.FLOAT32),
-        flags=(BAD_IF_SET,),
-    )
+    wave_cell = Cell(address=10, type=NumberType.FLOAT32)
+    wave = MapValue(id="wave", cell=wave_cell, flags=(BAD_IF_SET,))
     oil = MapValue(
         id="oil",
         cell=Cell(address=20, type=NumberType.INT16),

@@ -1,4 +1,4 @@
-"""A recording of a counting plant."""
+"""Sources on a clock that is stepped: a recording of a counting plant, and the simulated source."""
 
 import tempfile
 from dataclasses import replace
@@ -8,6 +8,7 @@ from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel,
 from acquisition.recording.reader import open_recording
 from acquisition.recording.source import RecordingSource
 from acquisition.recording.writer import RecordingWriter
+from acquisition.simulated.source import SimulatedSource
 from acquisition.source import SampleSource
 from core.machine import Measurand
 
@@ -44,6 +45,14 @@ class UnitsRecordingRig(RecordingRig):
     """The same in engineering units, as from a device that has no counts."""
 
     sample_type = "float32"
+
+
+class SimulatedRig(RecordingRig):
+    """A simulated source in real time."""
+
+    async def __aenter__(self) -> "SimulatedRig":
+        self.source = SimulatedSource(self._feed, self._calibration, self._clock)
+        return self
 
 
 def recorded(calibration) -> RecordedUnit:

@@ -143,7 +143,7 @@ class _FifoRig(Rig):
         self.step_samples = 50
         ids = frozenset(SLOW)
         beside = MapDevice(
-            _Slow(self._feed.slow), registers(()), (), only_slow(self._calibration, ids)
+            SlowFeed(self._feed.slow), registers(()), (), only_slow(self._calibration, ids)
         )
         self._device = FifoDevice(self._feed, self.layout, depth_samples=4000, step_samples=50)
         self._server = self._serve(self._device)
@@ -170,16 +170,16 @@ class _FifoRig(Rig):
         self._device.produce(n_samples // self.step_samples)
 
 
-class _Slow:
+class SlowFeed:
     """A feed of slow values alone, that never ends."""
 
     def __init__(self, slow) -> None:
-        self._slow, self._n = slow, 0
+        self.slow, self._n = slow, 0
 
     def advance(self, n_samples: int):
         first, self._n = self._n, self._n + n_samples
         counts = np.zeros((0, n_samples), dtype=np.int16)
-        return RawBlock(0, first, 0, 600.0, counts, (), self._slow)
+        return RawBlock(0, first, 0, 600.0, counts, (), self.slow)
 
 
 class FifoTcpRig(OnTcp, _FifoRig):

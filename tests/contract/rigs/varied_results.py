@@ -19,17 +19,16 @@ N = 700
 
 
 def life(build: Build, seed: int = 1) -> list[Assessment]:
-    """Four hours of a machine that changes its load, stands still and loses a probe; with holes."""
+    """Four hours of a machine that changes its load, loses a probe and ends; with holes."""
     random = np.random.default_rng(seed)
     time_ns = T0 + np.cumsum(random.integers(5, 35, N)) * SECOND_NS
     time_ns[N // 2 :] += 25 * MINUTE_NS
-    return [result(build, random, int(at), i / N) for i, at in enumerate(time_ns)]
-
-
-def result(build: Build, random: np.random.Generator, at: int, share: float) -> Assessment:
-    """One result; the machine turns either way, and gives nothing at the end."""
-    found = result_at(build, random, at, share, speed_rpm=(0.0, 92.3))
-    return replace(build(at), condition=None) if share > 0.95 else found
+    n_full = 95 * N // 100 + 1
+    found = [
+        result_at(build, random, int(at), n / N, speed_rpm=(0.0, 92.3))
+        for n, at in enumerate(time_ns[:n_full])
+    ]
+    return found + [replace(build(int(at)), condition=None) for at in time_ns[n_full:]]
 
 
 WHOLE = TrendQuery("U1", "UJB", NAMES, T0 - HOUR_NS, T0 + 8 * HOUR_NS, 40, MINUTE_NS)
