@@ -9,6 +9,7 @@ import asyncio
 import os
 import random
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -105,10 +106,10 @@ class Life:
             (self.link_changes, 2),
             (self.time_passes, 3),
             (self.operator_acts, 7),
-            (self.written, 4),
+            (partial(self.written, "writes"), 4),
             (self.written_while_more_arrives, 2),
-            (self.written_without_an_answer, 2),
-            (self.refused, 2),
+            (partial(self.written, "writes_silently"), 2),
+            (partial(self.written, "refuses"), 2),
             (self.crashes, 2),
             (self.stops_in_order, 1),
         ]
@@ -189,13 +190,6 @@ class Life:
             assert is_allowed, action
         assert self.engine.alarm(alarm.identity.id) == expected
 
-    async def written(self) -> None:
-        await self._write("writes")
-
-    async def written_without_an_answer(self) -> None:
-        """The append is on the disk, but its acknowledgement never comes."""
-        await self._write("writes_silently")
-
     async def written_while_more_arrives(self) -> None:
         """What comes while the disk is busy is not taken for written."""
         self.uncertain.fate = "writes"
@@ -206,10 +200,8 @@ class Life:
         await writing
         self.durable = durable
 
-    async def refused(self) -> None:
-        await self._write("refuses")
-
-    async def _write(self, fate: str) -> None:
+    async def written(self, fate: str = "writes") -> None:
+        """Let the recorder write; silently, where the append is on the disk without an answer."""
         self.uncertain.fate = fate
         await self.recorder.flush()
         if fate != "refuses":

@@ -43,14 +43,18 @@ class Watched:
         return [f"{e.identity.id} {e.change}" for told in news for e in told.events]
 
 
+def account(n_stored: int, n_gap: int, n_repeated: int = 0) -> dict[str, Any]:
+    counts = SampleAccount(n_stored=n_stored, n_gap=n_gap, n_repeated=n_repeated)
+    return {"accounts": {"U1": counts}}
+
+
 @pytest.fixture
 def watched(host: Any) -> Watched:
     return Watched(host)
 
 
 def test_a_service_in_good_health_says_nothing(watched: Watched) -> None:
-    accounts = {"U1": SampleAccount(n_stored=10)}
-    assert [watched.after(0.5, accounts=accounts) for _ in range(100)] == [[]] * 100
+    assert [watched.after(0.5, **account(10, 0)) for _ in range(100)] == [[]] * 100
     assert {alarm.identity.unit for alarm in watched.alarms.alarms} == {PLANT}
     assert all(alarm.condition.is_known for alarm in watched.alarms.alarms)
 
@@ -90,9 +94,6 @@ def test_a_late_analysis_and_captures_that_cannot_be_written_are_alarms(watched:
 
 
 def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
-    def account(n_stored: int, n_gap: int) -> dict[str, Any]:
-        return {"accounts": {"U1": SampleAccount(n_stored=n_stored, n_gap=n_gap)}}
-
     watched.after(0.5, **account(60_000, 30_000))  # lost before anybody looked
     assert watched.after(100.0, **account(120_000, 32_000)) == []
     assert watched.after(100.0, **account(180_000, 40_000)) == ["plant:U1:samples_lost raised"]
@@ -104,24 +105,19 @@ def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_
     host: Any,
 ) -> None:
     watched = Watched(host, leads=False)
-    accounts = {"U1": SampleAccount(n_stored=10)}
-    assert watched.after(0.5, accounts=accounts, store_behind_s=99.0, n_unstored=7) == []
-    accounts = {"U1": SampleAccount(n_stored=10, n_gap=10)}
-    assert watched.after(0.5, accounts=accounts, analysis_delay_s=99.0) == [
+    assert watched.after(0.5, **account(10, 0), store_behind_s=99.0, n_unstored=7) == []
+    assert watched.after(0.5, **account(10, 10), analysis_delay_s=99.0) == [
         "plant:U1:samples_lost raised"
     ]
 
 
 def test_a_device_whose_samples_all_pass_for_repeated_ones_loses_them(watched: Watched) -> None:
-    def account(n_stored: int, n_repeated: int) -> dict[str, Any]:
-        return {"accounts": {"U1": SampleAccount(n_stored=n_stored, n_repeated=n_repeated)}}
-
-    watched.after(0.5, **account(60_000, 90_000))  # repeated before anybody looked
-    assert watched.after(100.0, **account(120_000, 95_000)) == []
-    quiet = [watched.after(100.0, **account(180_000, 95_000 + n * 60_000)) for n in range(2)]
+    watched.after(0.5, **account(60_000, 0, 90_000))  # repeated before anybody looked
+    assert watched.after(100.0, **account(120_000, 0, 95_000)) == []
+    quiet = [watched.after(100.0, **account(180_000, 0, 95_000 + n * 60_000)) for n in range(2)]
     assert quiet == [[], []]
-    assert watched.after(100.0, **account(180_000, 275_000)) == ["plant:U1:samples_lost raised"]
-    later = [watched.after(100.0, **account(180_000 + n * 60_000, 275_000)) for n in range(1, 9)]
+    assert watched.after(100.0, **account(180_000, 0, 275_000)) == ["plant:U1:samples_lost raised"]
+    later = [watched.after(100.0, **account(180_000 + n * 60_000, 0, 275_000)) for n in range(1, 9)]
     assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
 
 

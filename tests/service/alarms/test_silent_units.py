@@ -35,7 +35,8 @@ class Process:
         """Let seconds pass in which some units are reported on; returns the alarms that stand."""
         for _ in range(round(seconds)):
             self.host.ns += SECOND
-            self.store.unit_states.report("other", [_report(u, self.host.ns) for u in reporting])
+            reports = [replace(REPORT, unit=unit, n_beats=self.host.ns) for unit in reporting]
+            self.store.unit_states.report("other", reports)
             await self.silent.look()
             self.alarms.tick()
             await self.recorder.flush()
@@ -43,10 +44,6 @@ class Process:
 
     def stored(self, id_: str) -> Alarm:
         return next(alarm for alarm in self.store.alarms() if alarm.identity.id == id_)
-
-
-def _report(unit: str, n_beats: int) -> UnitReport:
-    return replace(REPORT, unit=unit, n_beats=n_beats)
 
 
 @pytest.fixture

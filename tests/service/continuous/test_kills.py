@@ -80,22 +80,15 @@ def recordings_in(root: Path) -> list[Recording]:
     return [open_recording(folder) for folder in sorted(root.iterdir())]
 
 
-def n_deeds(
-    tmp_path: Path, unit: RecordedUnit, blocks: list[SampleBlock], patch: pytest.MonkeyPatch
-) -> int:
-    with killed_at(10**9, patch) as done:
-        record(tmp_path / "whole", unit, blocks, [0])
-    return len(done)
-
-
 def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
     tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     blocks = [block(n) for n in range(N_BLOCKS)]
     later = [block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
-    total = n_deeds(tmp_path, unit, blocks, monkeypatch)
-    assert total > 25
-    for deed in range(total):
+    with killed_at(10**9, monkeypatch) as done:
+        record(tmp_path / "whole", unit, blocks, [0])
+    assert len(done) > 25
+    for deed in range(len(done)):
         root, synced = tmp_path / f"{deed}", [0]
         with killed_at(deed, monkeypatch), pytest.raises(Killed):
             record(root, unit, blocks, synced)
