@@ -51,7 +51,7 @@ async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
     }
 
 
-async def test_the_age_of_a_result_grows_until_it_is_no_longer_current(running: Any) -> None:
+async def test_a_result_that_is_too_old_or_of_a_lost_link_shows_no_number(running: Any) -> None:
     running.clock.s += 29.5
     ageing = await running.json(f"{UJB}/latest")
     running.clock.s += 1.0
@@ -65,8 +65,6 @@ async def test_the_age_of_a_result_grows_until_it_is_no_longer_current(running: 
     assert {r["reason"] for r in stale["readings"].values()} == {"stale"}
     assert stale["time"] == ageing["time"]
 
-
-async def test_a_unit_that_is_not_connected_shows_no_number(running: Any) -> None:
     running.live.set_link("U1", LinkState.NOT_CONNECTED, "10.0.0.7:502: timed out")
 
     for unit in ("U1", "U2"):
@@ -77,6 +75,9 @@ async def test_a_unit_that_is_not_connected_shows_no_number(running: Any) -> Non
         assert {r["reason"] for r in body["readings"].values()} == {"not_connected"}
     assert body["time"] is None
     assert body["window"] is None
+    for what in ("spectrum", "orbit"):
+        problem = await running.problem(f"/api/v1/units/U2/bearings/UJB/{what}", 409)
+        assert "no result yet" in problem["detail"]
 
 
 async def test_before_the_first_segment_a_bearing_waits_for_data(service: Any) -> None:
@@ -114,7 +115,7 @@ async def test_a_bearing_is_described_as_configured(read_only: Any) -> None:
     assert all_of_them[0] == one
 
 
-async def test_trends_are_the_stored_readings_to_the_last_bit(
+async def test_trends_are_the_stored_readings_to_the_last_bit_or_in_buckets(
     read_only: Any, found: list[Assessment]
 ) -> None:
     body = await read_only.json(
@@ -135,18 +136,8 @@ async def test_trends_are_the_stored_readings_to_the_last_bit(
     assert series["worst_level"] == [a.readings[K].quality.level.name.lower() for a in found]
     assert series["unit"] == "N/m"
 
-
-async def test_many_readings_are_gathered_into_buckets(
-    read_only: Any, found: list[Assessment]
-) -> None:
-    body = await read_only.json(
-        f"{UJB}/trends",
-        start="2026-01-01T00:00:00Z",
-        end="2026-01-01T00:02:00Z",
-        quantity=K,
-        max_points=3,
-    )
-
+    minutes = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-01T00:02:00Z"}
+    body = await read_only.json(f"{UJB}/trends", **minutes, quantity=K, max_points=3)
     values = [a.readings[K].value for a in found]
     assert body["bucket_s"] == 60.0
     assert body["time"] == [1_767_225_600.0, 1_767_225_660.0]
@@ -227,9 +218,3 @@ async def test_the_orbit_is_the_newest_three_turns(read_only: Any, found: list[A
     assert body["shaft_y_um"] == orbit.shaft_y_um.tolist()
     assert body["time"] == rfc3339(orbit.start_ns)
     assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)
-
-
-async def test_without_a_result_there_is_no_spectrum_and_no_orbit(read_only: Any) -> None:
-    for what in ("spectrum", "orbit"):
-        problem = await read_only.problem(f"/api/v1/units/U2/bearings/UJB/{what}", 409)
-        assert "no result yet" in problem["detail"]

@@ -41,6 +41,8 @@ def keep(tmp_path: Path) -> Keep:
 
 
 async def test_recordings_are_listed_with_what_they_are_for(service: Any, keep: Keep) -> None:
+    assert (await service.json(RECORDINGS))["recordings"] == []
+    await service.problem(f"{RECORDINGS}/U1-20260101T000000.000Z-shaft_x", 404)
     first, second = keep(10).name, keep(20, "U2").name
 
     body = await service.json(RECORDINGS)
@@ -65,7 +67,7 @@ async def test_recordings_are_listed_with_what_they_are_for(service: Any, keep: 
     await service.problem(RECORDINGS, 404, unit="U9")
 
 
-async def test_a_recording_is_described_with_its_holes_and_checksums(
+async def test_a_recording_has_holes_and_checksums_and_its_samples_as_csv(
     service: Any, keep: Keep
 ) -> None:
     folder = keep(10, lost=True)
@@ -79,6 +81,15 @@ async def test_a_recording_is_described_with_its_holes_and_checksums(
     assert [each["id"] for each in body["channels"]] == ["a", "b"]
     assert {each["unit"] for each in body["channels"]} == {"um"}
     assert body["files"] == {name: file.model_dump() for name, file in manifest.files.items()}
+
+    response = await service.get(f"{RECORDINGS}/{folder.name}/samples.csv")
+
+    assert response.headers["content-disposition"] == f'attachment; filename="{folder.name}.csv"'
+    rows = list(csv.DictReader(io.StringIO(response.text)))
+    assert [int(row["index"]) for row in rows] == [*range(30), *range(40, 50)]
+    assert [float(row["b [um]"]) for row in rows] == [-float(row["index"]) for row in rows]
+    lost = [row["index"] for row in rows if row["a [um]"] == "nan"]
+    assert lost == [str(index) for index in range(BLOCK, 2 * BLOCK)]
 
 
 async def test_the_files_of_a_recording_arrive_whole(
@@ -94,21 +105,6 @@ async def test_the_files_of_a_recording_arrive_whole(
     taken = open_recording(tmp_path / "taken" / folder.name)
     numbers = [int(value) for raw in taken.raw_blocks() for value in raw.counts[0]]
     assert numbers == [*range(30), *range(40, 50)]
-
-
-async def test_the_samples_of_a_recording_come_as_csv_without_the_missing_ones(
-    service: Any, keep: Keep
-) -> None:
-    name = keep(10, lost=True).name
-
-    response = await service.get(f"{RECORDINGS}/{name}/samples.csv")
-
-    assert response.headers["content-disposition"] == f'attachment; filename="{name}.csv"'
-    rows = list(csv.DictReader(io.StringIO(response.text)))
-    assert [int(row["index"]) for row in rows] == [*range(30), *range(40, 50)]
-    assert [float(row["b [um]"]) for row in rows] == [-float(row["index"]) for row in rows]
-    lost = [row["index"] for row in rows if row["a [um]"] == "nan"]
-    assert lost == [str(index) for index in range(BLOCK, 2 * BLOCK)]
 
 
 async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(
@@ -150,11 +146,6 @@ async def test_no_name_leads_out_of_the_folder_of_recordings(
             response = await service.get(f"{RECORDINGS}/{name}{what}")
             assert response.status_code in (404, 422), f"{name}{what}"
     assert len((await service.json(RECORDINGS))["recordings"]) == 1
-
-
-async def test_without_any_recording_the_list_is_empty(service: Any) -> None:
-    assert (await service.json(RECORDINGS))["recordings"] == []
-    await service.problem(f"{RECORDINGS}/U1-20260101T000000.000Z-shaft_x", 404)
 
 
 async def test_a_bit_that_flips_in_what_a_recording_was_made_for_hides_it(

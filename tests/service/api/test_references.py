@@ -13,19 +13,6 @@ def reference(n: int, **changes: Any) -> GapReference:
     return GapReference("U1", "UJB", T0 + n * 10**9, "A. Name", (1990.0 + n, 2003.1), **arguments)
 
 
-async def test_without_a_stored_reference_the_plant_files_is_in_force(read_only: Any) -> None:
-    body = await read_only.json(UJB)
-
-    assert body["gap_reference_um"] == [2000.0, 2000.0]
-    assert body["reference"] == {
-        "source": "plant_file",
-        "set": None,
-        "author": None,
-        "note": None,
-    }
-    assert await read_only.json(f"{UJB}/references") == []
-
-
 async def test_the_reference_in_force_is_said_with_time_author_and_note(running: Any) -> None:
     running.store.add_reference(reference(1))
     running.store.add_reference(

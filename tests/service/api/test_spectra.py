@@ -104,7 +104,11 @@ async def test_a_kept_spectrum_is_the_one_that_was_shown_then(
     assert (body["level"][0], body["reason"][0]) == (quality.level.name.lower(), quality.reason)
 
 
-async def test_nothing_kept_is_no_spectra_rather_than_an_error(read_only: Any) -> None:
+async def test_nothing_kept_is_no_spectra_and_says_when_the_first_was(read_only: Any) -> None:
+    before = {"start": "2025-01-01T00:00:00Z", "end": "2025-02-01T00:00:00Z"}
+    early = await read_only.json(SPECTRA, **before)
+    assert early["time"] == []
+    assert early["first"].startswith("2026-01-01T00:00:13")
     body = await read_only.json(SPECTRA.replace("U1", "U2"), **DAY)
 
     assert (body["time"], body["frequency_hz"], body["first"]) == ([], [], None)
@@ -114,13 +118,6 @@ async def test_nothing_kept_is_no_spectra_rather_than_an_error(read_only: Any) -
         "bearing_x": [],
         "bearing_y": [],
     }
-
-
-async def test_a_range_before_the_first_spectrum_says_when_that_was(read_only: Any) -> None:
-    body = await read_only.json(SPECTRA, start="2025-01-01T00:00:00Z", end="2025-02-01T00:00:00Z")
-
-    assert body["time"] == []
-    assert body["first"].startswith("2026-01-01T00:00:13")
 
 
 async def test_a_channel_that_was_lost_has_null_for_a_spectrum(
@@ -192,11 +189,8 @@ async def test_what_is_asked_wrongly_is_refused_by_name(read_only: Any) -> None:
         problem = await read_only.problem(SPECTRA, 422, **{**DAY, **wrong})
 
         assert parameter in str(problem["errors"]) + problem["detail"]
-
-
-async def test_spectra_of_a_bearing_that_is_not_there_are_refused(read_only: Any) -> None:
-    await read_only.problem(SPECTRA.replace("UJB", "XJB"), 404, **DAY)
-    await read_only.problem(SPECTRA.replace("U1", "U9"), 404, **DAY)
+    for known, unknown in (("UJB", "XJB"), ("U1", "U9")):
+        await read_only.problem(SPECTRA.replace(known, unknown), 404, **DAY)
 
 
 async def test_more_numbers_than_fit_an_answer_are_refused_before_they_are_written(

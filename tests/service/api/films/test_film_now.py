@@ -125,3 +125,10 @@ async def test_a_film_that_is_not_watched_says_why(learned: Any) -> None:
     assert found["is_watched"] is False
     assert "rated_power_mw" in found["why_not"]
     assert (found["x"], found["y"], found["estimator"]) == (None, None, None)
+    whole = {"start": "2023-01-01T00:00:00Z", "end": "2024-06-01T00:00:00Z"}
+    for unit, bearing, status, named in (
+        ("U2", "UJB", 409, "rated_power_mw"),
+        ("U1", "XJB", 404, "XJB"),
+    ):
+        path = f"/api/v1/units/{unit}/bearings/{bearing}/film/readings"
+        assert named in (await learned.problem(path, status, **whole))["detail"]
