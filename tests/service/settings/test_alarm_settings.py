@@ -247,14 +247,6 @@ def test_a_limit_of_an_oil_that_nobody_measures_is_refused(
     assert "needs the bearing's oil_temperature" in mistake
 
 
-def test_no_unit_is_called_as_alarms_of_the_whole_plant_are(
-    changed: Changed, mistakes: Mistakes
-) -> None:
-    text, _ = changed('id = "U1"', 'id = "plant"')
-
-    assert "kept for alarms of the whole plant" in mistakes(text)[0]
-
-
 @pytest.mark.parametrize(
     ("table", "key", "said"),
     [
