@@ -56,13 +56,10 @@ def test_blocks_begin_at_multiples_of_their_length() -> None:
     made = blocks_of([30, 333])
     assert [b.first_index for b in made] == [30, 50, 100, 150, 200, 250, 300]
     assert [b.counts.shape[1] for b in made] == [20, 50, 50, 50, 50, 50, 33]
+    assert all(block.start_ns % 1000 == 0 for block in made)  # as a wire in microseconds carries
 
 
-def test_a_stamp_is_what_a_wire_in_microseconds_can_carry() -> None:
-    assert all(block.start_ns % 1000 == 0 for block in blocks_of([0, 200]))
-
-
-def test_a_gap_ends_the_block_before_it_and_keeps_what_was_rejected_in_front() -> None:
+def test_a_gap_or_a_restart_ends_the_block_before_it_and_keeps_what_was_rejected() -> None:
     grid = BlockGrid(LENGTH)
     assert grid.put(piece(0, 30)) == []
     refused = (Rejection("torn_slot", 10),)
@@ -72,13 +69,12 @@ def test_a_gap_ends_the_block_before_it_and_keeps_what_was_rejected_in_front() -
         (45, 5, refused),
         (50, 50, ()),
     ]
-
-
-def test_a_restart_ends_the_block_before_it() -> None:
-    grid = BlockGrid(LENGTH)
-    grid.put(piece(0, 30))
-    done = grid.put(piece(30, 50, epoch=2))
-    assert [(b.epoch, b.first_index, b.counts.shape[1]) for b in done] == [(1, 0, 30), (2, 30, 20)]
+    grid.put(piece(100, 130))
+    done = grid.put(piece(130, 150, epoch=2))
+    assert [(b.epoch, b.first_index, b.counts.shape[1]) for b in done] == [
+        (1, 100, 30),
+        (2, 130, 20),
+    ]
 
 
 def test_one_part_that_is_not_ok_makes_the_block_not_ok() -> None:

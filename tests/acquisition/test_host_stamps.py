@@ -62,15 +62,10 @@ def test_a_host_clock_that_was_set_is_followed_at_once_or_after_ten_seconds(step
     assert abs(stamps.start_ns(stop) - stepped_ns) < 1_000_000
 
 
-def test_a_new_epoch_begins_a_new_line():
-    stamps = HostStamps(RATE_HZ)
-    stamps.add(0, 1_000_000, START_NS)
-    stamps.add(1, 50, START_NS + NS_PER_S)
-    assert stamps.start_ns(50) == START_NS + NS_PER_S
-
-
-def test_a_gap_in_the_index_takes_the_time_it_took():
+def test_a_gap_in_the_index_takes_the_time_it_took_and_a_new_epoch_begins_a_new_line():
     stamps = HostStamps(RATE_HZ)
     stamps.add(0, 600, START_NS)
     stamps.add(0, 600 + 600 * 3600, START_NS + 3600 * NS_PER_S)
     assert stamps.start_ns(600 + 600 * 3600) == START_NS + 3600 * NS_PER_S
+    stamps.add(1, 50, START_NS + 7200 * NS_PER_S)
+    assert stamps.start_ns(50) == START_NS + 7200 * NS_PER_S

@@ -33,8 +33,5 @@ class NoSlowValues:
 def test_a_bus_says_what_it_refused_also_behind_slow_values_of_another_device() -> None:
     assert refused_frames_of(Bus()) == {"duplicate": 2}
     assert refused_frames_of(JoinedSource(Bus(), NoSlowValues())) == {"duplicate": 2}
-
-
-def test_where_there_are_no_frames_none_are_refused() -> None:
     assert refused_frames_of(Ring()) == {}
     assert refused_frames_of(JoinedSource(Ring(), NoSlowValues())) == {}

@@ -75,43 +75,32 @@ def test_a_counter_that_wraps_goes_on(n_bits, counted, plant):
     np.testing.assert_array_equal(samples, np.arange(start, start + 600) % 2**15)
 
 
-def assert_in_place(blocks) -> None:
-    """Each sample is its own number, so that a wrong index shows."""
-    for block in blocks:
-        index = np.arange(block.first_index, block.stop_index)
-        np.testing.assert_array_equal(block.counts[0], index % 2**15)
-
-
-@pytest.mark.parametrize("n_bits", WIDTHS)
-def test_every_gap_that_a_counter_can_tell_is_exact(n_bits, plant):
+@pytest.mark.parametrize(
+    ("n_bits", "shortest", "longest", "most_late_s"),
+    [
+        *((n, 0, min((1 << n) // 2 - 1, 3000), 0.0) for n in WIDTHS),
+        # the clock tells how often the counter wrapped in a silence
+        *((n, 1 << n, (20 << n) - 1, min(0.3, 0.3 * (1 << n) / RATE_HZ)) for n in (8, 12, 16)),
+    ],
+)
+def test_every_gap_that_a_counter_and_the_clock_can_tell_is_exact(
+    n_bits, shortest, longest, most_late_s, plant
+):
     random = np.random.default_rng(n_bits)
     plant = plant(n_bits)
-    longest = min((1 << n_bits) // 2 - 1, 3000)
     blocks, index = plant.take(range(3), 0.0), 3
     for _ in range(300):
-        index += int(random.integers(0, longest + 1))
-        blocks += plant.take(range(index, index + 3), index / RATE_HZ)
+        index += int(random.integers(shortest, longest + 1))
+        late_s = float(random.uniform(0.0, most_late_s))
+        blocks += plant.take(range(index, index + 3), index / RATE_HZ + late_s)
         index += 3
     assert {block.epoch for block in blocks} == {0}
     assert all(block.rejected == () for block in blocks)
     assert blocks[-1].stop_index == index
     assert sum(block.n_samples for block in blocks) == 903
-    assert_in_place(blocks)
-
-
-@pytest.mark.parametrize("n_bits", [8, 12, 16])
-def test_the_clock_tells_how_often_a_counter_wrapped_in_a_silence(n_bits, plant):
-    random = np.random.default_rng(n_bits)
-    plant = plant(n_bits)
-    blocks, index = plant.take(range(3), 0.0), 3
-    for _ in range(300):
-        index += int(random.integers(1 << n_bits, 20 << n_bits))
-        late_s = float(random.uniform(0.0, min(0.3, 0.3 * (1 << n_bits) / RATE_HZ)))
-        blocks += plant.take(range(index, index + 3), index / RATE_HZ + late_s)
-        index += 3
-    assert {block.epoch for block in blocks} == {0}
-    assert blocks[-1].stop_index == index
-    assert_in_place(blocks)
+    for block in blocks:
+        samples = np.arange(block.first_index, block.stop_index) % 2**15
+        np.testing.assert_array_equal(block.counts[0], samples)
 
 
 @pytest.mark.parametrize("n_bits", [12, 16, 24, 32])

@@ -6,8 +6,6 @@ import pytest
 
 from acquisition.can.dbc import load_dbc
 from acquisition.can.layout import FrameLayout, byte_offset, scalar_reader
-from acquisition.daq.can_dbc import daq_dbc
-from acquisition.daq.can_frames import FrameEncoder
 from acquisition.errors import FrameError
 
 N_FRAMES = 20
@@ -68,39 +66,6 @@ def test_any_signal_in_any_place_is_read_as_cantools_reads_it(tmp_path):
         n_other += sum(byte_offset(s) is None for s in signals)
     assert n_aligned > 100
     assert n_other > 50
-
-
-@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
-@pytest.mark.parametrize("floats", [False, True], ids=["counts", "floats"])
-@pytest.mark.parametrize("extended", [False, True], ids=["standard", "extended"])
-def test_cantools_decodes_what_the_simulated_daq_sends(
-    fd, floats, extended, shape_of, eventful_feed
-):
-    shape = shape_of(n_channels=7, n_slow=2, fd=fd, floats=floats, extended=extended)
-    raw = eventful_feed(n_channels=7, floats=floats).advance(50)
-    database = cantools.database.load_string(daq_dbc(shape), "dbc")
-    encoder = FrameEncoder(shape)
-    found: dict[str, list] = {}
-    for frame in encoder.frames(raw):
-        [message] = [
-            m
-            for m in database.messages
-            if (m.frame_id, m.is_extended_frame) == (frame.frame_id, frame.extended)
-        ]
-        assert message.is_fd == frame.fd
-        assert len(frame.data) == message.length
-        for name, value in message.decode(frame.data).items():
-            found.setdefault(name, []).append(value)
-    assert found["index"][0] == raw.first_index
-    assert found["epoch"] == [raw.epoch]
-    assert found["n_samples"] == [50]
-    assert found["seconds"][0] * 10**6 + found["microseconds"][0] == raw.start_ns // 1000
-    assert [found["ok"][0] >> c & 1 for c in range(7)] == [int(ok) for ok in raw.ok]
-    assert found["slow0"] == [raw.slow[0]]
-    assert np.isnan(found["slow1"]).all()
-    for c, channel in enumerate(shape.channels):
-        columns = [found[name] for name in shape.sample_names(channel.id)]
-        np.testing.assert_array_equal(np.array(columns).T.ravel(), raw.counts[c])
 
 
 def test_a_multiplexed_message_cannot_be_read_at_a_value_it_does_not_have(tmp_path):

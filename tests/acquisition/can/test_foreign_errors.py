@@ -87,7 +87,11 @@ async def test_a_bug_in_a_driver_is_not_hidden(fake_bus_source, fake_bus):
     [
         ({"interface": "socketcan", "channel": "can0"}, AcquisitionError, "socketcan can0: "),
         ({"interface": "nosuch", "channel": "x"}, ConfigError, "nosuch"),
-        ({"interface": "socketcan", "channel": "can0", "options": {"nosuch": 1}}, ConfigError, "can0"),
+        (
+            {"interface": "socketcan", "channel": "can0", "options": {"nosuch": 1}},
+            ConfigError,
+            "can0",
+        ),
         ({"interface": "kvaser", "channel": "0"}, ConfigError, "kvaser"),
         ({"interface": "pcan", "channel": "PCAN_USBBUS1"}, ConfigError, "library"),
         ({"interface": "slcan", "channel": "/dev/ttyNONE"}, LinkError, "No such file"),

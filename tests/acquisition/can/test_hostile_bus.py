@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from rigs.tiers import covering, fast_and_long
+from rigs.tiers import covering
 
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
@@ -95,49 +95,6 @@ async def test_two_hundred_of_each_fault_and_no_false_sample(fault, shape, devic
         assert 0 < lost.total() <= 2 * N_EACH * shape.samples_per_frame
     else:
         assert lost == Counter()
-
-
-@pytest.mark.parametrize("most_losses", fast_and_long(1000, 10_000))
-@pytest.mark.parametrize("shape", ["classic", "fd"], indirect=True)
-async def test_seeded_losses_over_the_wire_are_exact(most_losses, shape, device, source_of):
-    random = np.random.default_rng(20261121)
-    n_losses, n_expected = 0, 0
-    n_waves = len(shape.waves)
-    async with SlcanTcpServer(device) as server:
-        source = source_of(shape, server.endpoint, when_full="wait")
-        async with source.connect() as stream:
-            watch = Watch(stream)
-            await watch.up_to(50)
-            while n_losses < most_losses:
-                for _ in range(20):
-                    n_instants = int(random.integers(0, 50 // shape.samples_per_frame))
-                    server.inject("drop", n_instants * n_waves)
-                    n_losses += n_instants
-                    n_expected += n_instants * shape.samples_per_frame
-                    server.produce(1)
-                server.produce(1)
-                await watch.up_to(device.ledger.n_samples("U1"))
-    assert watch.lost == Counter({"gap": n_expected})
-    assert sum(b.n_samples for b in watch.blocks) + n_expected == device.ledger.n_samples("U1")
-    assert len({block.epoch for block in watch.blocks}) == 1
-
-
-async def test_bus_off_is_a_lost_link_at_once_and_reopening_restarts_the_controller(
-    shape, device, source_of
-):
-    async with SlcanTcpServer(device) as server:
-        source = source_of(shape, server.endpoint, stale_after_s=1000.0)
-        async with source.connect() as stream:
-            await Watch(stream).up_to(50)
-            server.inject("bus_off")
-            server.produce(1)
-            with pytest.raises(LinkError, match="bus-off"):
-                await Watch(stream).up_to(10_000)
-        async with source.connect() as stream:
-            server.produce(3)
-            watch = Watch(stream)
-            await watch.up_to(device.ledger.n_samples("U1"))
-    assert watch.blocks[-1].epoch == 7
 
 
 async def test_a_device_that_repeats_itself_for_ever_is_stale(shape, device, source_of):

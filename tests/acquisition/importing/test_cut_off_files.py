@@ -121,11 +121,6 @@ def test_parts_that_are_missing_at_the_end_are_noticed_at_their_border_too(
         read_all(path, job)
 
 
-def test_half_a_number_at_the_end_of_a_text_is_no_number(read_text: Callable[..., Any]) -> None:
-    with pytest.raises(ConfigError, match="line 3: the file ends within it"):
-        read_text("time,shaft x,shaft y\n0,1,2\n0.001667,1,2345"[:-2])
-
-
 @pytest.mark.parametrize("n_damaged", fast_and_long(2, 8))
 @pytest.mark.parametrize("kind", ["tdms", "mdf4", "blf", "hdf5"])
 @pytest.mark.usefixtures("confined")

@@ -179,12 +179,6 @@ def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(
             imported(kind, run.units_um, with_channels(unit="mm/s"))
 
 
-def test_the_factor_of_the_unit_is_taken(run: Any, imported: Imported) -> None:
-    found = imported("csv", run.units_um, with_channels(unit="mm", factor=1000.0))
-    expected = (run.units_um.astype(np.float64) * 1000.0).astype(np.float32)
-    np.testing.assert_allclose(found.samples, expected, rtol=1e-6)
-
-
 def test_a_csv_file_may_have_semicolons_decimal_commas_and_lines_before_its_header(
     tmp_path: Path, run: Any, read: Read, job: ImportJob
 ) -> None:

@@ -138,15 +138,6 @@ def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
         assert file.num_row_groups == -(-opened.manifest.n_samples // 200) > 4
 
 
-def test_the_manifest_says_when_it_began_and_who_made_it(
-    record: Callable[..., Path], numbered: Numbered
-) -> None:
-    first = numbered(5, 10, start_ns=1_767_225_600_008_333_333)
-    manifest = open_recording(record([first, numbered(15, 10)])).manifest
-    assert manifest.start == "2026-01-01T00:00:00.008333333Z"
-    assert manifest.made_by == "padwatch in a test"
-
-
 def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
     tmp_path: Path, unit: RecordedUnit, numbered: Numbered
 ) -> None:
@@ -230,15 +221,19 @@ def test_what_the_reader_would_refuse_is_not_written(
     assert recorder.finish().n_blocks == 2
 
 
-def test_a_recording_of_version_1_is_still_read(
+def test_a_manifest_says_when_it_began_and_who_made_it_and_version_1_is_still_read(
     record: Callable[..., Path], numbered: Numbered
 ) -> None:
-    blocks = [numbered(50 * n, 50) for n in range(3)]
+    first = numbered(0, 50, start_ns=1_767_225_600_008_333_333)
+    blocks = [first, numbered(50, 50), numbered(100, 50)]
     folder = record(blocks)
+    manifest = open_recording(folder).manifest
+    assert manifest.start == "2026-01-01T00:00:00.008333333Z"
+    assert manifest.made_by == "padwatch in a test"
     path = folder / "manifest.json"
-    manifest = json.loads(path.read_text()) | {"version": 1}
-    del manifest["block_samples"], manifest["checksum"]
-    path.write_text(json.dumps(manifest))
+    document = json.loads(path.read_text()) | {"version": 1}
+    del document["block_samples"], document["checksum"]
+    path.write_text(json.dumps(document))
     opened = open_recording(folder)
     assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
     assert opened.manifest.calibration.block_samples == 50

@@ -53,22 +53,20 @@ def four_probes(machine: Unit) -> Unit:
     )
 
 
-def test_an_accelerometer_s_corner_takes_from_its_signal_what_it_should(
+def test_an_accelerometer_s_corner_takes_what_it_should_and_a_probe_s_resonance_no_gap(
     machine: Unit, quiet: Scenario
 ) -> None:
-    corner = HighPass(0.5, order=2)
-    weak = replace(quiet, channels={"UJB_vx": ChannelScenario(response=corner)})
+    corner, soft = HighPass(0.5, order=2), Resonance(60.0, 0.05)
+    channels = {
+        "UJB_vx": ChannelScenario(response=corner),
+        "UJB_ux": ChannelScenario(response=soft),
+    }
+    right, found = (
+        readings(machine, scenario, 4) for scenario in (quiet, replace(quiet, channels=channels))
+    )
 
-    found = line(readings(machine, weak, 4)[2]) / line(readings(machine, quiet, 4)[2])
-
-    assert abs(found / corner.at(np.array([1.5]))[0] - 1.0) < 1e-3
-
-
-def test_a_probe_s_own_resonance_leaves_its_gap_alone(machine: Unit, quiet: Scenario) -> None:
-    soft = replace(quiet, channels={"UJB_ux": ChannelScenario(response=Resonance(60.0, 0.05))})
-
-    difference = readings(machine, soft)[0] - readings(machine, quiet)[0]
-
+    assert abs(line(found[2]) / line(right[2]) / corner.at(np.array([1.5]))[0] - 1.0) < 1e-3
+    difference = found[0] - right[0]
     assert abs(difference[: 5 * TURN].mean()) < 0.05
     assert np.abs(difference).max() < 0.2
 

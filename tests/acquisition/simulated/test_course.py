@@ -90,19 +90,3 @@ def test_a_shaft_that_comes_to_rest_shakes_nothing(machine: Unit, full_load: Sce
     assert np.std(running.readings[SHAFT]) > 10.0 * noise.gap_um_rms
     assert np.std(standing.readings[SHAFT]) == pytest.approx(noise.gap_um_rms, rel=0.1)
     assert np.std(standing.readings[BEARING]) == pytest.approx(noise.velocity_mm_s_rms, rel=0.1)
-
-
-def test_the_shaft_turns_as_far_as_its_speed_says(machine: Unit, quiet: Scenario) -> None:
-    """Seen by runout: a shaft that slows down from 92.3 to 60 r/min passes so many bumps."""
-    bearings = {name: replace(b, runout_um_pk=(100.0,)) for name, b in quiet.bearings.items()}
-    calm = replace(quiet, bearings=bearings, unbalance_grade_mm_s=0.0)
-    seconds = 30 * CHUNK_S
-
-    def slowing(elapsed_s: float) -> Scenario:
-        return replace(calm, speed_rpm=92.3 - 32.3 * elapsed_s / seconds)
-
-    gap = readings(SimulatedPlant(machine, Told(slowing), 3), 30)[SHAFT]
-    swing = np.unwrap(np.angle(scipy.signal.hilbert(gap - gap.mean())))
-    turns = (swing[-1200] - swing[1200]) / (2.0 * np.pi)
-    mean_rpm = (92.3 + 60.0) / 2.0
-    assert turns == pytest.approx(mean_rpm / 60.0 * (seconds - 4.0), rel=0.01)

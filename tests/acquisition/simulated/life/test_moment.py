@@ -9,10 +9,8 @@ import pytest
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life_truth import UnitLife
 from acquisition.simulated.life.moment import row_at, scenario_at
-from benchmarks.accuracy_estimates import estimates
-from benchmarks.accuracy_plant import REALISTIC, Run, machine, spectra
+from benchmarks.accuracy_plant import machine
 from core.machine import Measurand
-from core.uncertainty import BearingAccuracy
 
 Life = Callable[..., UnitLife]
 Day = Callable[[float], int]
@@ -47,20 +45,6 @@ def test_a_scenario_holds_what_was_so_at_that_moment(two_years: Life, day_ns: Da
         0.8 * chain.accelerometer_gain[1] * strays
     )
     assert scenario.channels["UJB_ux"].gain == chain.probe_gain[0]
-
-
-def test_before_and_after_a_loss_the_whole_chain_finds_the_film_of_the_life(
-    two_years: Life, day_ns: Day
-) -> None:
-    life = two_years(1, Damage(DamageKind.STIFFNESS_LOSS, "UJB", day_ns(500), 0.2))
-    for day in (490, 510):
-        scenario = scenario_at(life, running_ns(life, day_ns(day)), MACHINE)
-        found = spectra(Run(scenario, REALISTIC), seed=day)["UJB"]
-        given = {e.name: e for e in estimates(found, BearingAccuracy())}
-        for name in ("dynamic k_xx", "dynamic k_yy"):
-            estimate = given[name]
-            assert abs(estimate.error) < 5.0 * estimate.std + 0.01, (day, name)
-            assert estimate.std < 0.03, (day, name)
 
 
 def test_the_vortex_is_there_at_part_load_only(two_years: Life) -> None:
