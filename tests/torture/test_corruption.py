@@ -2,6 +2,7 @@
 
 import shutil
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -82,11 +83,13 @@ def outcome(folder: Path, truth: Rows) -> tuple[str, set[str]]:
     return "silent", wrong
 
 
-def damaged(whole: Path, folder: Path, rng: np.random.Generator) -> str:
+def damaged(
+    whole: Path, folder: Path, rng: np.random.Generator, targets: Sequence[str] = TARGETS
+) -> str:
     """A copy of the folder with one file damaged; what was done to it."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(whole, folder)
-    target = folder / TARGETS[rng.integers(len(TARGETS))]
+    target = folder / targets[rng.integers(len(targets))]
     kind = str(rng.choice(sorted(CHANGES)))
     target.write_bytes(corrupted(target.read_bytes(), kind, rng))
     return f"{kind} in {target.name}"
@@ -149,14 +152,9 @@ def test_no_wrong_sample_is_read_from_a_damaged_recording(
     rng = np.random.default_rng(torture.seed)
     n_refused = 0
     for _ in range(torture.times(N_RECORDINGS)):
-        folder = tmp_path / "run"
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(whole, folder)
-        files = sorted(folder.iterdir())
-        target, kind = files[rng.integers(len(files))], str(rng.choice(sorted(CHANGES)))
-        target.write_bytes(corrupted(target.read_bytes(), kind, rng))
+        done = damaged(whole, tmp_path / "run", rng, sorted(file.name for file in whole.iterdir()))
         try:
-            assert read(folder) == content, (kind, target.name)
+            assert read(tmp_path / "run") == content, done
         except ConfigError:
             n_refused += 1
     assert n_refused

@@ -115,21 +115,22 @@ def require_all_or_nothing(
 
 
 @pytest.mark.timeout(7200)
+@pytest.mark.parametrize(
+    ("is_new", "n_cases"),
+    [pytest.param(False, N_CASES, id="up to date"), pytest.param(True, N_CASES // 2, id="new")],
+)
 def test_whatever_call_fails_a_transaction_is_whole_or_absent_and_the_store_goes_on(
-    calls: FailingCalls, empty: Path, assessment: Build, torture: Torture
+    calls: FailingCalls,
+    empty: Path,
+    assessment: Build,
+    torture: Torture,
+    is_new: bool,
+    n_cases: int,
 ) -> None:
-    n = None if torture.times(N_CASES) == N_CASES else torture.times(N_CASES)
+    if is_new:
+        shutil.rmtree(empty / "data")
+    n = None if torture.times(n_cases) == N_CASES else torture.times(n_cases)
     torture.figure(require_all_or_nothing(calls, empty, n, torture.seed, assessment))
-
-
-@pytest.mark.timeout(3600)
-def test_whatever_call_fails_a_new_database_is_made_all_the_same(
-    calls: FailingCalls, tmp_path: Path, assessment: Build, torture: Torture
-) -> None:
-    nothing = tmp_path / "nothing"
-    nothing.mkdir()
-    n = torture.times(N_CASES // 2)
-    torture.figure(require_all_or_nothing(calls, nothing, n, torture.seed, assessment))
 
 
 def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") -> Outcome:

@@ -92,8 +92,8 @@ def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_p
         with acquire, analyse:
             killed = kill_them(acquire, analyse, server, database, N_KILLS, rng)
         sent = asyncio.run(on_the_stream(load_plant_file(files["plant"]), server))
-        reached = sum(unit_last(sent, unit) for unit in PLANT.units)
-        assert sum(positions(database).values()) == reached, analyse.newest_log()
+        last = {unit: number for number, (unit, _) in enumerate(sent, 1)}
+        assert sum(positions(database).values()) == sum(last.values()), analyse.newest_log()
         wanted = found_in(asyncio.run(single_process(files["single"], sent)))
     found = found_in(database)
     assert {name: len(rows) for name, rows in found.items()} == {
@@ -105,8 +105,3 @@ def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_p
         f"kills over a stream ({kills}): {len(sent)} messages, {len(wanted['assessment'])} results"
         " equal to a single process"
     )
-
-
-def unit_last(sent: list[tuple[str, object]], unit: str) -> int:
-    """Sequence of a unit's last message, counted from 1."""
-    return max((number for number, (its, _) in enumerate(sent, 1) if its == unit), default=0)

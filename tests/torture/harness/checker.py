@@ -7,7 +7,7 @@ number is computed again from seed, channel, epoch and index by the real monitor
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -74,16 +74,12 @@ class Findings:
     @property
     def wrong(self) -> dict[str, list[str]]:
         """What is wrong, the first of each kind."""
-        named = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {
-            name: value[:5] for name, value in named.items() if isinstance(value, list) and value
-        }
+        return {name: v[:5] for name, v in vars(self).items() if isinstance(v, list) and v}
 
     @property
     def counts(self) -> dict[str, int]:
         """How much there was of everything."""
-        named = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: len(v) if isinstance(v, list) else v for name, v in named.items()}
+        return {name: len(v) if isinstance(v, list) else v for name, v in vars(self).items()}
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,11 @@ import os
 import pickle
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from harness.deeds import Deed, letters
 from service.store.port import StoreError
@@ -23,6 +25,7 @@ from service.store.sqlite import SqliteStore
 ATTEMPTS = 4
 GAVE_UP = 3
 DATABASE = "padwatch.sqlite3"
+T = TypeVar("T")
 
 
 def main() -> None:
@@ -47,7 +50,7 @@ def _endure(folder: Path, deeds: Sequence[Deed], bugs: Sequence[str]) -> int:
     acks = os.open(folder / "acks", os.O_WRONLY | os.O_CREAT)
     errors = os.open(folder / "errors", os.O_WRONLY | os.O_CREAT)
     path = folder / "data" / DATABASE
-    store = _opened(path, errors)
+    store = _tried(lambda: SqliteStore(path, address=letters), errors)
     if store is None:
         return GAVE_UP
     if "synchronous_normal" in bugs:
@@ -55,7 +58,10 @@ def _endure(folder: Path, deeds: Sequence[Deed], bugs: Sequence[str]) -> int:
     for number, deed in enumerate(deeds):
         if "acknowledged_before_commit" in bugs:
             os.write(acks, f"{number}\n".encode())
-        if not _is_done(store, deed, errors, bugs) and "promises_anyway" not in bugs:
+        if (
+            not _tried(partial(_append, store, deed, bugs), errors)
+            and "promises_anyway" not in bugs
+        ):
             return GAVE_UP
         os.write(acks, f"{number}\n".encode())
     with suppress(StoreError):
@@ -63,27 +69,22 @@ def _endure(folder: Path, deeds: Sequence[Deed], bugs: Sequence[str]) -> int:
     return 0
 
 
-def _opened(path: Path, errors: int) -> SqliteStore | None:
+def _tried(do: Callable[[], T], errors: int) -> T | None:
+    """Do something, if need be again and again; None if it never succeeds."""
     for _ in range(ATTEMPTS):
         try:
-            return SqliteStore(path, address=letters)
+            return do()
         except StoreError as error:
-            os.write(errors, f"open: {error}\n".encode())
+            os.write(errors, f"{error}\n".encode())
     return None
 
 
-def _is_done(store: SqliteStore, deed: Deed, errors: int, bugs: Sequence[str]) -> bool:
-    for _ in range(ATTEMPTS):
-        try:
-            if "in_two_parts" in bugs or "two_transactions" in bugs:
-                store.append([deed.assessment], [deed.gap])
-                store.append([], [], [deed.alarm], [deed.film])
-            deed.append_to(store)
-        except StoreError as error:
-            os.write(errors, f"{error}\n".encode())
-        else:
-            return True
-    return False
+def _append(store: SqliteStore, deed: Deed, bugs: Sequence[str]) -> bool:
+    if "in_two_parts" in bugs or "two_transactions" in bugs:
+        store.append([deed.assessment], [deed.gap])
+        store.append([], [], [deed.alarm], [deed.film])
+    deed.append_to(store)
+    return True
 
 
 if __name__ == "__main__":

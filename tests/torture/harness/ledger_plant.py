@@ -101,9 +101,9 @@ class LedgerPlant:
             )
         ]
         for bearing in BEARINGS:
-            low = bearing.lower()
-            parts += [SHAFT.format(id=f"{low}_shaft_{axis}") for axis in "xy"]
-            parts += [VELOCITY.format(id=f"{low}_bearing_{axis}") for axis in "xy"]
+            for kind in (SHAFT, VELOCITY):
+                ids = [f"{bearing.lower()}_{kind[0]}_{axis}" for axis in "xy"]
+                parts += [CHANNEL.format(id_, *kind) for id_ in ids]
         for id_, kind, most in SLOW:
             parts.append(SLOW_CHANNEL.format(id=id_, unit=kind, most=most))
         for bearing in BEARINGS:
@@ -200,26 +200,17 @@ kind = "identification"
 product_code = "{id}"
 """
 
-SHAFT = """
+SHAFT = ("shaft", "proximity_probe", 4.0, "V/mm", 12.0, 1.0, 11.0)
+VELOCITY = ("bearing", "velocity", 100.0, "mV/(mm/s)", 10.0, -5.0, 5.0)
+CHANNEL = """
 [[unit.channel]]
-id = "{id}"
-transducer = "proximity_probe"
-sensitivity = 4.0
-sensitivity_unit = "V/mm"
-full_scale_v = 12.0
-ok_min_v = 1.0
-ok_max_v = 11.0
-"""
-
-VELOCITY = """
-[[unit.channel]]
-id = "{id}"
-transducer = "velocity"
-sensitivity = 100.0
-sensitivity_unit = "mV/(mm/s)"
-full_scale_v = 10.0
-ok_min_v = -5.0
-ok_max_v = 5.0
+id = "{0}"
+transducer = "{2}"
+sensitivity = {3}
+sensitivity_unit = "{4}"
+full_scale_v = {5}
+ok_min_v = {6}
+ok_max_v = {7}
 """
 
 SLOW_CHANNEL = """

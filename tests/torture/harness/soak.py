@@ -121,21 +121,20 @@ class Soaked:
 
     def growth(self, name: str) -> Slope:
         """How something grew after the warm-up."""
-        at_s = np.array([usage.at_s for usage in self.settled])
-        return slope(at_s, np.array([float(getattr(usage, name)) for usage in self.settled]))
+        return slope(self._values("at_s"), self._values(name))
 
     def rise(self, name: str) -> float:
         """How much more of something there was at most in the second half after the warm-up."""
-        half = len(self.settled) // 2
-        first, second = (
-            max(float(getattr(usage, name)) for usage in part)
-            for part in (self.settled[:half], self.settled[half:])
-        )
-        return second - first
+        values = self._values(name)
+        half = len(values) // 2
+        return float(values[half:].max() - values[:half].max())
 
     def most(self, name: str) -> float:
         """The most of something after the warm-up."""
-        return max(float(getattr(usage, name)) for usage in self.settled)
+        return float(self._values(name).max())
+
+    def _values(self, name: str) -> FloatArray:
+        return np.array([float(getattr(usage, name)) for usage in self.settled])
 
     def table(self, plant: LedgerPlant) -> str:
         """One line for each figure."""

@@ -5,8 +5,8 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).parents[3]
 
@@ -17,15 +17,13 @@ CALLS = (
 STRACE = ("strace", "-f", "-qq", "-xx", "-y", "-s", "10000000")
 
 
-@dataclass(frozen=True)
-class Made:
+class Made(NamedTuple):
     """A file that was not there."""
 
     name: str
 
 
-@dataclass(frozen=True)
-class Written:
+class Written(NamedTuple):
     """Bytes at a place in a file."""
 
     name: str
@@ -33,38 +31,33 @@ class Written:
     data: bytes
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """A file made so long."""
 
     name: str
     size: int
 
 
-@dataclass(frozen=True)
-class Synced:
+class Synced(NamedTuple):
     """A file, or the folder, brought to the disk."""
 
     name: str
 
 
-@dataclass(frozen=True)
-class Renamed:
+class Renamed(NamedTuple):
     """A file under another name."""
 
     old: str
     new: str
 
 
-@dataclass(frozen=True)
-class Removed:
+class Removed(NamedTuple):
     """A name that is no more."""
 
     name: str
 
 
-@dataclass(frozen=True)
-class Acknowledged:
+class Acknowledged(NamedTuple):
     """The program said of a transaction that it is durable."""
 
     number: int
