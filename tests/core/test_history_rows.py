@@ -1,5 +1,6 @@
 """Rows of readings become histories, or are refused with line and reason."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from core.condition.operating_limits import OperatingLimits
 from core.condition.operating_state import OperatingState
 from core.condition.operation_history import operation_history, operation_of_states
 from core.history_rows import histories_from_columns
-from core.stiffness_history import Evidence
+from core.stiffness_history import Evidence, StiffnessHistory
 
 STEP_NS = 600_000_000_000
 PLACES = {("U1", "UJB"), ("U1", "LJB"), ("U2", "UJB")}
@@ -115,3 +116,50 @@ def test_states_that_are_told_settle_as_those_that_are_followed() -> None:
     assert told.is_settled.tolist() == followed.is_settled.tolist()
     assert 0 < np.sum(told.is_settled) < n
     assert set(followed.state.tolist()) > {OperatingState.PART_LOAD, OperatingState.STANDSTILL}
+
+
+def history(n: int = 5) -> StiffnessHistory:
+    one, pair = np.ones(n), np.ones((2, n))
+    return StiffnessHistory(
+        *(np.arange(n), one, one, one, one, one, one),
+        *(20.0 * pair, 0.01 * pair, 50.0 * pair, 20.0 * pair),
+    )
+
+
+def test_a_part_of_a_history_is_a_history() -> None:
+    whole = history()
+    assert whole.rows(1, 3).time_ns.tolist() == [1, 2]
+    assert len(whole.rows(2, 2)) == 0
+
+
+def test_a_missing_number_is_of_bad_quality_unless_it_says_why() -> None:
+    ln_k = history().ln_k.copy()
+    ln_k[1, 2] = np.nan
+    whole = history()
+    columns = {**vars(whole), "ln_k": ln_k}
+    del columns["evidence"]
+    assert StiffnessHistory(**columns).evidence[1].tolist() == [0, 0, Evidence.BAD_QUALITY, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "value", "says"),
+    [
+        ("time_ns", 2, 1, "time_ns: row 2 is not after row 1"),
+        ("oil_temperature_c", 3, np.inf, "oil_temperature_c: row 3 is infinite"),
+        ("ln_k", (0, 4), np.nan, "evidence: row 4 contradicts ln_k"),
+        ("evidence", (0, 4), Evidence.BAD_QUALITY, "evidence: row 4 contradicts ln_k"),
+        ("u_random", (1, 0), 0.0, "u_random: row 0 must be above 0"),
+    ],
+)
+def test_impossible_columns_are_refused_with_their_row(
+    column: str, row: int | tuple[int, int], value: float, says: str
+) -> None:
+    wrong = getattr(history(), column).copy()
+    wrong[row] = value
+    with pytest.raises(ValueError, match=says):
+        replace(history(), **{column: wrong})
+
+
+def test_a_column_of_another_length_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"power_mw: shape \(4,\), expected \(5,\)"):
+        replace(history(), power_mw=np.ones(4))

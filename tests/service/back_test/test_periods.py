@@ -1,8 +1,11 @@
-"""From which readings a baseline is learned, and which are compared with it."""
+"""Periods of learning and comparing, and alarms out of decisions."""
 
 import numpy as np
 import pytest
 
+from core.alarms.alarm import AlarmLevel
+from core.decision.back_test import DecisionHistory
+from service.back_test.alarm_stretches import alarm_stretches
 from service.back_test.arguments import event_of, time_ns_of
 from service.back_test.periods import DAY_NS, Learning, MachineEvent, Period, periods_of
 
@@ -61,3 +64,34 @@ def test_an_event_is_a_place_a_time_and_words() -> None:
 def test_what_is_no_event_is_refused_with_an_example(text: str) -> None:
     with pytest.raises(ValueError, match="is not an event like 'U1 2026-03-01T08:00:00Z overhaul'"):
         event_of(text)
+
+
+def decided(level: list[int], change: list[float]) -> DecisionHistory:
+    n = len(level)
+    return DecisionHistory(
+        verdict=np.array(level, np.int8),
+        level=np.array(level, np.int8),
+        change=np.array(change),
+        significance=np.full(n, 10.0),
+        time_scale_h=np.full(n, 4.0),
+    )
+
+
+def test_a_quiet_film_has_no_alarm() -> None:
+    assert list(alarm_stretches(decided([0, 0, 0], [0.0, 0.1, 0.2]))) == []
+    assert list(alarm_stretches(decided([], []))) == []
+
+
+def test_an_alarm_that_rises_is_one_alarm() -> None:
+    (found,) = alarm_stretches(decided([0, 1, 2, 1, 0], [0.0, -0.05, -0.2, -0.1, 0.0]))
+    assert (found.begin, found.danger, found.end, found.level) == (1, 2, 4, AlarmLevel.DANGER)
+    assert (found.raised.change, found.largest.change, found.largest.row) == (-0.05, -0.2, 2)
+    assert found.largest.std == 0.02
+
+
+def test_alarms_that_return_are_counted_each_and_the_last_may_last() -> None:
+    found = list(alarm_stretches(decided([1, 0, 1, 1], [0.1, 0.0, 0.2, 0.3])))
+    assert [(alarm.begin, alarm.end, alarm.danger) for alarm in found] == [
+        (0, 1, None),
+        (2, None, None),
+    ]

@@ -5,10 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
+from acquisition.modbus.identity import ExpectedIdentification, Signature
 from core.vector_rows import VectorPart, VectorRow
 from service.settings.base import MisfitError
+from service.settings.modbus_identity import IdentitySettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,
     ModbusPolledSettings,
@@ -16,6 +18,7 @@ from service.settings.modbus_sources import (
     SlowDeviceSettings,
 )
 from service.settings.response import FOLDER
+from service.wiring.modbus_identity import identity_of
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 SKF = "maps/vector-rack-skf-like.toml"
@@ -142,3 +145,34 @@ def test_a_queue_that_cannot_be_followed_is_refused(settings, n_channels: int, s
     with pytest.raises(MisfitError, match=said) as refusal:
         fifo(**settings).fifo_layout(n_channels)
     assert refusal.value.at[0] == "source"
+
+
+IDENTITY: TypeAdapter[IdentitySettings] = TypeAdapter(IdentitySettings)
+
+
+def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
+    signature = {"kind": "signature", "address": 1000, "words": [0x0102, 7], "function": 4}
+    assert identity_of(IDENTITY.validate_python(signature)) == Signature(
+        address=1000, words=(0x0102, 7), function=4
+    )
+    identification = {"kind": "identification", "vendor": "Acme", "revision": "1.4"}
+    assert identity_of(IDENTITY.validate_python(identification)) == ExpectedIdentification(
+        vendor="Acme", revision="1.4"
+    )
+    assert identity_of(None) is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "complaint"),
+    [
+        ({"kind": "signature", "address": 0, "words": []}, "at least 1 item"),
+        ({"kind": "signature", "address": 0, "words": [65_536]}, "less than or equal to 65535"),
+        ({"kind": "signature", "address": 65_535, "words": [1, 2]}, "beyond register 65535"),
+        ({"kind": "signature", "address": 0, "words": [1], "function": 6}, "should be 3 or 4"),
+        ({"kind": "identification"}, "needs vendor, product_code or revision"),
+        ({"kind": "face"}, "'signature', 'identification'"),
+    ],
+)
+def test_an_identity_that_cannot_be_is_refused(wrong: dict[str, object], complaint: str) -> None:
+    with pytest.raises(ValidationError, match=complaint):
+        IDENTITY.validate_python(wrong)
