@@ -18,12 +18,13 @@ def block(index: int, off_s: float = 0.0, epoch: int = 1) -> RawBlock:
     return RawBlock(epoch, 600 * index, stamp_ns, 600.0, counts, (True,), ())
 
 
-def test_stamps_that_fit_are_kept_to_the_nanosecond() -> None:
+def test_stamps_that_fit_are_kept_to_the_nanosecond_and_a_restart_may_have_any_time() -> None:
     check = StampCheck()
     for n, off_s in enumerate((0.0, 0.5, -0.3, 0.123456789)):
         checked, fault = check.check(block(n, off_s))
         assert fault is None
         assert checked.start_ns == block(n, off_s).start_ns
+    assert check.check(block(0, -86400.0, epoch=2))[1] is None
 
 
 @pytest.mark.parametrize(
@@ -76,9 +77,3 @@ def test_a_clock_that_began_in_1970_may_be_set_and_drift() -> None:
     assert check.check(block(2, -1.767e9 + 100.0))[1] is None
     assert check.check(block(3))[1] is StampFault.JUMPED
     assert check.check(block(4))[1] is None
-
-
-def test_a_restarted_device_may_have_any_time() -> None:
-    check = StampCheck()
-    check.check(block(5))
-    assert check.check(block(0, -86400.0, epoch=2))[1] is None

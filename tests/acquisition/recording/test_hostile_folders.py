@@ -171,25 +171,21 @@ def test_a_truncated_or_damaged_file_is_refused(folder: Path, name: str) -> None
     assert f"{name}: damaged: checksum" in refusal(folder)
 
 
-def with_doubles(table: Any) -> Any:
-    return table.set_column(1, pa.field("c1", pa.float64(), nullable=False), [np.zeros(1000)])
-
-
-def with_holes(table: Any) -> Any:
-    return table.set_column(1, "c1", [pa.array([None] * 1000, pa.int16())])
-
-
-def with_a_column_too_many(table: Any) -> Any:
-    return table.append_column(table.schema.field(0), table["c0"])
+DOUBLES = pa.field("c1", pa.float64(), nullable=False), [np.zeros(1000)]
+HOLES = "c1", [pa.array([None] * 1000, pa.int16())]
 
 
 @pytest.mark.parametrize(
     ("changed", "options", "words"),
     [
-        (with_doubles, {}, "column 'c1' of type double where the manifest says otherwise"),
-        (with_holes, {}, "column 'c1' of type int16 where the manifest says otherwise"),
-        (with_a_column_too_many, {}, "3 columns where the manifest says otherwise"),
-        (lambda table: table, {"row_group_size": 500}, "samples.parquet: not in row groups of"),
+        (lambda t: t.set_column(1, *DOUBLES), {}, "column 'c1' of type double where"),
+        (lambda t: t.set_column(1, *HOLES), {}, "column 'c1' of type int16 where"),
+        (
+            lambda t: t.append_column("c9", t["c0"]),
+            {},
+            "3 columns where the manifest says otherwise",
+        ),
+        (lambda t: t, {"row_group_size": 500}, "samples.parquet: not in row groups of"),
     ],
 )
 def test_samples_that_are_not_as_the_format_has_them_are_refused(

@@ -42,20 +42,14 @@ def test_the_noise_has_the_density_of_its_data_sheet_and_rises_below_its_corner(
             assert power[band].sum() == pytest.approx(expected[band].sum(), rel=0.06)
 
 
-def test_integrated_noise_does_not_run_away() -> None:
+def test_integrated_noise_neither_runs_away_nor_steps_from_chunk_to_chunk() -> None:
     stream = noise(2)
     early, _, late = (stream.advance(600_000)[1] for _ in range(3))
 
     assert np.abs(late).max() < 2.0 * np.abs(early).max()
     assert abs(late.mean()) < 0.05 * late.std()
-
-
-def test_noise_joins_from_chunk_to_chunk_without_a_step() -> None:
-    stream = noise(3)
     velocity = np.concatenate([stream.advance(2048)[1] for _ in range(50)])
     steps = np.abs(np.diff(velocity))
-
-    assert steps[2047::2048].max() < steps.max() + 1e-12
     assert steps[2047::2048].mean() == pytest.approx(steps.mean(), rel=0.5)
 
 
