@@ -85,7 +85,6 @@ class Consumer:
                         await self._know(stream, tasks)
                         await self._fetch_all(stream)
                 except StreamError as error:
-                    let_stop_through()
                     self._note(str(error))
                     is_misfit = isinstance(error, StreamMisfitError)
                     await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
@@ -113,7 +112,6 @@ class Consumer:
             progress.reaches_back(state.first_seq)
 
     async def _fetch_all(self, stream: JetStreamContext) -> None:
-        let_stop_through()
         async with asyncio.TaskGroup() as tasks:
             for unit in self.units:
                 tasks.create_task(self._fetch_unit(stream, unit), name=f"fetch {unit}")

@@ -103,13 +103,11 @@ class Publisher:
                         self._note(None)
                     await self._send_all(stream, pulse)
             except StreamError as error:
-                let_stop_through()
                 self._note(str(error))
                 is_misfit = isinstance(error, StreamMisfitError)
                 await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
 
     async def _send_all(self, stream: JetStreamContext, pulse: Pulse) -> None:
-        let_stop_through()
         async with asyncio.TaskGroup() as tasks:
             for unit in self._identities:
                 tasks.create_task(self._send_unit(stream, unit, pulse), name=f"publish {unit}")

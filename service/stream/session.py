@@ -14,6 +14,7 @@ from nats.aio.client import Client
 from nats.errors import AuthorizationError, Error, NoServersError
 from nats.js.client import JetStreamContext
 
+from acquisition.stopping import let_stop_through, n_stops
 from service.settings.stream import StreamSettings
 from service.stream.errors import StreamError, StreamMisfitError
 
@@ -62,7 +63,7 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
         if not lost.done():
             lost.set_result(None)
 
-    client = Client()
+    client, n_before = Client(), n_stops()
     try:
         await client.connect(
             servers=list(settings.servers),
@@ -80,12 +81,14 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
             token=_token(settings),
             user_credentials=settings.credentials_file,
         )
+        let_stop_through(n_before)
         _require_version(client)
     except (Error, OSError, TimeoutError) as error:
         await _closed(client)
+        let_stop_through(n_before)
         reason = reasons[-1] if isinstance(error, NoServersError) and reasons else error
         raise _renamed(reason, settings) from None
-    except StreamMisfitError:
+    except (StreamMisfitError, asyncio.CancelledError):
         await _closed(client)
         raise
     return client

@@ -11,7 +11,6 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import n_rows
 from rigs.store_fixtures import at
 
-from core.assessment import Assessment
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore, readers, writer
 from service.store.sqlite.readers import Readers
@@ -29,23 +28,14 @@ def files_up_to(n_bytes: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def stored_of(store: SqliteStore, batches: list[list[Assessment]]) -> tuple[int, str]:
-    """How many were stored until one was refused, and why."""
-    for number, some in enumerate(batches):
-        try:
-            store.append(some, [])
-        except StoreError as error:
-            return number, str(error)
-    pytest.fail("nothing was refused")
-
-
 def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(path: Path) -> None:
     batch = [[assessment(at(10 * n + i), speed_rpm=1.0) for i in range(10)] for n in range(100)]
     with closing(SqliteStore(path)) as store:
         first = store._writer
-        with files_up_to(1_000_000):
-            n_stored, refusal = stored_of(store, batch)
-        assert "no file may be larger than 1000000 bytes here" in refusal
+        refusal = pytest.raises(StoreError, match="no file may be larger than 1000000 bytes here")
+        with files_up_to(1_000_000), refusal:
+            for n_stored, some in enumerate(batch):  # noqa: B007 - the one that is refused
+                store.append(some, [])
         store.append(batch[n_stored], [])
 
         assert store._writer is not first

@@ -16,7 +16,6 @@ from service.store.sqlite import SqliteStore
 MINUTE_NS, HOUR_NS = 60_000_000_000, 3_600_000_000_000
 T0 = 1_767_225_600_000_000_000
 N_HOURS = 3
-LATER_NS = 1 << 62
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """Blocks that use everything a block can hold, and a real server."""
 
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a f
 
 from core.blocks import Rejection, SampleBlock
 from core.device_clock import DeviceClock, StampFault
-from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
+from core.quality import GOOD, Reading, Reason, missing, uncertain
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.stream.identity import UnitIdentity, fingerprint
@@ -49,11 +48,6 @@ def block() -> SampleBlock:
         clock=DeviceClock(0.1, -3.5, None, 2),
         stamp_fault=StampFault.JUMPED,
     )
-
-
-@pytest.fixture
-def bad_block(block: SampleBlock) -> SampleBlock:
-    return replace(block, channel_quality=(bad(Reason.DEAD), GOOD), slow={}, clock=None)
 
 
 @pytest.fixture

@@ -1,20 +1,16 @@
 """Who is told to stop while the library waits does stop, though the library does not hear it."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from nats.aio.client import Client
 
 from acquisition.clock import SystemClock
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
-from service.stream import consumer as consuming
-from service.stream import publisher as publishing
 from service.stream.consumer import Consumer
-from service.stream.errors import StreamError
 from service.stream.identity import UnitIdentity
 from service.stream.outbound import Outgoing
 from service.stream.publisher import Publisher
@@ -92,25 +88,22 @@ async def test_a_publisher_that_waits_for_the_servers(publisher: Publisher, stre
     await require_it_stops(task, stream)
 
 
-@pytest.mark.parametrize("is_refused", [True, False])
+@pytest.mark.parametrize("refusal", [None, ConnectionRefusedError()])
 async def test_both_while_they_wait_for_a_connection(
     consumer: Consumer,
     publisher: Publisher,
     stream: Any,
     monkeypatch: pytest.MonkeyPatch,
-    is_refused: bool,
+    refusal: OSError | None,
 ) -> None:
-    @asynccontextmanager
-    async def session(*_: object) -> AsyncIterator[Any]:
+    async def connect(*_: object, **__: object) -> None:
         await stream.wait()
-        if is_refused:
-            raise StreamError("NATS is not reached")
-        yield stream
+        if refusal is not None:
+            raise refusal
 
-    async def nothing(*_: object) -> None: ...
+    async def close(*_: object) -> None: ...
 
-    monkeypatch.setattr(Consumer, "_know", nothing)
-    monkeypatch.setattr(publishing, "ensure", nothing)
-    for module, one in ((consuming, consumer), (publishing, publisher)):
-        monkeypatch.setattr(module, "session", session)
+    monkeypatch.setattr(Client, "connect", connect)
+    monkeypatch.setattr(Client, "close", close)
+    for one in (consumer, publisher):
         await require_it_stops(asyncio.create_task(one.run()), stream)

@@ -20,7 +20,9 @@ from service.store.waveform_port import WaveformFile, WaveformKind
 from service.waveforms.caretaker import Caretaker, Custody
 from service.waveforms.gauge import Gauge
 from service.waveforms.index import Index
+from service.waveforms.keeper import WaveformKeeper
 from service.waveforms.room import RoomLimits
+from service.waveforms.watch_keeping import WatchKeeping
 
 T0 = 1_767_225_600_000_000_000
 HOUR_NS = 3600 * 10**9
@@ -65,11 +67,15 @@ class Rig:
         self.space = DiskSpace(1, 10**12, 10**12)
         self.hire()
 
-    def hire(self) -> None:
-        """As after a restart."""
+    def hire(self) -> Caretaker:
+        """Begin anew, as after a restart."""
         self.gauge = Gauge(self.roots, SpaceLimits(0.1, 0.05, 0, 0), self.measured)
         custody = Custody(self.roots, self.room, self.gauge, lambda: self.bound)
         self.caretaker = Caretaker(custody, Index(self.store.waveforms, "here"), self.clock)
+        return self.caretaker
+
+    def keeper(self, hire: Callable[[], Caretaker] | None = None) -> WaveformKeeper:
+        return WaveformKeeper(self.gauge, hire or self.hire, self.clock, WatchKeeping(self.root))
 
     def measured(self, _: Path) -> DiskSpace:
         return self.space
@@ -78,12 +84,12 @@ class Rig:
         name = f"{unit}-{hours:03d}-{kind.value}"
         return recording(self.roots[kind] / name, T0 + hours * HOUR_NS, unit)
 
-    def make_day(self, hours: int, unit: str = "U1") -> list[str]:
+    def make_day(self, hours: int) -> list[str]:
         """Recordings of an hour each."""
-        names = [f"{unit}-{hour:03d}-continuous" for hour in range(hours, hours + 24)]
+        names = [f"U1-{hour:03d}-continuous" for hour in range(hours, hours + 24)]
         for hour, name in enumerate(names, hours):
             start_ns = T0 + hour * HOUR_NS
-            recording(self.roots[CONTINUOUS] / name, start_ns, unit, HOUR_NS // 9)
+            recording(self.roots[CONTINUOUS] / name, start_ns, step_ns=HOUR_NS // 9)
         return names
 
     def files(self) -> list[WaveformFile]:

@@ -15,8 +15,6 @@ from service.space.disk import DiskSpace
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 from service.store.waveforms import StoredWaveforms
-from service.waveforms.keeper import WaveformKeeper
-from service.waveforms.watch_keeping import WatchKeeping
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 FULL = DiskSpace(1, 10**12, 0)
@@ -170,9 +168,9 @@ def test_room_is_measured_though_nobody_can_look_after_the_recordings(rig: Any) 
         raise StoreError("the database is away")
 
     rig.space = FULL
-    keeper = WaveformKeeper(rig.gauge, hire, rig.clock, WatchKeeping(rig.root))
+    keeper = rig.keeper(hire)
     keeper.look()
-    second = WaveformKeeper(rig.gauge, hire, rig.clock, WatchKeeping(rig.root))
+    second = rig.keeper(hire)
     assert (keeper.is_full(), second.is_full()) == (True, True)
     rig.space = DiskSpace(1, 10**12, 10**12)
     second.look()  # which another process has the watch for
@@ -200,7 +198,7 @@ def test_a_disk_that_does_not_say_leaves_the_others_measured(rig: Any) -> None:
 
 
 def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> None:
-    keeper = WaveformKeeper(rig.gauge, lambda: rig.caretaker, rig.clock, WatchKeeping(rig.root))
+    keeper = rig.keeper(lambda: rig.caretaker)
     parts: Any = SimpleNamespace(
         store_error=None, behind_s=0.0, n_unstored=0, depth=0, capacity=1, oldest_wait_s=0.0
     )

@@ -4,27 +4,15 @@ from pathlib import Path
 from typing import Any
 
 from service.store.waveform_port import WaveformKind, WaveformState
-from service.waveforms.caretaker import Caretaker
-from service.waveforms.keeper import WaveformKeeper
 from service.waveforms.place import place_of
-from service.waveforms.watch_keeping import WatchKeeping
 
 CONTINUOUS = WaveformKind.CONTINUOUS
-
-
-def keeper_of(rig: Any) -> WaveformKeeper:
-    def hire() -> Caretaker:
-        rig.hire()
-        found: Caretaker = rig.caretaker
-        return found
-
-    return WaveformKeeper(rig.gauge, hire, rig.clock, WatchKeeping(rig.root))
 
 
 def test_what_there_is_is_counted_and_what_is_damaged_is_named(rig: Any) -> None:
     folder = rig.make(0)
     (rig.make(1) / "manifest.json").write_text("{}")
-    keeper = keeper_of(rig)
+    keeper = rig.keeper()
     keeper.look()
 
     assert keeper.n_files[CONTINUOUS] == 2
@@ -37,7 +25,7 @@ def test_what_there_is_is_counted_and_what_is_damaged_is_named(rig: Any) -> None
 
 def test_only_one_process_looks_after_a_folder_and_another_takes_over(rig: Any) -> None:
     rig.make(0)
-    first, second = keeper_of(rig), keeper_of(rig)
+    first, second = rig.keeper(), rig.keeper()
     first.look()
     second.look()
     assert (first.n_files[CONTINUOUS], dict(second.n_files)) == (1, {})
@@ -52,7 +40,7 @@ def test_a_disk_that_is_away_is_told_and_its_recordings_are_not_given_up(
     rig: Any, tmp_path: Path
 ) -> None:
     rig.make(0)
-    keeper = keeper_of(rig)
+    keeper = rig.keeper()
     keeper.look()
     rig.roots[CONTINUOUS].rename(tmp_path / "unmounted")
     keeper.look()
