@@ -80,7 +80,9 @@ async def test_units_say_how_their_samples_arrive(running: Any) -> None:
     assert both[1]["source"]["data_age_s"] is None
 
 
-async def test_the_overview_shows_what_each_bearing_shows(read_only: Any) -> None:
+async def test_the_overview_shows_each_bearing_and_the_catalogue_every_quantity(
+    read_only: Any,
+) -> None:
     overview = await read_only.json("/api/v1/overview")
 
     assert overview["plant"] == {"name": "Demo plant", "origin": "live"}
@@ -92,9 +94,6 @@ async def test_the_overview_shows_what_each_bearing_shows(read_only: Any) -> Non
         for bearing in unit["bearings"]:
             path = f"/api/v1/units/{unit['id']}/bearings/{bearing['bearing']}/latest"
             assert await read_only.json(path) == bearing
-
-
-async def test_the_catalogue_names_every_quantity(read_only: Any) -> None:
     assert await read_only.json("/api/v1/quantities") == [
         {"name": q.name, "unit": q.unit, "label": q.label} for q in CATALOGUE
     ]

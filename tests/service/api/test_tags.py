@@ -53,6 +53,15 @@ async def test_who_has_an_answer_already_is_not_sent_it_again(running: Any) -> N
         assert again.content == b""
         assert again.headers["etag"] == known.headers["etag"]
         assert "content-type" not in again.headers
+    # it says when it was given, so that ages can be counted on from there
+    overview = await ask(running, "overview")
+    assert overview.headers["padwatch-time"] == overview.json()["time"]
+    advance(running)
+    same = await ask(running, "overview", overview.headers["etag"])
+    assert same.headers["padwatch-time"] == (await ask(running, "overview")).json()["time"]
+    assert same.headers["padwatch-time"] > overview.headers["padwatch-time"]
+    refused = await ask(running, "units/U9")
+    assert refused.headers["padwatch-time"] == same.headers["padwatch-time"]
 
 
 async def tags_of(service: Any, paths: Iterable[str]) -> list[str]:
@@ -106,16 +115,10 @@ async def test_ages_in_the_overview_are_those_of_now_also_in_parts_that_were_kep
         assert (await ask(running, f"units/{unit['id']}")).json()["source"] == unit["source"]
 
 
-async def test_an_answer_says_when_it_was_given_so_that_what_is_kept_can_be_counted_on(
-    running: Any,
-) -> None:
-    first = await ask(running, "overview")
-    assert first.headers["padwatch-time"] == first.json()["time"]
-    advance(running)
-    same = await ask(running, "overview", first.headers["etag"])
-    assert same.headers["padwatch-time"] == (await ask(running, "overview")).json()["time"]
-    refused = await ask(running, "units/U9")
-    assert refused.headers["padwatch-time"] == same.headers["padwatch-time"]
+async def test_every_answer_carries_its_origin_errors_and_pages_included(read_only: Any) -> None:
+    for path in ("/api/v1/overview", "/api/v1/units/U9", "/livez", "/", "/nothing"):
+        response = await read_only.get(path)
+        assert response.headers["padwatch-origin"] == "live", path
 
 
 async def test_a_tag_may_be_named_in_every_spelling(read_only: Any) -> None:
@@ -125,9 +128,6 @@ async def test_a_tag_may_be_named_in_every_spelling(read_only: Any) -> None:
         assert (await ask(read_only, "alarms", known)).status_code == 304, known
     for unknown in ('"other"', "", ",,,", "W/", 'W/"', '"' * 4000):
         assert (await ask(read_only, "alarms", unknown)).status_code == 200, unknown
-
-
-async def test_a_refusal_has_no_tag(read_only: Any) -> None:
     refused = await ask(read_only, "units/U9", "*")
     assert refused.status_code == 404
     assert "etag" not in refused.headers

@@ -59,12 +59,8 @@ async def test_pages_of_a_trend_have_every_reading_once(stored: Any) -> None:
 
     assert means == [1e9 + n for n in range(N)]
     assert times == [START_NS / 1e9 + n for n in range(N)]
-
-
-async def test_a_page_that_is_exactly_full_is_the_last(stored: Any) -> None:
-    page = {"quantity": K, "max_points": N, "cursor": "first"}
-
-    assert (await stored.json(f"{UJB}/trends", **WHOLE, **page))["next_cursor"] is None
+    full = {"quantity": K, "max_points": N, "cursor": "first"}  # and the last
+    assert (await stored.json(f"{UJB}/trends", **WHOLE, **full))["next_cursor"] is None
 
 
 async def test_wrong_cursors_are_refused(stored: Any) -> None:
@@ -93,6 +89,10 @@ async def test_a_trend_is_the_same_numbers_as_csv(stored: Any) -> None:
     assert {row[f"{K}_worst_level"] for row in rows} == {"good"}
     assert {row["is_simulated"] for row in rows} == {"False"}
     assert rows[-1]["time_utc"] == "2026-01-01T00:00:24.000Z"
+    page = {"quantity": K, "max_points": 10, "cursor": "first", "format": "csv"}
+    first = await stored.get(f"{UJB}/trends", **WHOLE, **page)
+    assert first.headers["padwatch-next-cursor"] == str(START_NS + 10_000_000_000)
+    await stored.problem(f"{UJB}/trends", 422, **WHOLE, quantity=K, format="xlsx")
 
 
 async def test_a_trend_is_a_parquet_file_where_that_is_accepted(stored: Any) -> None:
@@ -108,15 +108,6 @@ async def test_a_trend_is_a_parquet_file_where_that_is_accepted(stored: Any) -> 
     assert table[f"{K}_count"].to_pylist() == body["series"][K]["count"]
     assert table.schema.field(f"{K}_mean").metadata == {b"unit": b"N/m"}
     assert [t.timestamp() for t in table["time_utc"].to_pylist()] == body["time"]
-
-
-async def test_a_file_says_where_the_next_page_begins(stored: Any) -> None:
-    asked = {"quantity": K, "max_points": 10, "cursor": "first", "format": "csv"}
-
-    response = await stored.get(f"{UJB}/trends", **WHOLE, **asked)
-
-    assert response.headers["padwatch-next-cursor"] == str(START_NS + 10_000_000_000)
-    await stored.problem(f"{UJB}/trends", 422, **WHOLE, quantity=K, format="xlsx")
 
 
 async def test_groups_are_below_each_other_in_a_file(

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from core.account import Gap
@@ -76,24 +76,19 @@ def test_the_database_refuses_to_change_entries(
 
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(actor=st.text(st.characters(), max_size=400), reason=st.text(st.characters()))
+@example("🦭" * 500, "a\ud800b\r\n\u202e")
+@example("\x00", "=HYPERLINK(1)")
+@example("", "'; DROP TABLE audit; --")
 def test_any_name_and_any_reason_can_be_written(
     store: SqliteStore, path: Path, deed: Build, actor: str, reason: str
 ) -> None:
-    store.audit.record([deed(actor=actor, reason=reason, object=reason, after={"a": actor})])
+    texts = {"object": reason, "action": reason, "peer": actor, "after": {"a": actor}}
+    store.audit.record([deed(actor=actor, reason=reason, **texts)])
 
     newest = store.audit.entries(AuditQuery(limit=1))[0]
     assert len(newest.actor) <= MAX_NAME
     assert newest.actor[:200] == actor.encode("utf-8", "replace").decode()[:200]
     assert verify_trail(path).is_whole
-
-
-def test_hostile_names_are_names(store: SqliteStore, path: Path, deed: Build) -> None:
-    signs = ("\x00", "a\ud800b", "\r\n", "\u202e", "")
-    names = ("=HYPERLINK(1)", "<script>", "'; DROP TABLE audit; --", "🦭" * 500, *signs)
-    for n, name in enumerate(names, 1):
-        store.audit.record([deed(actor=name, action=name, object=name, reason=name, peer=name)])
-        verdict = verify_trail(path)
-        assert (verdict.is_whole, verdict.n_entries) == (True, n)
 
 
 def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, deed: Build) -> None:
@@ -102,12 +97,6 @@ def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, dee
     assert entry.after is not None
     assert len(entry.after) < 2000
     assert f'"n_characters":{2 * MAX_DOCUMENT + 11}' in entry.after
-
-
-def test_a_deed_that_is_no_json_is_not_written_at_all(store: SqliteStore, deed: Build) -> None:
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        store.audit.record([deed(0), deed(1, after={"value": float("nan")})])
-    assert all_of(store) == []
 
 
 def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Build) -> None:
@@ -223,6 +212,8 @@ def test_a_transaction_that_fails_leaves_no_entry(
     store.audit.record([deed(0)])
     with pytest.raises(StoreError):
         store.audit.record([deed(1), replace(deed(2), time_ns="soon")])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        store.audit.record([deed(1), deed(2, after={"value": float("nan")})])
     store.audit.record([deed(3)])
     assert [entry.number for entry in all_of(store)] == [1, 2]
     assert verify_trail(path).is_whole

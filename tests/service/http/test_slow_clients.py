@@ -6,15 +6,24 @@ LARGE_MIB = 64
 JUST_LATE_S = 4.1
 
 
-async def test_headers_that_never_end_are_given_up(start) -> None:
-    running = await start()
+@pytest.mark.parametrize(
+    ("sent", "counter", "more"),
+    [
+        (b"GET / HTTP/1.1\r\nHost: localhost\r\nX-A: ", "_n_wire", b"b"),  # buys no time
+        (b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 10\r\n\r\n12345", "_n_body", b""),
+    ],
+)
+async def test_headers_or_a_body_that_never_end_are_given_up(
+    start, sent: bytes, counter: str, more: bytes
+) -> None:
+    running = await start(["a"])
     client = await running.client()
-    await client.send(b"GET / HTTP/1.1\r\nHost: localhost\r\nX-A: ")
+    await client.send(sent)
     connection = running.connection()
-    await running.until(lambda: connection._n_wire > 0)
+    await running.until(lambda: getattr(connection, counter) > 0)
 
     running.pass_time(3.9)
-    await client.send(b"b")  # one more byte buys no time
+    await client.send(more)
     running.pass_time(0.2)
 
     assert await client.status() == 408
@@ -40,20 +49,6 @@ async def test_empty_lines_between_requests_buy_no_time(start) -> None:
     running.pass_time(8.1)
 
     assert await client.is_closed()
-
-
-async def test_a_body_that_never_ends_is_given_up(start) -> None:
-    running = await start()
-    client = await running.ask("/", "POST", "Content-Length: 10\r\n")
-    await client.send(b"12345")
-    connection = running.connection()
-    await running.until(lambda: connection._n_body == 5)
-
-    running.pass_time(JUST_LATE_S)
-
-    assert await client.status() == 408
-    assert await client.is_closed()
-    assert running.app.n_asked == 0
 
 
 async def test_a_service_that_stalls_blames_no_client(start) -> None:
