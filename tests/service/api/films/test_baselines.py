@@ -57,7 +57,7 @@ async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
     assert found["learning"]["is_over"] is False
 
 
-async def test_cells_are_the_learned_ones_in_plant_units(learned: Any) -> None:
+async def test_cells_and_export_are_what_was_learned(learned: Any) -> None:
     found = await learned.json(f"{BASELINES}/1")
 
     baseline = learned.store.films.baseline("U1", "UJB", 1).of(Watched.STIFFNESS, "x")
@@ -78,15 +78,11 @@ async def test_cells_are_the_learned_ones_in_plant_units(learned: Any) -> None:
         assert low <= e <= high
     assert found["about"]["status"] == "in_force"
 
-
-async def test_an_exported_baseline_reads_back_as_it_was_learned(learned: Any) -> None:
-    response = await learned.get(f"{BASELINES}/1/export")
-
-    assert (
-        response.headers["content-disposition"] == 'attachment; filename="U1-UJB-baseline-1.json"'
-    )
-    assert response.headers["content-type"] == "application/json"
-    assert from_json(response.text) == learned.store.films.baseline("U1", "UJB", 1)
+    export = await learned.get(f"{BASELINES}/1/export")
+    name = 'attachment; filename="U1-UJB-baseline-1.json"'
+    assert export.headers["content-disposition"] == name
+    assert export.headers["content-type"] == "application/json"
+    assert from_json(export.text) == learned.store.films.baseline("U1", "UJB", 1)
 
 
 async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_again(
@@ -141,14 +137,20 @@ async def test_what_does_not_fit_is_refused_and_changes_nothing(
 ) -> None:
     before = await learned.json(BASELINES)
 
-    for path, body, words in (
-        ("1/accept", ANNA, "in force already"),
-        ("thaw", ANNA, "not frozen"),
-        ("renew", {**ANNA, "event_time": "2999-01-01T00:00:00Z"}, "future"),
+    foreign = await post(learned, f"{BASELINES}/freeze", ANNA, origin="https://elsewhere.example")
+    assert foreign.status_code == 403
+    unwatched = await post(learned, BASELINES.replace("U1", "U2") + "/freeze", ANNA)
+    assert unwatched.status_code == 409
+    assert "rated_power_mw" in as_problem(unwatched)["detail"]
+    for path, body, status, words in (
+        ("1/accept", ANNA, 409, "in force already"),
+        ("9/accept", ANNA, 404, "unit 'U1' bearing 'UJB' has no baseline 9"),
+        ("thaw", ANNA, 409, "not frozen"),
+        ("renew", {**ANNA, "event_time": "2999-01-01T00:00:00Z"}, 409, "future"),
     ):
         answer = await post(learned, f"{BASELINES}/{path}", body)
 
-        assert answer.status_code == 409
+        assert answer.status_code == status
         assert words in as_problem(answer)["detail"]
         assert await learned.json(BASELINES) == before
 
@@ -170,18 +172,3 @@ async def test_a_wrong_request_is_refused_by_name(learned: Any, as_problem: AsPr
 
         assert answer.status_code == 422, body
         assert as_problem(answer)["errors"][0]["parameter"] == parameter
-
-
-async def test_nobody_acts_from_another_site_or_on_what_is_not_there(
-    learned: Any, as_problem: AsProblem
-) -> None:
-    foreign = await post(learned, f"{BASELINES}/freeze", ANNA, origin="https://elsewhere.example")
-    unknown = await post(learned, f"{BASELINES}/9/accept", ANNA)
-    unwatched = await post(learned, "/api/v1/units/U2/bearings/UJB/baselines/freeze", ANNA)
-
-    assert foreign.status_code == 403
-    assert as_problem(unknown)["detail"] == "unit 'U1' bearing 'UJB' has no baseline 9"
-    assert unknown.status_code == 404
-    assert unwatched.status_code == 409
-    assert "rated_power_mw" in as_problem(unwatched)["detail"]
-    assert (await learned.json(BASELINES))["is_frozen"] is False

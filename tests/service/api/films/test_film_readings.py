@@ -41,7 +41,7 @@ async def test_readings_are_the_stored_ones_with_their_conditions(
         assert {len(column) for column in series.values()} == {n}
 
 
-async def test_more_readings_than_wanted_are_thinned_evenly_up_to_the_newest(
+async def test_more_readings_than_wanted_are_thinned_evenly_or_come_page_by_page(
     learned: Any, lived: StiffnessHistory
 ) -> None:
     found = await learned.json(READINGS, **ALL, max_points=50)
@@ -54,17 +54,12 @@ async def test_more_readings_than_wanted_are_thinned_evenly_up_to_the_newest(
     )
     assert found["next_end"] is None
 
-
-async def test_all_readings_come_page_by_page_without_a_gap_or_a_double(
-    learned: Any, lived: StiffnessHistory
-) -> None:
     times: list[float] = []
     end = ALL["end"]
     while end:
         page = await learned.json(READINGS, start=ALL["start"], end=end, thin=False, max_points=999)
         times = page["time"] + times
         end = page["next_end"]
-
     assert times == (lived.time_ns / 1e9).tolist()
 
 
@@ -97,16 +92,6 @@ async def test_what_is_measured_is_told_from_what_was_simulated(service: Any, ma
     assert found["baseline_version"][-1] == 1
     assert found["x"]["deviation_percent"][-1] == pytest.approx(0.0, abs=1e-6)
     assert found["x"]["deviation_percent"][0] is None
-
-
-async def test_readings_of_a_film_that_is_not_watched_are_refused_with_the_reason(
-    learned: Any,
-) -> None:
-    found = await learned.problem("/api/v1/units/U2/bearings/UJB/film/readings", 409, **ALL)
-    unknown = await learned.problem("/api/v1/units/U1/bearings/XJB/film/readings", 404, **ALL)
-
-    assert "rated_power_mw" in found["detail"]
-    assert "XJB" in unknown["detail"]
 
 
 async def test_readings_of_a_film_are_the_same_numbers_as_a_file(
