@@ -7,7 +7,6 @@ from playwright.async_api import expect
 from real_plant import DEMO
 
 ALARM = "U1:UJB:order1_shaft_x"
-ROW = f"[data-alarm='{ALARM}']"
 CAPTURE = "\n[capture]\npre_s = 5.0\npost_s = 2.0\nmax_s = 60.0\n"
 LIMIT = "alarms.shaft_order1_um_pk = { alert = 1.0, deadband = 0.1 }\n"
 OIL = 'oil_temperature = "ujb_oil_temperature"\n'
@@ -25,7 +24,7 @@ async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
     new_plant.start_daq()
     new_plant.start_service()
     await page.goto(f"{new_plant.url}#/alarms")
-    row = page.locator(ROW)
+    row = page.locator(f"[data-alarm='{ALARM}']")
     await expect(row).to_be_visible()
     links = f"{new_plant.url}api/v1/alarms/{ALARM}/evidence"
     for _ in range(600):

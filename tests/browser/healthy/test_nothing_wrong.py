@@ -4,7 +4,6 @@ import re
 
 from playwright.async_api import expect
 
-ROW = "[data-source=U1]"
 NOT_WATCHED = "This film is not watched: operating states need power_channel and rated_power_mw."
 
 
@@ -34,7 +33,7 @@ async def test_a_source_in_good_health_says_what_arrives_from_where(
     plant, page, complaints
 ) -> None:
     await page.goto(plant.url + "#/sources")
-    row = page.locator(ROW)
+    row = page.locator("[data-source=U1]")
     await expect(row.locator(".mark").first).to_have_text("Connected")
     await expect(row.locator("[data-head=Missing]")).to_have_text("0")
     await expect(page.get_by_text("1 of 1 connected.")).to_be_visible()
