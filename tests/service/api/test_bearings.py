@@ -180,7 +180,7 @@ async def test_a_hole_in_the_trend_is_a_point_without_a_value(
     assert body["series"][K]["count"][-2:] == [0, 1]
 
 
-async def test_the_spectrum_shows_the_lines_where_the_readings_say(
+async def test_the_spectrum_shows_the_lines_of_the_readings_and_the_orbit_is_the_newest(
     read_only: Any, found: list[Assessment]
 ) -> None:
     body = await read_only.json(f"{UJB}/spectrum")
@@ -196,6 +196,13 @@ async def test_the_spectrum_shows_the_lines_where_the_readings_say(
         assert shaft[near].max() > 10 * np.median(shaft)
     assert shaft.tolist() == newest.spectrum.amplitude_um_pk(0).tolist()
 
+    orbit, body = newest.orbit, await read_only.json(f"{UJB}/orbit")
+    assert orbit is not None
+    assert body["shaft_x_um"] == orbit.shaft_x_um.tolist()
+    assert body["shaft_y_um"] == orbit.shaft_y_um.tolist()
+    assert body["time"] == rfc3339(orbit.start_ns)
+    assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)  # three turns
+
 
 async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[Assessment]) -> None:
     n_segments = found[-1].spectrum.n_segments.copy()
@@ -207,14 +214,3 @@ async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[A
 
     assert channels["bearing_x"]["amplitude"] is None
     assert len(channels["bearing_y"]["amplitude"]) > 100
-
-
-async def test_the_orbit_is_the_newest_three_turns(read_only: Any, found: list[Assessment]) -> None:
-    body = await read_only.json(f"{UJB}/orbit")
-
-    orbit = found[-1].orbit
-    assert orbit is not None
-    assert body["shaft_x_um"] == orbit.shaft_x_um.tolist()
-    assert body["shaft_y_um"] == orbit.shaft_y_um.tolist()
-    assert body["time"] == rfc3339(orbit.start_ns)
-    assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)

@@ -17,7 +17,7 @@ WHOLE = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
 GOOD = {**WHOLE, "quantity": "speed_rpm"}
 
 
-async def test_an_unknown_unit_or_bearing_is_not_found(read_only: Any) -> None:
+async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only: Any) -> None:
     bearing = "U9/bearings/UJB"
     units = ("U9", "U9/bearings", bearing, "u1", "%00", "'; DROP TABLE assessment; --")
     for path in (*units, *(f"{bearing}/{what}" for what in ("latest", "spectrum", "orbit"))):
@@ -30,6 +30,8 @@ async def test_an_unknown_unit_or_bearing_is_not_found(read_only: Any) -> None:
     await read_only.problem("/api/v1/units/U9/bearings/UJB/trends", 404, **GOOD)
     await read_only.problem("/api/v1/units/U1/bearings/XJB/trends", 404, **GOOD)
     await read_only.problem("/api/v1/units/U9/gaps", 404, **WHOLE)
+    for path in ("/api/v1/nothing", "/api/v2/units", "/nowhere", "/static/no.js"):
+        await read_only.problem(path, 404)
 
 
 @pytest.mark.parametrize(
@@ -113,11 +115,6 @@ async def test_a_parameter_that_nobody_knows_is_refused_everywhere(read_only: An
 
         assert problem["errors"][0]["parameter"] == "verbose"
         assert problem["detail"] == "there is no parameter 'verbose' here; known: none"
-
-
-async def test_an_unknown_path_is_a_problem_too(read_only: Any) -> None:
-    for path in ("/api/v1/nothing", "/api/v2/units", "/nowhere", "/static/no.js"):
-        await read_only.problem(path, 404)
 
 
 async def test_a_range_that_could_take_all_memory_is_refused(

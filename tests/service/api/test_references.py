@@ -56,13 +56,12 @@ async def test_the_history_is_whole_and_newest_first(running: Any) -> None:
     assert await running.json("/api/v1/units/U2/bearings/UJB/references") == []
 
 
-async def test_the_history_of_what_is_not_there_is_a_problem(read_only: Any) -> None:
+async def test_a_history_that_is_not_there_or_cannot_be_read_is_a_problem(
+    running: Any, tmp_path: Any
+) -> None:
     for path in ("U9/bearings/UJB", "U1/bearings/XJB"):
-        problem = await read_only.problem(f"/api/v1/units/{path}/references", 404)
+        problem = await running.problem(f"/api/v1/units/{path}/references", 404)
         assert path.partition("/")[0] in problem["detail"]
-
-
-async def test_a_history_that_cannot_be_read_is_a_problem(running: Any, tmp_path: Any) -> None:
     (tmp_path / "padwatch.sqlite3").rename(tmp_path / "away")
 
     problem = await running.problem(f"{UJB}/references", 503)

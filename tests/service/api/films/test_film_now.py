@@ -11,7 +11,9 @@ FILM = "/api/v1/units/U1/bearings/UJB/film"
 LJB = "/api/v1/units/U1/bearings/LJB/film"
 
 
-async def test_a_film_as_it_was_learned_is_normal(service: Any, machine: Any) -> None:
+async def test_a_film_as_it_was_learned_is_normal_and_tells_its_condition(
+    service: Any, machine: Any
+) -> None:
     machine.run(30)
     found = await service.json(FILM)
 
@@ -22,6 +24,17 @@ async def test_a_film_as_it_was_learned_is_normal(service: Any, machine: Any) ->
     assert change["low_95"] < change["percent"] < change["high_95"]
     assert abs(change["percent"]) < 4.0
     assert found["limits"] == {"alert": 0.04, "danger": 0.15}
+
+    machine.run(2, eccentricity_ratio=0.37, oil_temperature_c=46.1)
+    found = await service.json(FILM)
+    condition = found["condition"]
+    assert (condition["operating_state"], condition["is_settled"]) == ("full_load", True)
+    cell = condition["cell"]
+    assert (cell["eccentricity_low"], cell["eccentricity_high"]) == (0.35, 0.4)
+    assert (cell["oil_temperature_low_c"], cell["oil_temperature_high_c"]) == (45.0, 47.5)
+    assert cell["attitude_low_deg"] is None
+    assert found["next_reading"] > found["time"]
+    assert found["next_reading"].endswith("0:00.000Z")  # the next full period
 
 
 async def test_a_softer_film_is_told_with_interval_time_scale_and_cause(
@@ -59,23 +72,6 @@ def require_the_condition_of_each_film(found: dict[str, Any]) -> None:
     assert found["U1:UJB:stiffness_x"]["operating_state"] == "full_load"
     assert found["U1:UJB:stiffness_x"]["cell"]["eccentricity_low"] is not None
     assert {found[id_] for id_ in found if "stiffness" not in id_} == {None}
-
-
-async def test_the_condition_is_told_with_its_cell_and_the_time_of_the_next_reading(
-    service: Any, machine: Any
-) -> None:
-    machine.run(2, eccentricity_ratio=0.37, oil_temperature_c=46.1)
-
-    found = await service.json(FILM)
-
-    condition = found["condition"]
-    assert (condition["operating_state"], condition["is_settled"]) == ("full_load", True)
-    cell = condition["cell"]
-    assert (cell["eccentricity_low"], cell["eccentricity_high"]) == (0.35, 0.4)
-    assert (cell["oil_temperature_low_c"], cell["oil_temperature_high_c"]) == (45.0, 47.5)
-    assert cell["attitude_low_deg"] is None
-    assert found["next_reading"] > found["time"]
-    assert found["next_reading"].endswith("0:00.000Z")  # the next full period
 
 
 async def test_what_is_not_judged_is_never_called_normal_and_says_why(
