@@ -43,12 +43,12 @@ class CuttingProxy:
                 Thread(target=self._pass_on, args=(client,), daemon=True).start()
 
     def _pass_on(self, client: socket.socket) -> None:
-        reached = suppress(OSError)
-        with client, reached, socket.create_connection(("127.0.0.1", self._server)) as server:
-            self._both_ways(client, server)
-
-    def _both_ways(self, client: socket.socket, server: socket.socket) -> None:
-        with selectors.DefaultSelector() as ready:
+        with (
+            client,
+            suppress(OSError),
+            socket.create_connection(("127.0.0.1", self._server)) as server,
+            selectors.DefaultSelector() as ready,
+        ):
             ready.register(client, selectors.EVENT_READ, server)
             ready.register(server, selectors.EVENT_READ, client)
             while True:

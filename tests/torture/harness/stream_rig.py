@@ -4,7 +4,7 @@ import asyncio
 import sqlite3
 import time
 from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from pathlib import Path
 
 import nats
@@ -188,10 +188,9 @@ NUMBERS = ("id", "series", "layout", "seal")
 
 def found_in(database: Path) -> dict[str, list[dict[str, object]]]:
     """Results, gaps and events of alarms, to the last bit; not what clocks of hosts have made."""
-    with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
+    with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
         connection.row_factory = sqlite3.Row
         found = {name: connection.execute(query).fetchall() for name, query in QUERIES.items()}
-    connection.close()
     return {
         name: [{key: row[key] for key in row.keys() if key not in NUMBERS} for row in rows]  # noqa: SIM118
         for name, rows in found.items()
@@ -202,10 +201,9 @@ def positions(database: Path) -> dict[str, int]:
     """How far each unit is on the stream."""
     if not database.exists():
         return {}
-    with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
+    with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
         try:
             rows = connection.execute("SELECT unit, sequence FROM stream_position").fetchall()
         except sqlite3.OperationalError:
             rows = []
-    connection.close()
     return dict(rows)
