@@ -111,14 +111,11 @@ def test_steady_state_under_a_rotating_force_is_the_frequency_response(
         assert np.abs(outputs[rows][:, 600 * 50 :] - expected).max() <= 3e-5 * np.abs(phasor).max()
 
 
-def test_forces_that_do_not_fill_whole_blocks_are_refused() -> None:
+def test_forces_of_uneven_blocks_and_a_rate_of_zero_are_refused() -> None:
     rotor = lift(discrete_rotor(), 32)
     with pytest.raises(ValueError, match=r"\(6, 33\).*32 steps"):
         simulate(rotor, np.zeros(20), np.zeros((6, 33)))
     with pytest.raises(ValueError, match="at least 1 step"):
         lift(discrete_rotor(), 0)
-
-
-def test_a_rate_of_zero_is_refused() -> None:
     with pytest.raises(ValueError, match="above 0 Hz"):
         discretize(MATRICES, np.zeros((10, 2)), np.zeros((12, 20)), 0.0)

@@ -76,9 +76,7 @@ def test_lines_beside_a_strong_tone_are_dropped_and_quiet_distant_ones_kept() ->
     assert not own[104:108].any()
     assert own[115:].all()
     assert own[:85].all()
-
-
-def test_flat_noise_leaks_too_little_to_drop_a_line() -> None:
+    # Flat noise leaks too little to drop a line.
     assert little_leakage(np.ones((341, 2)), 0.005).all()
 
 

@@ -150,13 +150,8 @@ def test_results_say_the_condition_that_they_were_found_under(films: Any) -> Non
     [first], _ = watch.take([films.assessment(10**18, **known)])
     for i in range(1, 62):
         [last], _ = watch.take([films.assessment(10**18 + i * 60 * S, **known)])
-    [blind], _ = watch.take(
-        [
-            films.assessment(
-                10**18 + 4000 * S, **known | {"eccentricity_ratio": missing(Reason.DEAD)}
-            )
-        ]
-    )
+    lost = known | {"eccentricity_ratio": missing(Reason.DEAD)}
+    [blind], _ = watch.take([films.assessment(10**18 + 4000 * S, **lost)])
 
     assert first.condition is not None
     assert last.condition is not None

@@ -180,12 +180,7 @@ TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
         (ECCENTRICITY, "{ alert = -0.7 }", ".alert = -0.7", "than 0"),
         (ECCENTRICITY, '{ alert = 1.0, states = ["x"] }', ".states[1] = 'x'", "'full_load'"),
         (ECCENTRICITY, "{ alert = 0.7, states = [] }", ".states", "least"),
-        (
-            ECCENTRICITY,
-            '{ alert = 0.7, states = ["run_up", "run_up"] }',
-            ".states[2]",
-            "used twice",
-        ),
+        (ECCENTRICITY, '{ alert = 1.0, states = ["run_up", "run_up"] }', ".states[2]", "twice"),
         (ECCENTRICITY, "{ alert = 0.7, latching = 1 }", ".latching = 1", "boolean"),
         (GAP, "{ deadband = 1.0 }", ".alert", "alert_below or danger_below"),
         (GAP, "{ alert_below = 600.0, danger_below = 700.0 }", ".alert_below", "danger_below, 700"),
@@ -196,23 +191,18 @@ TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
             ".deadband = 50",
             "between, 50",
         ),
-        (
-            ZONES,
-            "{ table = [{ a_b = 2.0, b_c = 2.0, c_d = 3.0 }] }",
-            ".table[1].b_c = 2.0",
-            "a_b, 2",
-        ),
-        (
-            ZONES,
-            "{ table = [{ a_b = 1.0, b_c = 2.0, c_d = 1.5 }] }",
-            ".table[1].c_d = 1.5",
-            "b_c, 2",
-        ),
-        (
-            ZONES,
-            "{ table = [{ a_b = 0.0, b_c = 2.0, c_d = 3.0 }] }",
-            ".table[1].a_b = 0.0",
-            "than 0",
+        *(
+            (
+                ZONES,
+                f"{{ table = [{{ a_b = {a}, b_c = 2.0, c_d = {c} }}] }}",
+                f".table[1].{key}",
+                said,
+            )
+            for a, c, key, said in (
+                ("2.0", "3.0", "b_c = 2.0", "a_b, 2"),
+                ("1.0", "1.5", "c_d = 1.5", "b_c, 2"),
+                ("0.0", "3.0", "a_b = 0.0", "than 0"),
+            )
         ),
         (ZONES, f"{{ table = [{{ {TABLE}, deadband = 2.0 }}] }}", ".table[1].deadband", "b_c, 2"),
         (ZONES, f"{{ table = [{{ {TABLE} }}, {{ {TABLE} }}] }}", ".table[2].states[1]", "twice"),
