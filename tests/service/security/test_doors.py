@@ -121,13 +121,18 @@ def test_a_use_is_written_once_a_minute(doors: Doors, access: AccessStore) -> No
 
 
 @pytest.mark.usefixtures("anna")
-def test_logging_out_ends_this_login_and_no_other(doors: Doors) -> None:
+def test_logging_out_ends_this_login_and_no_other_and_a_forged_token_opens_nothing(
+    doors: Doors,
+) -> None:
     here, there = log_in(doors), log_in(doors)
     doors.log_out(here)
     doors.log_out(here)
     doors.log_out("no token")
     assert doors.person(here, T0) is Refusal.UNKNOWN
     assert isinstance(doors.person(there, T0), Identity)
+    for forged in ("", "x", "x" * 43, "ä" * 43, "\ud800" * 43, "' OR 1=1 --", "a" * 9999):
+        assert doors.person(forged, T0) is Refusal.UNKNOWN
+        assert doors.machine(forged, T0) is Refusal.UNKNOWN
 
 
 def test_a_new_password_ends_every_login_of_its_account_alone(
@@ -231,14 +236,6 @@ def test_passwords_tried_all_at_once_are_counted_one_by_one(doors: Doors, anna: 
         )
     n_tried = sum(isinstance(one, NotLoggedIn) and one.wait_s == 0.0 for one in found)
     assert n_tried == OF_ACCOUNT.n_free
-
-
-@pytest.mark.usefixtures("anna")
-def test_a_forged_token_opens_nothing(doors: Doors) -> None:
-    log_in(doors)
-    for token in ("", "x", "x" * 43, "ä" * 43, "\ud800" * 43, "' OR 1=1 --", "a" * 9999):
-        assert doors.person(token, T0) is Refusal.UNKNOWN
-        assert doors.machine(token, T0) is Refusal.UNKNOWN
 
 
 @pytest.mark.usefixtures("anna")

@@ -26,8 +26,5 @@ def test_a_key_for_one_unit_opens_no_other_and_changes_nothing_of_the_plant() ->
     assert key.may(Permission.READ)
     assert not key.may(Permission.CHANGE_MEASURING)
     assert not key.may(Permission.CHANGE_ACCESS, "U1")
-
-
-def test_actions_of_a_key_are_not_taken_for_those_of_an_account_of_its_name() -> None:
-    names = {Identity("anna", Role.VIEWER, means).actor for means in Means}
-    assert names == {"anna", "key:anna"}
+    # actions of a key are not taken for those of an account of its name
+    assert {Identity("anna", Role.VIEWER, means).actor for means in Means} == {"anna", "key:anna"}
