@@ -191,18 +191,23 @@ TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
             ".deadband = 50",
             "between, 50",
         ),
-        *(
-            (
-                ZONES,
-                f"{{ table = [{{ a_b = {a}, b_c = 2.0, c_d = {c} }}] }}",
-                f".table[1].{key}",
-                said,
-            )
-            for a, c, key, said in (
-                ("2.0", "3.0", "b_c = 2.0", "a_b, 2"),
-                ("1.0", "1.5", "c_d = 1.5", "b_c, 2"),
-                ("0.0", "3.0", "a_b = 0.0", "than 0"),
-            )
+        (
+            ZONES,
+            "{ table = [{ a_b = 2.0, b_c = 2.0, c_d = 3.0 }] }",
+            ".table[1].b_c = 2.0",
+            "a_b, 2",
+        ),
+        (
+            ZONES,
+            "{ table = [{ a_b = 1.0, b_c = 2.0, c_d = 1.5 }] }",
+            ".table[1].c_d = 1.5",
+            "b_c, 2",
+        ),
+        (
+            ZONES,
+            "{ table = [{ a_b = 0.0, b_c = 2.0, c_d = 3.0 }] }",
+            ".table[1].a_b = 0.0",
+            "than 0",
         ),
         (ZONES, f"{{ table = [{{ {TABLE}, deadband = 2.0 }}] }}", ".table[1].deadband", "b_c, 2"),
         (ZONES, f"{{ table = [{{ {TABLE} }}, {{ {TABLE} }}] }}", ".table[2].states[1]", "twice"),
