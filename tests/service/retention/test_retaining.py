@@ -108,7 +108,7 @@ async def test_a_clock_that_is_years_ahead_or_less_than_a_day_of_results_makes_n
     assert old.done == []
 
 
-def test_nothing_finer_is_kept_longer_than_what_is_coarser() -> None:
+def test_nothing_finer_is_kept_longer_than_what_is_coarser_and_zero_days_are_for_ever() -> None:
     for wrong in (
         {"readings_days": 10.0, "minutes_days": 9.0},
         {"readings_days": 0.0, "minutes_days": 9.0},
@@ -118,8 +118,5 @@ def test_nothing_finer_is_kept_longer_than_what_is_coarser() -> None:
             RetentionSettings.model_validate(wrong)
     everything = dict.fromkeys(("readings_days", "minutes_days", "ten_minutes_days"), 0.0)
     RetentionSettings.model_validate(everything)
-
-
-def test_zero_days_are_for_ever() -> None:
     found = retention_limits(RetentionSettings(readings_days=1.5, films_days=0.0))
     assert (found.readings_ns, found.films_ns) == (round(1.5 * DAY_NS), None)

@@ -47,15 +47,7 @@ def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(
         SqliteStore(path)
 
 
-def test_a_file_that_is_no_database_is_refused(path: Path) -> None:
-    path.parent.mkdir()
-    path.write_bytes(b"speed;power\n92.3;700\n" * 100)
-
-    with pytest.raises(StoreError, match="file is not a database"):
-        SqliteStore(path)
-
-
-def test_a_truncated_database_is_refused(path: Path) -> None:
+def test_a_truncated_database_and_what_is_none_are_refused(path: Path) -> None:
     store = SqliteStore(path)
     store.append([assessment(at(i), speed_rpm=1.0) for i in range(200)], [])
     store.close()
@@ -65,6 +57,9 @@ def test_a_truncated_database_is_refused(path: Path) -> None:
         path.write_bytes(whole[:n_bytes])
         with pytest.raises(StoreError, match=f"{path}: "):
             SqliteStore(path)
+    path.write_bytes(b"speed;power\n92.3;700\n" * 100)
+    with pytest.raises(StoreError, match="file is not a database"):
+        SqliteStore(path)
 
 
 @pytest.mark.parametrize(("first", "then"), list(itertools.permutations(Origin)))

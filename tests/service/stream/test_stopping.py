@@ -84,7 +84,7 @@ async def test_a_publisher_that_waits_for_the_servers(publisher: Publisher, stre
     publisher.waiting.add("U1", Outgoing("1", b"a block"))
     publisher.waiting.add("U1", Outgoing("2", b"another"))
     pulse = SimpleNamespace(beat=lambda *_: None, rest=lambda: None)
-    task = asyncio.create_task(publisher._send_unit(stream, "U1", pulse))  # type: ignore[arg-type]
+    task = asyncio.create_task(publisher._send_unit(stream, "U1", pulse))
     await require_it_stops(task, stream)
 
 
