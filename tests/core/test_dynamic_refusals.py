@@ -47,21 +47,6 @@ def test_channels_of_different_segments_are_refused(recording: Recording) -> Non
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"band_hz": (0.0, 12.0)}, "band"),
-        ({"quiet_band_hz": (25.0, 15.0)}, "quiet band"),
-        ({"min_segments": 2}, "3 segments"),
-        ({"min_lines": 0}, "at least 1"),
-        ({"n_integrations": 3}, "0, 1 or 2"),
-    ],
-)
-def test_settings_that_mean_nothing_are_refused(wrong: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        replace(DynamicSettings(), **wrong)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
     "stricter",
     [{"min_signal_share": 0.999}, {"max_relative_uncertainty": 1e-4}, {"min_coherence": 0.9999}],
 )

@@ -103,12 +103,3 @@ def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout() -> None:
     assert excitation(clear, runout_um_pk=2.4) is Reason.OK
     assert excitation(clear, runout_um_pk=2.6) is Reason.INSUFFICIENT_EXCITATION
     assert excitation(spectrum(motion(n_segments=1))) is Reason.FEW_SEGMENTS
-
-
-def test_limits_and_brackets_that_mean_nothing_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"coherence.*1\.2"):
-        LineLimits(min_coherence=1.2)
-    with pytest.raises(ValueError, match="runout of -1"):
-        LineLimits(runout_um_pk=-1.0)
-    with pytest.raises(ValueError, match=r"bracket stiffness.*nan"):
-        BracketDynamics(math.nan)

@@ -14,7 +14,6 @@ from core.settings import AnalysisSettings
 from core.speed import SpeedSource
 from core.vector_monitor import VectorMonitor
 from core.vector_rows import VectorPart, VectorRow
-from core.vector_settings import VectorSettings
 
 
 def test_equation_5_is_computed_from_the_amplitudes_of_a_rack(rack) -> None:
@@ -215,9 +214,3 @@ def test_a_block_of_something_else_is_refused(rack) -> None:
         rack((VectorRow("nowhere", VectorPart.GAP),))
     with pytest.raises(ValueError, match="are the same"):
         rack((AMPLITUDES[0], AMPLITUDES[0]))
-
-
-@pytest.mark.parametrize("wrong", [{"hop_polls": 0}, {"hop_polls": 61}, {"min_polls": 1}])
-def test_an_impossible_average_is_refused(wrong) -> None:
-    with pytest.raises(ValueError, match="polls"):
-        VectorSettings(**({"n_polls": 60} | wrong))
