@@ -189,12 +189,9 @@ BO_ 512 NESTED: 8 N
 NESTED_RANGES = "SG_MUL_VAL_ 512 y inner 1-1;\nSG_MUL_VAL_ 512 inner outer 0-0;\n"
 
 
-def test_a_message_that_nobody_asks_for_may_be_multiplexed_twice_over(dbc):
+def test_an_unused_message_may_be_multiplexed_twice_over_but_not_by_billions_of_values(dbc):
     dbc.write_text(DBC + NESTED + NESTED_RANGES, encoding="utf-8")
     compiled(dbc, X)
-
-
-def test_a_multiplexer_of_billions_of_values_is_refused_before_it_fills_the_memory(dbc):
     ranges = NESTED_RANGES.replace("1-1", "1-1, 3-4000000000")
     dbc.write_text(DBC + NESTED + ranges, encoding="utf-8")
     with pytest.raises(ConfigError, match="have 3999999997 values, at most 100000"):

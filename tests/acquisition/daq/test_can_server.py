@@ -143,13 +143,3 @@ def test_a_feed_that_does_not_fit_the_shape_is_refused(counting_feed):
         CanDevice(counting_feed(n_channels=3), SHAPE)
     with pytest.raises(ConfigError, match=r'need the profile "padwatch_int16", not "padwatch_f'):
         CanDevice(counting_feed(), replace(SHAPE, floats=True))
-
-
-async def test_a_link_to_a_terminal_stays_when_its_number_changes(tmp_path, device):
-    link = tmp_path / "adapter"
-    async with SlcanPtyServer(device, link=link) as server:
-        assert server.endpoint == {"interface": "slcan", "channel": str(link)}
-        assert link.exists()
-        server.inject("cut")
-        assert link.exists()
-    assert not link.is_symlink()

@@ -1,15 +1,22 @@
-"""Devices that keep no connection: closed after each reply, after a rest, or one for everybody."""
+"""Connections: kept, closed after each reply, closed by the other end, or left at a stop."""
 
 import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 from rigs.hostile_modbus import HostileServer
 from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.identity import ExpectedIdentification
+from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
-from acquisition.modbus.transport import ConnectionUse, TcpTransport
+from acquisition.modbus.transport import ConnectionUse, LinkSettings, TcpTransport
 from acquisition.registers.cells import Cell
 from acquisition.registers.register_map import Signature
 
@@ -75,3 +82,64 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
             device.image.put(Cell(address=1), 43)
         with pytest.raises(ConfigError, match=r"another device"):
             await anext(stream)
+
+
+@pytest.mark.parametrize("done", ["a reply", "a connection"])
+async def test_what_is_done_with_the_stop_does_not_undo_it(done, counting_feed, link_to):
+    async with ModbusRingServer(RingDevice(counting_feed())) as server:
+        link = link_to(server.port)
+        if done == "a reply":
+            await link.open()
+            stopped = asyncio.create_task(link.read(0, 16))
+            judge = link._connection._framer.handleFrame
+
+            def stop_and_judge(*arguments):
+                stopped.cancel()
+                return judge(*arguments)
+
+            link._connection._framer.handleFrame = stop_and_judge
+        else:
+            stopped = asyncio.create_task(link.open())
+            create = link._connection._client.ctx.call_create
+
+            async def create_and_stop():
+                made = await create()
+                stopped.cancel()
+                return made
+
+            link._connection._client.ctx.call_create = create_and_stop
+        await asyncio.wait([stopped], timeout=30)
+        assert stopped.cancelled()
+        link.close()
+
+
+N_TRIES = 200
+
+
+@pytest.fixture
+def port() -> Iterator[int]:
+    """In a thread of its own: closed before the client has written anything."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def hang_up() -> None:
+            with suppress(OSError):
+                while True:
+                    server.accept()[0].close()
+
+        thread = threading.Thread(target=hang_up)
+        thread.start()
+        yield server.getsockname()[1]
+        server.shutdown(socket.SHUT_RDWR)
+        thread.join()
+
+
+async def test_it_is_a_lost_link_each_time_and_nothing_else(port: int) -> None:
+    settings = LinkSettings(
+        transport=TcpTransport(host="127.0.0.1", port=port),
+        identity=ExpectedIdentification(vendor="any"),
+    )
+    for _ in range(N_TRIES):
+        link = ModbusLink(settings)
+        with pytest.raises(LinkError, match=r"closed the connection|reset by peer"):
+            await link.open()
+        link.close()

@@ -7,8 +7,11 @@ import pytest
 from rigs.hostile_sources import KINDS, Trial, lies_to
 from rigs.wrong_replies import COMMON, CONTENTS
 
-FEW, MANY = 4, 100
-N_AT_ONCE = 20
+FEW = 4
+MANY = {"tcp": 100, "rtu": 20}
+N_AT_ONCE = {"tcp": 20, "rtu": 5}
+"""A line tells a wrong reply by its time-out only, and many lines together outlast it."""
+
 OF_RIGHT_FORM = [
     COMMON["fewer registers"],  # a queue may be that short
     *(make for lies in CONTENTS.values() for make in lies.values()),
@@ -26,7 +29,7 @@ def cases() -> list:
             lied_to = [source for source in sources if name in lies_to(wire, source)]
             for source in lied_to:
                 case, id_ = (KINDS[wire, source], make), f"{source} over {wire}: {name}"
-                long.append(pytest.param(*case, MANY, marks=pytest.mark.long, id=id_))
+                long.append(pytest.param(*case, MANY[wire], marks=pytest.mark.long, id=id_))
                 if source == lied_to[n % len(lied_to)]:
                     fast.append(pytest.param(*case, FEW, id=f"{id_}, a few"))
     return fast + long
@@ -36,7 +39,7 @@ def cases() -> list:
 async def test_no_wrong_reply_becomes_a_sample(
     kind, make, n_contents, counting_feed, counts_calibration, clock_of_its_own
 ):
-    n_trials = min(n_contents, N_AT_ONCE)
+    n_trials = min(n_contents, N_AT_ONCE[kind.link])
     async with AsyncExitStack() as plant:
         trials = []
         for seed in range(n_trials):

@@ -5,6 +5,7 @@ import pytest
 from rigs.polled import map_of, take
 
 from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.ticks import Ticks
 from acquisition.registers.cells import Cell, NumberType
 from acquisition.registers.device_time import EpochTime
 from acquisition.registers.register_map import Signature
@@ -134,3 +135,29 @@ async def test_what_cannot_work_is_refused_before_anything_is_sent(
     with pytest.raises(ConfigError, match=said):
         async with plant(map_of(), read_as=map_of(**registers), **settings):
             pass
+
+
+async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(stepped_clock) -> None:
+    ticks = Ticks(stepped_clock, 60.0)
+    stepped_clock.step(7.0)
+    started_s = stepped_clock.now_ns() // 10**9
+
+    assert [await ticks.next() for _ in range(3)] == [0, 1, 2]
+    assert stepped_clock.monotonic_s() == 7.0 + 120.0
+    assert ticks.epoch == started_s
+    stepped_clock.step(192.0)  # what a slow reply has missed is left out
+    assert await ticks.next() == 6
+    assert stepped_clock.monotonic_s() == 7.0 + 360.0
+    assert await ticks.next() == 7
+
+
+async def test_a_machine_that_was_suspended_while_waiting_says_the_true_tick(stepped_clock) -> None:
+    ticks = Ticks(stepped_clock, 1.0)
+    await ticks.next()
+    asleep = stepped_clock.sleep
+
+    async def oversleep(duration_s: float) -> None:
+        await asleep(duration_s + 10.5)
+
+    stepped_clock.sleep = oversleep
+    assert await ticks.next() == 11

@@ -107,18 +107,14 @@ def test_a_slot_of_zeros_is_blank_and_a_written_one_is_not():
         assert not decode_slot(encode_slot(first, layout), layout).blank
 
 
-def test_samples_of_version_1_lie_channel_by_channel_behind_ten_registers():
-    counts = np.arange(12, dtype=np.int16).reshape(3, 4)
-    slot = Slot(0x0001_0002, 0x0003_0004, 5, 6, 0b101, counts, 0x0002)
-    words = np.frombuffer(encode_slot(slot, V1), ">u2")
-    assert words.tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, *range(12), 2]
-
-
-def test_a_slot_of_version_2_has_epoch_and_slow_values_before_and_a_checksum_behind_the_samples():
+def test_samples_lie_behind_ten_registers_or_epoch_and_slow_values_and_before_a_checksum():
+    """Channel by channel; only version 2 has epoch, slow values and checksum in its slots."""
     counts = np.arange(12, dtype=np.int16).reshape(3, 4)
     slot = Slot(
         0x0001_0002, 0x0003_0004, 5, 6, 0b101, counts, 2, epoch=0x0007_0008, slow=(1.0, 2.0)
     )
+    words = np.frombuffer(encode_slot(slot, V1), ">u2")
+    assert words.tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, *range(12), 2]
     data = encode_slot(slot, V2)
     words = np.frombuffer(data, ">u2")
     assert words[:12].tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, 7, 8]

@@ -1,7 +1,7 @@
 """Slow values of another device join waveforms, and losing that device loses no waveform."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 
 import numpy as np
@@ -19,6 +19,7 @@ from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.transport import TcpTransport
 from acquisition.registers.cells import Cell, NumberType
 from acquisition.registers.register_map import MapValue, RegisterMap
+from acquisition.source import refused_frames_of
 from core.blocks import SampleBlock
 from core.quality import GOOD, Level, Reading, Reason
 
@@ -44,6 +45,12 @@ class Waves:
             )
             n += 1
             await asyncio.sleep(0)
+
+
+class Bus(Waves):
+    """A source that refuses frames."""
+
+    refused_frames: Mapping[str, int] = {"duplicate": 2}
 
 
 class PollingClock:
@@ -185,6 +192,14 @@ async def test_a_bug_in_the_background_is_not_swallowed(plant, monkeypatch) -> N
         with pytest.raises(ZeroDivisionError):
             async with source.connect():
                 pass
+
+
+async def test_a_bus_reports_refused_frames_also_behind_slow_values(plant) -> None:
+    async with plant() as (waves, slow, *_):
+        assert refused_frames_of(Bus()) == {"duplicate": 2}
+        assert refused_frames_of(JoinedSource(Bus(), slow)) == {"duplicate": 2}
+        assert refused_frames_of(Waves()) == {}
+        assert refused_frames_of(waves) == {}
 
 
 def test_a_calibration_is_divided_between_the_two_devices(counts_calibration) -> None:

@@ -21,7 +21,6 @@ from acquisition.raw import RawBlock
 from acquisition.recording.inversion import raw_of
 from acquisition.recording.manifest import RecordedUnit
 from core.arrays import CountArray, SampleArray
-from core.quality import Reason
 
 Numbered = Callable[..., RawBlock]
 EVERY_COUNT = np.arange(-32768, 32768, dtype=np.int16)
@@ -58,15 +57,6 @@ def test_what_was_judged_is_judged_the_same_again(
     assert again.channel_quality == block.channel_quality
     assert again.slow == block.slow
     assert again.samples.tobytes() == block.samples.tobytes()
-
-
-def test_a_slow_value_out_of_range_stays_out_of_range(
-    unit: RecordedUnit, numbered: Numbered
-) -> None:
-    block = calibrate(numbered(0, 5, slow=(-20.0, math.inf)), unit.calibration)
-    again = calibrate(raw_of(block, unit.calibration), unit.calibration)
-    assert again.slow["slow0"].quality.reason is Reason.OUT_OF_RANGE
-    assert again.slow["slow1"].quality.reason is Reason.NOT_MEASURED
 
 
 @pytest.mark.parametrize("wrong", [0.5, math.nan, math.inf, 1e6])

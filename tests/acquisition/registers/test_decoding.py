@@ -52,16 +52,6 @@ def test_every_type_comes_back_from_every_byte_order(type_: str, order: str) -> 
     assert one(MapValue(id="v", cell=cell), registers_of(number, type_, order)) == (number, 0)
 
 
-@pytest.mark.parametrize(
-    ("order", "content"),
-    [("ABCD", "42f6e979"), ("CDAB", "e97942f6"), ("BADC", "f64279e9"), ("DCBA", "79e9f642")],
-)
-def test_a_known_float_is_found_in_the_byte_orders_of_the_manuals(order, content) -> None:
-    cell = Cell(address=7, type=NumberType.FLOAT32, byte_order=ByteOrder(order))
-
-    assert one(MapValue(id="v", cell=cell), bytes.fromhex(content))[0] == pytest.approx(123.456)
-
-
 SKF = MapValue(
     id="v",
     cell=Cell(address=609, type=NumberType.INT16),

@@ -1,5 +1,6 @@
 """Every Modbus source on a device that lies, over TCP and on a serial line."""
 
+import asyncio
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +24,11 @@ from rigs.wrong_replies import (
 )
 
 MAX_HONEST = 5
+MAX_CONNECTIONS = 100
+"""Several times as many as a trial needs where a busy machine outlasts some time-outs."""
+
+PATIENCE_S = 60.0
+"""For one connection, which ends by itself in seconds."""
 
 
 class _Lying:
@@ -70,7 +76,7 @@ class Trial:
     def __init__(self, rig, seed: int) -> None:
         self._rig = rig
         self._random = np.random.default_rng(seed)
-        self.n_told = self.n_refused = 0
+        self.n_told = self.n_refused = self.n_connections = 0
         self.blocks: list = []
 
     async def lie(self, make: Callable[[Words], list], n_lies: int) -> None:
@@ -95,8 +101,10 @@ class Trial:
 
     async def _read(self) -> None:
         """Read until the lie has been told, one block more, and what is kept for the reader."""
+        self.n_connections += 1
+        assert self.n_connections <= MAX_CONNECTIONS, f"{self.n_told} lies told, then no way on"
         n_more = 2
-        async with self._rig.source.connect() as stream:
+        async with asyncio.timeout(PATIENCE_S), self._rig.source.connect() as stream:
             self._rig.run(self._rig.step_samples)
             async for block in stream:
                 self.blocks.append(block)

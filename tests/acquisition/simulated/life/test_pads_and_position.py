@@ -3,11 +3,17 @@
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from acquisition.simulated.life.films import even_setting, film_course
 from acquisition.simulated.life.life_bearing import LIFE_UJB
 from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.order1 import order1_um_pk
 from acquisition.simulated.life.thermal import ThermalCourse
+from acquisition.simulated.life.wander import lagged, wander
+from core.rotor import bearing_response, forward_force, rotor_matrices
+from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
+from core.tilting_pad import FilmColumns
 
 Life = Callable[..., UnitLife]
 
@@ -48,3 +54,43 @@ def test_warm_clearance_wanders_by_micrometres_for_no_reason_that_is_measured(
         warm_um = clearance_um[clearance_um < np.median(clearance_um)]
         # half of a normal distribution: 0.6 times its standard deviation, here 1 µm
         assert 0.3 < np.std(warm_um) < 1.2
+
+
+def test_eliminated_brackets_change_no_amplitude_and_no_phase() -> None:
+    random = np.random.default_rng(3)
+    rotor, n = RotorParameters(), 5
+    films = {
+        b.bearing: FilmColumns(*(s * random.uniform(0.2e9, 2e9, n) for s in (1.0, 0.2, 1.0)))
+        for b in rotor.brackets
+    }
+    grade_mm_s = random.uniform(0.5, 4.0, n)
+    sound = {b.bearing: np.ones(n) for b in rotor.brackets}
+
+    found = order1_um_pk(films, sound, 90.9, grade_mm_s, rotor)
+
+    for row in range(n):
+        at_row = {name: film.at(row) for name, film in films.items()}
+        force_n = unbalance_force_n(float(grade_mm_s[row]), 90.9)
+        force = forward_force(rotor, ForcePlane.MASS_CENTRE, force_n)
+        matrices = rotor_matrices(rotor, at_row, 90.9)
+        expected = bearing_response(rotor, matrices, 90.9 / 60.0, force)
+        for name, phasors in expected.items():
+            np.testing.assert_allclose(found[name][:, row], 1e6 * phasors, rtol=1e-9)
+
+
+def test_wander_has_its_size_from_the_beginning_and_forgets_in_its_time() -> None:
+    first = [wander(np.random.default_rng(i), 2, 1.0, 1e6, 1.0)[0] for i in range(2000)]
+    assert np.std(first) == pytest.approx(1.0, rel=0.1)
+    steps = wander(np.random.default_rng(1), 400_000, 600.0, 6000.0, 2.0)
+
+    assert np.std(steps) == pytest.approx(2.0, rel=0.05)
+    after_ten = np.corrcoef(steps[:-10], steps[10:])[0, 1]
+    assert after_ten == pytest.approx(np.exp(-1.0), abs=0.03)
+
+
+def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slower() -> None:
+    time_s = np.repeat([1000.0, 10_000.0], 10)
+    followed = lagged(np.repeat([1.0, 0.0], 10), time_s, 100.0, 0.0)
+
+    assert followed[9] == pytest.approx(1.0 - np.exp(-1.0))
+    assert followed[19] == pytest.approx(followed[9] * np.exp(-0.1))
