@@ -20,15 +20,9 @@ MILLION = 10**6
 
 def at(index: int, late_s: float = 0.0, epoch: int = 7, n: int = 60) -> SampleBlock:
     """Samples of a device that counts from T0 on, or by so much later."""
-    return SampleBlock(
-        unit="U1",
-        epoch=epoch,
-        first_index=index,
-        start_ns=T0 + round((index / RATE_HZ + late_s) * NS_PER_S),
-        rate_hz=RATE_HZ,
-        samples=np.zeros((4, n), dtype=np.float32),
-        channel_quality=(GOOD,) * 4,
-    )
+    start_ns = T0 + round((index / RATE_HZ + late_s) * NS_PER_S)
+    samples = np.zeros((4, n), dtype=np.float32)
+    return SampleBlock("U1", epoch, index, start_ns, RATE_HZ, samples, (GOOD,) * 4)
 
 
 def place(block: SampleBlock) -> tuple[int, int, int]:

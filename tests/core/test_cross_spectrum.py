@@ -51,16 +51,15 @@ def test_amplitudes_that_are_compared_come_from_the_same_segments() -> None:
     assert spectrum.amplitude_um_pk(0)[0] == pytest.approx(np.sqrt((4 + 4 + 400 + 400) / 4))
 
 
-def test_coherence_is_one_for_a_common_cause_and_small_for_none(phasors: np.ndarray) -> None:
+def test_coherence_is_one_for_a_common_cause_small_for_none_and_zero_for_nothing(
+    phasors: np.ndarray,
+) -> None:
     usable = np.ones((9, 4), dtype=bool)
     common = phasors.copy()
     common[:, 1] = (0.3 + 0.4j) * common[:, 0]
     spectrum = average(FREQUENCY_HZ, common, usable)
     np.testing.assert_allclose(spectrum.coherence(0, 1), 1.0)
     assert np.all(spectrum.coherence(0, 2) < 0.6)
-
-
-def test_nothing_usable_is_zero_segments_not_a_division_by_zero(phasors: np.ndarray) -> None:
     spectrum = average(FREQUENCY_HZ, phasors, np.zeros((9, 4), dtype=bool))
     assert not spectrum.n_segments.any()
     assert not spectrum.coherence(0, 2).any()

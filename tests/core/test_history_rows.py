@@ -34,16 +34,13 @@ def columns(n: int = 6) -> dict[str, Any]:
     }
 
 
-def test_every_row_finds_its_bearing_direction_and_time() -> None:
+def test_every_row_finds_its_place_and_a_direction_without_a_row_has_no_number() -> None:
     found = histories_from_columns(columns(), PLACES)
     assert set(found) == PLACES
     assert np.exp(found["U2", "UJB"].history.ln_k) == pytest.approx(
         1e9 + np.array([[6 * time + 4 + side for time in range(6)] for side in (0, 1)])
     )
     assert found["U1", "LJB"].history.oil_temperature_c.tolist() == [40 + t for t in range(6)]
-
-
-def test_a_direction_without_a_row_has_no_number() -> None:
     rows = {key: column[:-1] for key, column in columns().items()}
     history = histories_from_columns(rows)["U2", "UJB"].history
     assert np.isnan(history.ln_k[1, -1])
@@ -88,14 +85,11 @@ def test_a_wrong_row_is_refused_with_its_line(key: str, row: int, value: object,
         histories_from_columns(rows, PLACES)
 
 
-def test_a_refusal_names_no_more_than_a_few_lines() -> None:
+def test_many_or_missing_or_unknown_or_uneven_columns_are_refused_briefly() -> None:
     rows = columns()
     rows["quality"] = ["fine"] * len(rows["unit"])
     with pytest.raises(ValueError, match=r"line 11: .*; and 26 more"):
         histories_from_columns(rows)
-
-
-def test_missing_unknown_and_uneven_columns_are_refused() -> None:
     rows = columns()
     with pytest.raises(ValueError, match="missing columns: unit, u_random"):
         histories_from_columns({k: c for k, c in rows.items() if k not in ("unit", "u_random")})

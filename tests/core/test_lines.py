@@ -18,11 +18,8 @@ from core.settings import AnalysisSettings
 RATE_HZ = 600.0
 
 
-def test_the_taper_is_the_one_of_scipy() -> None:
+def test_the_taper_is_the_one_of_scipy_and_phasors_on_a_bin_are_the_transform_there() -> None:
     np.testing.assert_allclose(hann(8192), signal.get_window("hann", 8192), atol=1e-15)
-
-
-def test_exact_phasors_on_a_bin_are_the_transform_there() -> None:
     samples = tapered(np.random.default_rng(2).normal(size=(2, 1024)))
     frequency_hz = np.array([3, 10, 77]) * RATE_HZ / 1024
     exact = exact_phasors(samples, RATE_HZ, frequency_hz)

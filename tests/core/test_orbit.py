@@ -100,12 +100,18 @@ def pulses(turns: FloatArray) -> FloatArray:
     return np.where(turns % 1.0 < 0.02, 5.0, 0.0)
 
 
-def test_marks_lie_where_the_pulses_begin() -> None:
+def test_marks_lie_where_the_pulses_begin_and_a_shaft_at_rest_makes_none() -> None:
     marks = marks_of(pulses(TURN_HZ * T + 0.25))
 
     expected = (np.arange(1, marks.size + 1) - 0.25) / TURN_HZ * RATE_HZ
     assert marks.size == 31
     assert np.max(np.abs(marks - expected)) <= 1.0
+
+    noise = np.random.default_rng(2).normal(0.0, 0.01, T.size)
+
+    assert marks_of(noise).size == 0
+    assert marks_of(np.full(100, np.nan)).size == 0
+    assert marks_of(np.zeros(100)).size == 0
 
 
 def test_marks_before_and_behind_a_hole_stay_where_they_are() -> None:
@@ -116,11 +122,3 @@ def test_marks_before_and_behind_a_hole_stay_where_they_are() -> None:
     left = marks_of(signal)
 
     assert left.tolist() == [at for at in whole if not 3999.0 < at < 5000.0]
-
-
-def test_a_shaft_at_rest_makes_no_marks() -> None:
-    noise = np.random.default_rng(2).normal(0.0, 0.01, T.size)
-
-    assert marks_of(noise).size == 0
-    assert marks_of(np.full(100, np.nan)).size == 0
-    assert marks_of(np.zeros(100)).size == 0

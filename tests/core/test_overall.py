@@ -63,15 +63,15 @@ def velocity(unit: Unit, measure: Measure) -> Callable[..., float | None]:
     return read
 
 
-def test_a_shaft_is_measured_from_peak_to_peak_whatever_its_frequencies(measure: Measure) -> None:
+def test_a_shaft_is_measured_from_peak_to_peak_and_by_its_farthest_excursion(
+    measure: Measure,
+) -> None:
     both = tone(60.0, TURN_HZ) + tone(15.0, 3 * TURN_HZ)
     found = measure(2000.0 + both, 2000.0 + tone(40.0, 7.3), 0 * TIME_S, 0 * TIME_S)
 
     assert found["overall_shaft_x_um_pp"].value == pytest.approx(150.0, rel=2e-3)
     assert found["overall_shaft_y_um_pp"].value == pytest.approx(80.0, rel=2e-3)
 
-
-def test_the_farthest_excursion_is_that_of_the_orbit_not_of_an_axis(measure: Measure) -> None:
     slanted = tone(60.0, TURN_HZ)
     found = measure(2000.0 + slanted, 1900.0 + slanted, 0 * TIME_S, 0 * TIME_S)
 
@@ -93,19 +93,15 @@ def test_a_bearing_has_the_same_velocity_whatever_measures_it(
     assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
 
 
-def test_the_power_of_noise_is_neither_gained_nor_lost(velocity: Callable[..., float]) -> None:
+def test_velocity_has_the_power_of_its_band_after_what_the_transducer_takes_away(
+    velocity: Callable[..., float],
+) -> None:
     noise = np.random.default_rng(4).normal(size=N)  # mm/s, white up to 300 Hz
     assert velocity(noise, Measurand.VELOCITY_MM_S) == pytest.approx(1.0, rel=0.03)
-
-
-def test_what_a_transducer_takes_away_is_given_back(velocity: Callable[..., float]) -> None:
     corner = HighPass(0.5)
     passed = abs(complex(corner.at(np.array([TURN_HZ]))[0]))
     found = velocity(tone(3.0 * passed, TURN_HZ), Measurand.VELOCITY_MM_S, corner)
     assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=5e-3)
-
-
-def test_what_lies_outside_the_band_is_not_counted(velocity: Callable[..., float]) -> None:
     signal = tone(3.0, 20.0) + tone(9.0, 200.0)
     found = velocity(signal, Measurand.VELOCITY_MM_S, velocity_high_hz=100.0)
     assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)

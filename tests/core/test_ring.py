@@ -61,7 +61,7 @@ def test_every_offered_sample_is_stored_flagged_missing_or_rejected(
     assert account.n_stored == 1 + good_samples
 
 
-def test_a_gap_is_exact_and_nothing_is_read_across_it() -> None:
+def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted() -> None:
     ring = Ring(2, CAPACITY)
     ring.write(block(100, 10))
     assert ring.write(block(117, 5)) == Gap(1, 110, 7, 117 * 10**7)
@@ -69,9 +69,6 @@ def test_a_gap_is_exact_and_nothing_is_read_across_it() -> None:
     assert not ring.holds(109, 122)
     with pytest.raises(LookupError, match="109 to 122"):
         ring.read(109, 122)
-
-
-def test_repeated_samples_are_dropped_and_counted() -> None:
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
     ring.write(block(0, 10))

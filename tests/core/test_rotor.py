@@ -15,7 +15,7 @@ FILMS = {
 ISOTROPIC = {name: Film.proportional(1.0e9, 1.0e9) for name in FILMS}
 
 
-def test_mass_and_stiffness_are_symmetric_when_the_films_are() -> None:
+def test_mass_and_stiffness_are_symmetric_and_gyroscopic_coupling_does_no_work() -> None:
     films = FILMS | {"UJB": Film.proportional(3.33e9, 1.11e9, -0.33e9)}
     matrices = rotor_matrices(PARAMETERS, films, 92.3)
 
@@ -24,8 +24,6 @@ def test_mass_and_stiffness_are_symmetric_when_the_films_are() -> None:
     assert np.linalg.eigvalsh(matrices.mass).min() > 0.0
     assert np.linalg.eigvalsh(matrices.stiffness).min() > 0.0
 
-
-def test_gyroscopic_coupling_does_no_work() -> None:
     gyroscopic = rotor_matrices(PARAMETERS, FILMS, 92.3).gyroscopic
 
     assert np.array_equal(gyroscopic, -gyroscopic.T)

@@ -28,13 +28,10 @@ def judged(samples: npt.NDArray[np.floating], turning: bool = True) -> Quality:
     return signal_quality(rms, float(counts.mean()), MM_S_PER_COUNT, turning, DEFAULT_LIMITS)
 
 
-def test_a_healthy_channel_moves_by_more_than_a_count() -> None:
+def test_a_healthy_channel_moves_by_more_than_a_count_a_stuck_or_dead_one_does_not() -> None:
     time_s = np.arange(N_SAMPLES) / 600.0
     assert judged(0.002 * np.sin(2 * np.pi * 1.538 * time_s)) == GOOD
     assert judged(0.001 * RANDOM.standard_normal(N_SAMPLES)) == GOOD
-
-
-def test_a_channel_that_flickers_by_a_count_is_stuck_and_one_at_zero_volts_is_dead() -> None:
     flicker = MM_S_PER_COUNT * RANDOM.integers(-1, 2, N_SAMPLES)
     assert judged(flicker + 0.5) == bad(Reason.STUCK)
     assert judged(flicker) == bad(Reason.DEAD)
@@ -113,15 +110,12 @@ STILL = np.full(24, 92.3)
 FULL = np.full(24, 700.0)
 
 
-def test_ordinary_wander_of_speed_and_load_is_stationary() -> None:
+def test_ordinary_wander_is_stationary_and_a_load_change_or_a_run_down_is_not() -> None:
     swing = np.sin(np.arange(24.0))
     assert stationarity(92.3 * (1 + 0.003 * swing), FULL + 8 * swing, DEFAULT_LIMITS) == GOOD
     assert stationarity(STILL, 2.0 * swing, DEFAULT_LIMITS) == GOOD
     assert stationarity(np.full(24, math.nan), np.full(24, math.nan), DEFAULT_LIMITS) == GOOD
     assert stationarity(np.array([]), np.array([]), DEFAULT_LIMITS) == GOOD
-
-
-def test_a_load_change_or_a_run_down_is_not_stationary() -> None:
     moved = uncertain(Reason.NON_STATIONARY)
     assert stationarity(STILL, np.linspace(320.0, 400.0, 24), DEFAULT_LIMITS) == moved
     assert stationarity(np.linspace(92.3, 80.0, 24), FULL, DEFAULT_LIMITS) == moved

@@ -91,28 +91,27 @@ def test_stiffness_is_how_the_force_grows() -> None:
     np.testing.assert_allclose(np.column_stack([by_x, by_y]), found.stiffness_n_per_m, rtol=1e-6)
 
 
-def test_damping_is_that_of_the_paper() -> None:
+def test_damping_is_that_of_the_paper_until_the_shaft_would_touch_a_pad() -> None:
     found = film(RING, 0.4, 20.0).at(0)
 
     np.testing.assert_allclose(found.damping_n_s_per_m, 0.0125 * found.stiffness_n_per_m)
 
-
-def test_a_shaft_that_would_touch_a_pad_is_refused() -> None:
     with pytest.raises(ValueError, match="touches a pad"):
         film(RING, 1.1, 11.25)
 
 
-def test_the_oil_has_the_viscosities_of_table_1_at_both_temperatures() -> None:
+def test_the_oil_has_the_viscosities_of_table_1_and_gets_thinner_as_it_warms() -> None:
     at_both = Oil().viscosity_pa_s(np.array([40.0, 100.0]))
 
     np.testing.assert_allclose(at_both, [0.047, 0.0068], rtol=1e-9)
 
-
-def test_oil_gets_thinner_as_it_warms_and_ever_more_slowly() -> None:
     steps = np.diff(Oil().viscosity_pa_s(np.arange(0.0, 110.0)))
 
     assert np.all(steps < 0.0)
     assert np.all(np.diff(steps) > 0.0)
+
+    with pytest.raises(ValueError, match=r"0\.05 Pa·s.*0\.047 Pa·s"):
+        Oil(viscosity_100_pa_s=0.05)
 
 
 def test_an_oil_of_class_46_is_as_thick_when_cool_as_its_viscosity_index_says() -> None:
@@ -123,8 +122,3 @@ def test_an_oil_of_class_46_is_as_thick_when_cool_as_its_viscosity_index_says() 
     kinematic = oil.viscosity_pa_s(np.array(20.0)) / oil.density_kg_per_m3(np.array(20.0))
 
     assert float(kinematic) * 1e6 == pytest.approx(137.0, rel=0.05)
-
-
-def test_an_oil_that_is_thicker_when_hot_is_refused_with_both_values() -> None:
-    with pytest.raises(ValueError, match=r"0\.05 Pa·s.*0\.047 Pa·s"):
-        Oil(viscosity_100_pa_s=0.05)

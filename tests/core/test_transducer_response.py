@@ -46,15 +46,13 @@ def test_responses_at_their_own_frequency(
     assert math.degrees(cmath.phase(factor)) == pytest.approx(phase_deg)
 
 
-def test_responses_are_one_where_the_transducer_is_made_for() -> None:
+def test_responses_are_one_where_the_transducer_is_made_for_and_a_chain_multiplies_them() -> None:
     far_above, far_below = np.array([500.0]), np.array([0.05])
 
     assert HighPass(0.5).at(far_above)[0] == pytest.approx(1.0, abs=1e-3)
     assert HighPass(0.5, 2).at(far_above)[0] == pytest.approx(1.0, abs=2e-3)
     assert Resonance(500.0, 0.1).at(far_below)[0] == pytest.approx(1.0, abs=1e-4)
 
-
-def test_a_chain_multiplies_what_its_parts_do() -> None:
     product = HighPass(0.5).at(FREQUENCY_HZ) * Resonance(60.0, 0.1).at(FREQUENCY_HZ)
 
     chain = ResponseChain((HighPass(0.5), ResponseChain((Resonance(60.0, 0.1),))))

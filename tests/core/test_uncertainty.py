@@ -12,12 +12,9 @@ from core.transfer import line_transfer
 from core.uncertainty import BearingAccuracy, Budget, coverage_factor, random_line, systematic_line
 
 
-def test_a_half_width_counts_as_a_uniform_distribution() -> None:
+def test_random_and_systematic_half_widths_stay_apart_and_combine_by_squares() -> None:
     assert systematic_line("gain", 0.05, 100.0).contribution == pytest.approx(5.0 / math.sqrt(3.0))
     assert random_line("statistics", 3.0).contribution == 3.0
-
-
-def test_random_and_systematic_stay_apart_and_combine_by_squares() -> None:
     a = systematic_line("a", 4.0 * math.sqrt(3.0), -1.0)
     b = systematic_line("b", 12.0 * math.sqrt(3.0), 1.0)
     budget = Budget(100.0, (random_line("statistics", 3.0), a, b))
@@ -26,6 +23,7 @@ def test_random_and_systematic_stay_apart_and_combine_by_squares() -> None:
     assert budget.combined == pytest.approx(13.0)
     assert budget.interval == pytest.approx((100.0 - 1.95996 * 13.0, 100.0 + 1.95996 * 13.0))
     assert budget.random_interval == pytest.approx((100.0 - 1.95996 * 3.0, 100.0 + 1.95996 * 3.0))
+    assert Budget(5.0, ()).interval == (5.0, 5.0)
 
 
 def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table() -> None:
@@ -38,10 +36,6 @@ def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table() -> Non
     assert coverage_factor(example) == pytest.approx(2.093, abs=0.003)
     mixed = [random_line("a", 1.0, 6.0), systematic_line("b", 10.0, 1.0)]
     assert coverage_factor(mixed) == pytest.approx(1.96, abs=0.01)
-
-
-def test_nothing_uncertain_is_an_interval_of_no_width() -> None:
-    assert Budget(5.0, ()).interval == (5.0, 5.0)
 
 
 SHAFT_UM_PK = 1.45  # root mean square of 50 phasors of variance 2
@@ -62,17 +56,14 @@ def at_line() -> tuple[Budget, Budget]:
     return ratio, transfer_budgets(transfer, accuracy, runout_um_pk=0.1)[0]
 
 
-def test_each_estimator_names_what_reaches_it(at_line: tuple[Budget, Budget]) -> None:
+def test_each_estimator_names_what_reaches_it_and_gains_limit_a_well_excited_line(
+    at_line: tuple[Budget, Budget],
+) -> None:
     ratio, transfer = ({line.name for line in budget.lines} for budget in at_line)
     common = {"spectral statistics", "gain of shaft probe", "gain of bearing transducer"}
     common |= {"bracket stiffness", "runout"}
     assert transfer == common
     assert ratio == common | {"incoherent motion", "bracket inertia left out"}
-
-
-def test_gains_and_bracket_are_what_limits_a_well_excited_line(
-    at_line: tuple[Budget, Budget],
-) -> None:
     for budget in at_line:
         lines = {line.name: line.contribution / budget.value for line in budget.lines}
         assert lines["gain of shaft probe"] == pytest.approx(0.05 / math.sqrt(3.0))

@@ -32,15 +32,13 @@ def test_no_used_line_is_within_the_guard_of_any_harmonic(speed_rpm: float) -> N
     np.testing.assert_array_equal(used, nearest > 3.0 * BIN_HZ)
 
 
-def test_the_guard_of_a_harmonic_follows_the_speed_as_it_wanders() -> None:
+def test_the_guard_of_a_harmonic_follows_the_speed_as_it_wanders_until_nothing_is_left() -> None:
     wandering = between_harmonics(FREQUENCY_HZ, (1.53, 1.55), 3.0)
 
     for speed_hz in np.linspace(1.53, 1.55, 41):
         steady = between_harmonics(FREQUENCY_HZ, (speed_hz, speed_hz), 3.0)
         assert not np.any(wandering & ~steady)
 
-
-def test_a_speed_that_wanders_more_than_harmonics_are_apart_leaves_nothing_there() -> None:
     used = between_harmonics(FREQUENCY_HZ, (1.0, 1.3), 3.0)
     assert not used[FREQUENCY_HZ > 4.0].any()
     assert used[FREQUENCY_HZ < 0.7].any()
@@ -80,15 +78,13 @@ def test_lines_beside_a_strong_tone_are_dropped_and_quiet_distant_ones_kept() ->
     assert little_leakage(np.ones((341, 2)), 0.005).all()
 
 
-def test_noise_of_known_density_has_the_phasor_power_it_should() -> None:
+def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> None:
     noise = np.random.default_rng(2).normal(size=(400, 8192))
     power = np.abs(bin_phasors(tapered(noise), 300)) ** 2
 
     # One-sided density of unit variance at 600 Hz; 120,000 correlated values, good to 0.4 %.
     assert power.mean() == pytest.approx(phasor_power_per_density(BIN_HZ) / 300.0, rel=0.015)
 
-
-def test_neighbouring_bins_correlate_as_stated() -> None:
     noise = np.random.default_rng(3).normal(size=(400, 8192))
     phasors = bin_phasors(tapered(noise), 300)
 

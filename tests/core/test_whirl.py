@@ -26,17 +26,13 @@ def orbit(x: complex, y: complex, n_segments: int = 24) -> CrossSpectrum:
     return spectrum(phasors)
 
 
-def test_x_before_y_is_forward_and_y_before_x_backward() -> None:
-    # u_x = cos ωt and u_y = sin ωt have phasors 1 and -i
+def test_x_before_y_is_forward_and_a_straight_line_has_no_sense() -> None:
     assert whirl(orbit(1.0, -1.0j), 3) is Whirl.FORWARD
     assert whirl(orbit(1.0, 1.0j), 3) is Whirl.BACKWARD
     assert roundness(orbit(2.0, -2.0j), 3) == pytest.approx(1.0)
     assert roundness(orbit(2.0, 2.0j), 3) == pytest.approx(-1.0)
     exchanged = orbit(-1.0j, 1.0)
     assert whirl(exchanged, 3) is Whirl.BACKWARD
-
-
-def test_a_straight_line_a_still_shaft_and_noise_have_no_sense() -> None:
     assert whirl(orbit(1.0, 2.0), 3) is Whirl.UNDECIDED
     assert whirl(orbit(0.0, 0.0), 3) is Whirl.UNDECIDED
     undecided = [whirl(spectrum(noise(seed)), 3) is Whirl.UNDECIDED for seed in range(200)]
@@ -53,7 +49,7 @@ def with_line(phasors: ComplexArray, line: int, size: float, rows: slice) -> Com
     return changed
 
 
-def test_the_vortex_is_found_where_shaft_and_bearing_share_a_line() -> None:
+def test_a_vortex_is_a_shared_line_and_neither_a_flank_nor_nothing() -> None:
     shared = with_line(noise(1), 5, 10.0, slice(None))
     louder_in_one_probe = with_line(shared, 8, 30.0, slice(0, 1))
     silent, moving = noise(1), with_line(noise(2), 6, 10.0, slice(None))
@@ -62,8 +58,6 @@ def test_the_vortex_is_found_where_shaft_and_bearing_share_a_line() -> None:
         found = vortex_frequency_hz([spectrum(phasors) for phasors in bearings], (0.3, 0.7))
         assert found == pytest.approx(FREQUENCY_HZ[line], abs=0.3 * FREQUENCY_HZ[0])
 
-
-def test_a_flank_or_nothing_at_all_is_no_vortex() -> None:
     beyond = with_line(1e-3 * noise(1), 12, 10.0, slice(None))
     assert vortex_frequency_hz([spectrum(beyond)], (0.6, 0.89)) is None
     assert vortex_frequency_hz([orbit(0.0, 0.0)], (5.0, 6.0)) is None

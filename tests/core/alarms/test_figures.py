@@ -83,7 +83,7 @@ def test_three_in_a_minute_chatter(times_s: Sequence[float], n_chattering: int) 
     assert watch.is_chattering("U1:UJB:order1_shaft_x", 130 * NS_PER_S) == (n_chattering > 0)
 
 
-def test_an_alarm_that_has_been_quiet_for_long_does_not_chatter_any_more() -> None:
+def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long() -> None:
     watch = ChatterWatch(RULE)
     for at_s in (0, 1, 2):
         watch.note(event(at_s), at_s * NS_PER_S)
@@ -91,8 +91,6 @@ def test_an_alarm_that_has_been_quiet_for_long_does_not_chatter_any_more() -> No
     assert watch.is_chattering("U1:UJB:order1_shaft_x", 602 * NS_PER_S)
     assert not watch.is_chattering("U1:UJB:order1_shaft_x", 603 * NS_PER_S)
 
-
-def test_what_returns_within_the_window_is_fleeting() -> None:
     back = AlarmChange.RETURNED
     events = [event(0), event(59.9, back), event(100), event(160, back)]
 

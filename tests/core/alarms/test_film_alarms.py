@@ -107,25 +107,21 @@ def test_without_a_phase_only_the_length_counts_and_that_is_said(
     assert found.reason.startswith("amplitude_change")
 
 
-def test_a_phase_that_is_lost_clears_no_vector_change() -> None:
+def test_without_a_reference_or_its_phase_nothing_is_known_and_standstill_suppresses() -> None:
     found = vector_condition(readings(60.0, NO_PHASE), "shaft_x", WELL, LIMITS, ALERT)
 
     assert (found.is_known, found.reason) == (False, "no_phase")
 
+    standing = readings(missing(Reason.STANDSTILL), NO_PHASE)
+    found = vector_condition(standing, "shaft_x", WELL, LIMITS, ALERT)
 
-def test_without_a_reference_nothing_is_known() -> None:
+    assert (found.is_known, found.suppressed_by) == (False, "standstill")
+
     for reference, place in ((None, "shaft_x"), (WELL, "bearing_y")):
         there = readings(60.0, 10.0)
         there |= {n.replace("shaft_x", place): r for n, r in there.items()}
         found = vector_condition(there, place, reference, LIMITS, None)
         assert (found.is_known, found.reason, found.suppressed_by) == (False, "no_reference", None)
-
-
-def test_a_shaft_that_stands_suppresses_its_vector() -> None:
-    standing = readings(missing(Reason.STANDSTILL), NO_PHASE)
-    found = vector_condition(standing, "shaft_x", WELL, LIMITS, ALERT)
-
-    assert (found.is_known, found.suppressed_by) == (False, "standstill")
 
 
 @pytest.mark.parametrize("vector", [(math.nan, 0.0), (-1.0, 0.0), (60.0, math.inf)])

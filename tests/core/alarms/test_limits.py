@@ -63,7 +63,7 @@ def test_a_reading_beside_its_line_raises_but_does_not_clear() -> None:
     assert judge(Reading(10.0, uncertain(Reason.FEW_SEGMENTS)), LIMITS, ALERT).is_known
 
 
-def test_a_channel_is_judged_by_its_samples_and_by_its_segments() -> None:
+def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> None:
     assert channel_condition(GOOD, None).level is None
     assert channel_condition(uncertain(Reason.SPEED_UNKNOWN), None).level is None
     assert channel_condition(bad(Reason.CLIPPED), None).reason == "clipped"
@@ -72,8 +72,6 @@ def test_a_channel_is_judged_by_its_samples_and_by_its_segments() -> None:
     assert slow_channel_condition(missing(Reason.OUT_OF_RANGE)).level is ALERT
     assert slow_channel_condition(Reading(45.0)).level is None
 
-
-def test_a_clock_is_judged_by_what_is_known_of_it() -> None:
     unclear = DeviceClock(None, None, None)
     fast = DeviceClock(offset_s=-3.0, drift_ppm=-250.0, u_drift_ppm=10.0)
     maybe = DeviceClock(offset_s=0.0, drift_ppm=250.0, u_drift_ppm=50.0)
@@ -88,8 +86,6 @@ def test_a_clock_is_judged_by_what_is_known_of_it() -> None:
     assert stamp_condition(StampFault.JUMPED).reason == "stamp_jumped"
     assert stamp_condition(None).level is None
 
-
-def test_a_link_says_why_it_is_lost() -> None:
     assert link_condition(True, None).level is None
     assert link_condition(False, "refused").reason == "refused"
     assert link_condition(False, None).reason == "not connected"
@@ -118,14 +114,12 @@ def test_a_shaft_may_walk_out_of_a_probes_range_on_either_side(
     assert (found.level, found.limit, found.reason) == (level, limit, reason)
 
 
-def test_a_gap_returns_only_when_it_is_clearly_inside_again() -> None:
+def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_state() -> None:
     assert judge(Reading(609.0), GAP, ALERT).level is ALERT
     assert judge(Reading(611.0), GAP, ALERT).level is None
     assert judge(Reading(409.0), GAP, DANGER).level is DANGER
     assert judge(Reading(411.0), GAP, DANGER).level is ALERT
 
-
-def test_the_limits_of_the_present_state_count() -> None:
     found = StateLimits(((frozenset({FULL}), Limits(100.0)), (frozenset({PART}), Limits(150.0))))
 
     assert found.judge(Reading(120.0), FULL, None).level is ALERT

@@ -101,13 +101,21 @@ def test_the_surface_is_as_near_the_truth_as_it_says(film_life: FilmLife) -> Non
     assert 0.4 < np.std(np.concatenate(errors)) < 1.3
 
 
-def test_nothing_is_compared_outside_the_learned_support(healthy: StiffnessHistory) -> None:
+def test_nothing_is_compared_outside_the_learned_support_nor_at_an_unseen_attitude(
+    healthy: StiffnessHistory,
+) -> None:
     baseline = learned(healthy)
     far = FilmConditions(np.array([0.95, 0.4, 0.4]), np.array([45.0, 5.0, 45.0]), np.full(3, 30.0))
     found = baseline.compare(far, np.full(3, 20.0), np.full(3, 0.01))
     assert found.place[:2].tolist() == [-1, -1]
     assert found.place[2] >= 0
     assert np.isnan(found.deviation[:2]).all()
+    random = np.random.default_rng(4)
+    attitude_deg = 30.0 + random.normal(0.0, 3.0, len(healthy))
+    baseline = learned(replace(healthy, attitude_deg=attitude_deg))
+    turned = FilmConditions.of(replace(healthy, attitude_deg=attitude_deg + 90.0))
+    found = baseline.compare(turned, healthy.ln_k[0], healthy.u_random[0])
+    assert np.mean(found.place >= 0) < 0.01
 
 
 def test_a_reading_that_scatters_more_than_the_learned_ones_weighs_less(
@@ -120,7 +128,9 @@ def test_a_reading_that_scatters_more_than_the_learned_ones_weighs_less(
     assert weight[1] < 0.02 < 0.2 < weight[0] <= 1.0
 
 
-def test_a_cell_needs_readings_on_several_days_or_neighbours(healthy: StiffnessHistory) -> None:
+def test_a_cell_needs_readings_on_several_days_or_neighbours_to_borrow_from(
+    healthy: StiffnessHistory,
+) -> None:
     settings = BaselineSettings(min_days=5, min_readings=30)
     cells = {cell.cell: cell for cell in learned(healthy, settings).table.cells}
     own = frozenset(name for name, cell in cells.items() if cell.support is Support.OWN)
@@ -129,21 +139,9 @@ def test_a_cell_needs_readings_on_several_days_or_neighbours(healthy: StiffnessH
         if cell.support is Support.BORROWED:
             around = sum(cells[other].n_days for other in neighbourhood(name) if other in cells)
             assert name in cells_between(own, settings.borrowing_reach) or around >= 5
-
-
-def test_only_cells_between_others_borrow_unseen() -> None:
     own = frozenset({(1, 5), (4, 5), (4, 9)})
     assert cells_between(own, reach=2) == {(2, 5), (3, 5)}
     assert cells_between(own, reach=3) == {(2, 5), (3, 5), (4, 6), (4, 7), (4, 8)}
-
-
-def test_an_unseen_attitude_is_not_compared(healthy: StiffnessHistory) -> None:
-    random = np.random.default_rng(4)
-    attitude_deg = 30.0 + random.normal(0.0, 3.0, len(healthy))
-    baseline = learned(replace(healthy, attitude_deg=attitude_deg))
-    turned = FilmConditions.of(replace(healthy, attitude_deg=attitude_deg + 90.0))
-    found = baseline.compare(turned, healthy.ln_k[0], healthy.u_random[0])
-    assert np.mean(found.place >= 0) < 0.01
 
 
 def test_less_is_known_of_the_far_side_of_the_outermost_cell(healthy: StiffnessHistory) -> None:

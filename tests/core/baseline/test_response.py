@@ -43,13 +43,10 @@ def test_shares_follow_from_stiffness_whatever_the_unbalance() -> None:
     assert np.mean(left, axis=1) == pytest.approx(0.0, abs=1e-3)
 
 
-def test_wrong_readings_do_not_teach_it() -> None:
+def test_wrong_or_too_few_readings_teach_nothing() -> None:
     ln_k, _ = place_columns(histories(2))
     shift = learned(1, outliers=0.05).expected(ln_k) - learned(1).expected(ln_k)
     assert np.max(np.abs(np.median(shift, axis=1))) < 0.002
-
-
-def test_too_few_readings_teach_nothing() -> None:
     assert learn_response(histories(1), np.arange(N) < 500) is None
 
 

@@ -38,12 +38,9 @@ def test_a_start_and_a_stop_pass_through_every_state() -> None:
     ]
 
 
-def test_power_that_hovers_at_a_limit_does_not_change_the_state() -> None:
+def test_a_state_settles_after_its_time_and_stays_where_power_hovers_at_a_limit() -> None:
     powers_mw = [280.0 + swing for swing in (-20.0, 3.0, -3.0, 3.0, -3.0)]
     assert {o.state for o in run([92.3] * 5, powers_mw)} == {OperatingState.PART_LOAD}
-
-
-def test_a_state_settles_only_after_its_time() -> None:
     settled = [o.is_settled(LIMITS) for o in run([92.3] * 40, [200.0] * 40)]
     assert settled == [False] * 30 + [True] * 10
 
@@ -60,13 +57,10 @@ def test_a_warm_up_lasts_on_through_changes_of_load() -> None:
     assert settled == [False] * 36 + [True] * 12
 
 
-def test_a_shaft_that_turns_in_between_after_a_gap_is_unknown() -> None:
+def test_without_speed_or_power_or_after_a_gap_the_state_is_unknown() -> None:
     before = advance(NEVER_SEEN, OperatingReading(0, 92.3, 200.0), LIMITS)
     after = advance(before, OperatingReading(120 * MINUTE_NS, 50.0, 0.0), LIMITS)
     assert after.state is OperatingState.UNKNOWN
-
-
-def test_without_speed_or_power_the_state_is_unknown() -> None:
     states = [o.state for o in run([float("nan"), 92.3], [200.0, float("nan")])]
     assert states == [OperatingState.UNKNOWN] * 2
 
@@ -109,17 +103,11 @@ def one(grid: CellGrid, e: float, t: float, attitude_deg: float = 0.0) -> tuple[
     return tuple(int(i) for i in cells[:, 0])
 
 
-def test_a_reading_lies_in_the_cell_whose_middle_is_nearest() -> None:
+def test_a_reading_lies_in_the_cell_whose_middle_is_nearest_also_in_frost() -> None:
     grid = CellGrid(0.05, 2.5, attitude_width_deg=30.0)
     assert grid.centre(one(grid, 0.32, 41.0, 725.0)) == pytest.approx((0.325, 41.25, 15.0))
-
-
-def test_frost_and_negative_attitudes_have_cells_too() -> None:
     grid = CellGrid(0.05, 2.5, attitude_width_deg=30.0)
     assert one(grid, 0.0, -0.1, -10.0) == (0, -1, 11)
-
-
-def test_a_reading_without_temperature_has_no_cell() -> None:
     nan, some = float("nan"), 0.3
     assert not CellGrid().is_known(FilmConditions.one(some, nan, some))[0]
     assert CellGrid().is_known(FilmConditions.one(some, some, nan))[0]

@@ -89,14 +89,13 @@ def test_a_softened_film_is_found_in_time(
         assert found.change[first] < -0.02
 
 
-def test_a_large_loss_is_danger_and_a_rise_of_stiffness_is_found_too(watch: Watch) -> None:
+def test_a_large_loss_is_danger_with_its_size_and_a_rise_of_stiffness_is_found_too(
+    watch: Watch,
+) -> None:
     for size, sign in ((0.3, -1.0), (-0.3, 1.0)):
         found = watch(1, change=loss(size, LATER_H + 24.0)).whole()
         assert found.level[-1] == AlarmLevel.DANGER
         assert np.sign(found.change[-1]) == sign
-
-
-def test_the_deviation_of_a_softened_film_is_its_loss(watch: Watch) -> None:
     newest = watch(1, change=loss(0.1, LATER_H)).steps()[-1]
     assert newest.finding is not None
     assert newest.finding.change == pytest.approx(np.log(0.9), abs=0.02)
@@ -146,14 +145,11 @@ def test_a_latched_level_stays_until_it_is_released(watch: Watch) -> None:
     assert release(early, baseline, limits).level is early.level
 
 
-def test_readings_that_come_too_often_count_once(watch: Watch) -> None:
+def test_readings_that_come_too_often_count_once_and_time_cannot_stand_still(watch: Watch) -> None:
     seen = watch(1).first(250)
     often = replace(seen.later, time_ns=seen.later.time_ns[0] + np.arange(250) * 12 * 10**9)
     newest = replace(seen, later=often, is_settled=np.ones(250, np.bool_)).steps()[-1]
     assert newest.evidence.n_counted <= 250 * 12 / 300 + 1
-
-
-def test_time_cannot_stand_still(watch: Watch) -> None:
     seen = watch(1)
     with pytest.raises(ValueError, match="is not after"):
         seen.steps(begin=replace(UNDECIDED, last_ns=int(seen.later.time_ns[0])))

@@ -118,15 +118,15 @@ def test_no_number_that_a_rack_flags_enters_an_average(rack) -> None:
     assert newest.window.coverage == pytest.approx(52 / 60)
 
 
-def test_a_standing_machine_gives_nothing(rack) -> None:
+def test_a_standing_machine_gives_nothing_and_one_without_a_speed_the_rated_one_in_doubt(
+    rack,
+) -> None:
     standing = SLOW | {"speed": Reading(3.0)}
     newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, slow=standing))[-1].readings
 
     for name in ("speed_rpm", "order1_shaft_x_um_pk", "stiffness_xx_n_per_m"):
         assert newest[name] == missing(Reason.STANDSTILL)
 
-
-def test_without_a_speed_the_rated_one_is_taken_and_doubted(rack) -> None:
     unknown = SLOW | {"speed": missing(Reason.NOT_MEASURED)}
     newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, slow=unknown))[-1]
 
@@ -143,7 +143,7 @@ def test_gaps_give_the_shaft_centre(rack) -> None:
     assert newest.readings["eccentricity_ratio"].value == pytest.approx(0.25, abs=0.001)
 
 
-def test_the_vortex_order_is_its_own_line_without_runout(rack) -> None:
+def test_the_vortex_order_is_its_own_line_or_switched_off(rack) -> None:
     monitor = rack(AMPLITUDES + VORTEX, bearing={"runout_um_pk": 100.0})
     newest = watch(monitor, polls(60.0, 50.0, 20.0, 10.0, 30.0, 30.0, 12.0, 12.0))[-1]
 
@@ -153,8 +153,6 @@ def test_the_vortex_order_is_its_own_line_without_runout(rack) -> None:
     assert newest.readings["vortex_frequency_hz"].value == pytest.approx(0.25 * 92.3 / 60)
     assert newest.estimators["xx"] == "ratio_vortex"
 
-
-def test_a_turbine_without_vortex_has_that_order_switched_off(rack) -> None:
     newest = watch(rack(has_vortex=False), polls(60.0, 50.0, 20.0, 10.0))[-1]
 
     assert newest.readings["vortex_k_eff_xx_n_per_m"] == missing(Reason.SWITCHED_OFF)

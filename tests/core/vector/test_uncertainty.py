@@ -105,14 +105,12 @@ def test_with_phases_stiffness_and_damping_are_told_apart(rack) -> None:
     assert newest.estimators == {"xx": "transfer_order1", "yy": "transfer_order1"}
 
 
-def test_vectors_that_do_not_hang_together_give_no_stiffness(rack) -> None:
+def test_vectors_that_do_not_hang_together_or_are_exchanged_are_doubted(rack) -> None:
     newest = watch(rack(AMPLITUDES + PHASES), vectors(noise_deg=60.0))[-1]
 
     for name in ("order1_k_eff_xx_n_per_m", "order1_transfer_k_xx_n_per_m"):
         assert newest.readings[name] == missing(Reason.INSUFFICIENT_EXCITATION)
 
-
-def test_exchanged_phases_are_doubted_as_exchanged_axes(rack) -> None:
     monitor = rack(AMPLITUDES + PHASES, rotation_sense=-1)
     newest = watch(monitor, vectors())[-1]
 

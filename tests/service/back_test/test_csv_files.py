@@ -25,7 +25,9 @@ def refusal(content: str | bytes) -> str:
     return str(refused.value)
 
 
-def test_times_with_any_offset_are_the_same_moment(text: Text, line: Line) -> None:
+def test_times_with_any_offset_or_in_whole_nanoseconds_are_the_same_moment(
+    text: Text, line: Line
+) -> None:
     rows = read(
         text(
             line(0, time="2025-03-01T08:00:00Z"),
@@ -34,9 +36,6 @@ def test_times_with_any_offset_are_the_same_moment(text: Text, line: Line) -> No
         )
     )
     assert {row["time_ns"] for row in rows[-3:]} == {1_740_816_000_000_000_000}
-
-
-def test_whole_nanoseconds_have_a_heading_of_their_own(text: Text) -> None:
     nanoseconds = text().replace("time,", "time_ns,", 1).replace("2025-01-01T00:50:00Z", "77")
     with pytest.raises(ReadingsError, match="line 2: time_ns is no integer: '2025-01-01T00:00:00Z"):
         read(nanoseconds)
@@ -92,13 +91,12 @@ def test_a_wrong_cell_is_named_with_its_line(
     assert refusal(text(line(100, **changes), line(110))).startswith(says)
 
 
-def test_ten_lines_are_named_and_the_others_counted(text: Text, line: Line) -> None:
+def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(
+    text: Text, line: Line
+) -> None:
     assert refusal(text()[:-20]) == "line 11: 8 columns where the heading has 10"  # cut off
     said = refusal(text(*(line(n, u_random="x") for n in range(100, 120))))
     assert "line 21: u_random is no number: 'x'; and 10 more" in said
-
-
-def test_other_encodings_are_refused(text: Text, line: Line) -> None:
     assert refusal(text(line(100, unit="Ü")).encode("latin-1")) == "line 12: not UTF-8 text"
     assert refusal(text().encode("utf-16")) == "line 1: has a NUL byte"
 

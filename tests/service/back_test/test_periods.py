@@ -16,7 +16,7 @@ def event(day: float, text: str = "overhaul") -> MachineEvent:
     return MachineEvent("U1", None, round(day * DAY_NS), text)
 
 
-def test_each_event_begins_to_learn_anew_from_its_first_reading() -> None:
+def test_each_event_begins_to_learn_anew_unless_it_is_before_or_after_all_readings() -> None:
     assert periods_of(DAYS, [], Learning(30)) == [Period(1, 0, 30, 100)]
     events = [event(70.5, "second"), event(50, "first")]
     assert periods_of(DAYS, events, Learning(20)) == [
@@ -24,22 +24,16 @@ def test_each_event_begins_to_learn_anew_from_its_first_reading() -> None:
         Period(2, 50, 70, 71, "first"),
         Period(3, 71, 91, 100, "second"),
     ]
-
-
-def test_an_end_of_learning_is_that_of_the_first_baseline_only() -> None:
-    learning = Learning(20, until_ns=10 * DAY_NS)
-    learned = [period.learned for period in periods_of(DAYS, [event(50)], learning)]
-    assert learned == [10, 70]
-
-
-def test_periods_that_are_too_short_are_learned_from_and_not_compared() -> None:
-    assert periods_of(DAYS, [event(10)], Learning(20))[0] == Period(1, 0, 10, 10)
-
-
-def test_events_before_and_after_all_readings_change_nothing_but_the_name() -> None:
     assert periods_of(DAYS + DAY_NS, [event(0), event(200)], Learning(30)) == [
         Period(1, 0, 30, 100, "overhaul")
     ]
+
+
+def test_learning_ends_where_told_and_short_periods_are_not_compared() -> None:
+    learning = Learning(20, until_ns=10 * DAY_NS)
+    learned = [period.learned for period in periods_of(DAYS, [event(50)], learning)]
+    assert learned == [10, 70]
+    assert periods_of(DAYS, [event(10)], Learning(20))[0] == Period(1, 0, 10, 10)
 
 
 def test_times_need_an_offset() -> None:
@@ -77,21 +71,15 @@ def decided(level: list[int], change: list[float]) -> DecisionHistory:
     )
 
 
-def test_a_quiet_film_has_no_alarm() -> None:
-    assert list(alarm_stretches(decided([0, 0, 0], [0.0, 0.1, 0.2]))) == []
-    assert list(alarm_stretches(decided([], []))) == []
-
-
-def test_an_alarm_that_rises_is_one_alarm() -> None:
+def test_an_alarm_that_rises_is_one_and_those_that_return_are_counted_each() -> None:
     (found,) = alarm_stretches(decided([0, 1, 2, 1, 0], [0.0, -0.05, -0.2, -0.1, 0.0]))
     assert (found.begin, found.danger, found.end, found.level) == (1, 2, 4, AlarmLevel.DANGER)
     assert (found.raised.change, found.largest.change, found.largest.row) == (-0.05, -0.2, 2)
     assert found.largest.std == 0.02
-
-
-def test_alarms_that_return_are_counted_each_and_the_last_may_last() -> None:
     found = list(alarm_stretches(decided([1, 0, 1, 1], [0.1, 0.0, 0.2, 0.3])))
     assert [(alarm.begin, alarm.end, alarm.danger) for alarm in found] == [
         (0, 1, None),
         (2, None, None),
     ]
+    assert list(alarm_stretches(decided([0, 0, 0], [0.0, 0.1, 0.2]))) == []
+    assert list(alarm_stretches(decided([], []))) == []

@@ -158,6 +158,8 @@ ORDER1, SPAN, ECCENTRICITY = "shaft_order1_um_pk", "shaft_overall_um_pp", "eccen
 VELOCITY, OIL_C, GAP = "bearing_overall_mm_s_rms", "oil_temperature_c", "gap_um"
 ZONES, REFERENCE = "zones.bearing_mm_s_rms", "order1_reference"
 TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
+ONE_TABLE = "{{ table = [{{ a_b = {}, b_c = {}, c_d = {} }}] }}"
+BETWEEN = "alert_below = 600.0, alert = 700.0"
 
 
 @pytest.mark.parametrize(
@@ -185,30 +187,10 @@ TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
         (GAP, "{ deadband = 1.0 }", ".alert", "alert_below or danger_below"),
         (GAP, "{ alert_below = 600.0, danger_below = 700.0 }", ".alert_below", "danger_below, 700"),
         (GAP, "{ alert_below = 600.0, alert = 500.0 }", ".alert = 500.0", "above alert_below, 600"),
-        (
-            GAP,
-            "{ alert_below = 6e2, alert = 7e2, deadband = 5e1 }",
-            ".deadband = 50",
-            "between, 50",
-        ),
-        (
-            ZONES,
-            "{ table = [{ a_b = 2.0, b_c = 2.0, c_d = 3.0 }] }",
-            ".table[1].b_c = 2.0",
-            "a_b, 2",
-        ),
-        (
-            ZONES,
-            "{ table = [{ a_b = 1.0, b_c = 2.0, c_d = 1.5 }] }",
-            ".table[1].c_d = 1.5",
-            "b_c, 2",
-        ),
-        (
-            ZONES,
-            "{ table = [{ a_b = 0.0, b_c = 2.0, c_d = 3.0 }] }",
-            ".table[1].a_b = 0.0",
-            "than 0",
-        ),
+        (GAP, f"{{ {BETWEEN}, deadband = 50.0 }}", ".deadband = 50", "between, 50"),
+        (ZONES, ONE_TABLE.format(2.0, 2.0, 3.0), ".table[1].b_c = 2.0", "a_b, 2"),
+        (ZONES, ONE_TABLE.format(1.0, 2.0, 1.5), ".table[1].c_d = 1.5", "b_c, 2"),
+        (ZONES, ONE_TABLE.format(0.0, 2.0, 3.0), ".table[1].a_b = 0.0", "than 0"),
         (ZONES, f"{{ table = [{{ {TABLE}, deadband = 2.0 }}] }}", ".table[1].deadband", "b_c, 2"),
         (ZONES, f"{{ table = [{{ {TABLE} }}, {{ {TABLE} }}] }}", ".table[2].states[1]", "twice"),
         (ZONES, "{ table = [] }", ".table", "at least 1"),

@@ -25,14 +25,11 @@ PROFILE = {
 }
 
 
-def test_a_can_source_is_read_and_its_dbc_is_seen_from_the_plant_file(tmp_path):
+def test_a_can_source_is_read_by_its_dbc_or_by_a_profile(tmp_path):
     source = CanSettings.model_validate(PLAIN, context={FOLDER: tmp_path})
     assert source.dbc_path == tmp_path / "daq.dbc"
     assert source.signals["y"] == ("WAVE.y0", "WAVE.y1")
     source.check_channels(["x", "y"], ["oil"])
-
-
-def test_a_profile_needs_nothing_else():
     CanSettings.model_validate(PROFILE).check_channels(["any"], [])
 
 

@@ -192,16 +192,13 @@ def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> 
         assert "\n" not in str(refusal.value)
 
 
-def test_an_empty_file_lacks_the_plant_and_its_units(mistakes: Mistakes) -> None:
+def test_an_empty_file_or_a_key_with_a_line_break_is_refused_in_its_lines(
+    mistakes: Mistakes, changed: Changed
+) -> None:
     assert [line.split(" — ")[0] for line in mistakes("")] == [
         "1: plant is missing",
         "1: unit is missing",
     ]
-
-
-def test_a_key_with_a_line_break_in_it_is_refused_in_one_line(
-    changed: Changed, mistakes: Mistakes
-) -> None:
     [found] = mistakes(changed("[plant]\n", '[plant]\n"na\\nme" = "x"\n')[0])
     assert "'na\\nme' = 'x': unknown key" in found
 
