@@ -47,16 +47,9 @@ def blocks() -> BlockMaker:
         slow["speed"] = missing(Reason.OUT_OF_RANGE) if speed_rpm is None else Reading(speed_rpm)
         for start in range(0, signals.shape[1], n_each):
             samples = signals[:, start : start + n_each].astype(np.float32)
-            yield SampleBlock(
-                unit="U1",
-                epoch=epoch,
-                first_index=first_index + start,
-                start_ns=round((first_index + start) / RATE_HZ * 1e9),
-                rate_hz=RATE_HZ,
-                samples=samples,
-                channel_quality=(GOOD,) * len(samples),
-                slow=slow,
-            )
+            index, quality = first_index + start, (GOOD,) * len(samples)
+            start_ns = round(index / RATE_HZ * 1e9)
+            yield SampleBlock("U1", epoch, index, start_ns, RATE_HZ, samples, quality, slow)
 
     return cut
 

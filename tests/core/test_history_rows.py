@@ -120,13 +120,10 @@ def history(n: int = 5) -> StiffnessHistory:
     )
 
 
-def test_a_part_of_a_history_is_a_history() -> None:
+def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why() -> None:
     whole = history()
     assert whole.rows(1, 3).time_ns.tolist() == [1, 2]
     assert len(whole.rows(2, 2)) == 0
-
-
-def test_a_missing_number_is_of_bad_quality_unless_it_says_why() -> None:
     ln_k = history().ln_k.copy()
     ln_k[1, 2] = np.nan
     whole = history()

@@ -117,15 +117,14 @@ def test_one_nan_does_not_blind_the_other_channels(
     assert readings["order1_shaft_x_um_pk"].value == pytest.approx(60.0, rel=1e-3)
 
 
-def test_a_standing_machine_has_no_orders(results: Results, signals) -> None:
+def test_a_standing_machine_has_no_orders_and_the_line_gives_a_speed_that_nobody_measures(
+    results: Results, signals
+) -> None:
     newest = results(signals(14.0), speed_rpm=0.0)[-1]
     assert newest.readings["speed_rpm"].quality == bad(Reason.STANDSTILL)
     assert newest.readings["order1_k_eff_xx_n_per_m"].quality == bad(Reason.STANDSTILL)
     assert newest.readings["gap_x_um"].value is not None
     assert newest.orbit is None
-
-
-def test_without_a_speed_channel_the_line_itself_gives_the_speed(results: Results, signals) -> None:
     newest = results(signals(60.0), speed_rpm=None)[-1]
     assert newest.speed_source is SpeedSource.LINE
     assert newest.readings["speed_rpm"].value == pytest.approx(92.3, rel=2e-3)

@@ -41,18 +41,11 @@ def stream(n_blocks: int, gap: int = 500) -> list[SampleBlock]:
         turning = np.array([50 * np.cos(2 * np.pi * t), 50 * np.sin(2 * np.pi * t)]) + vortex
         samples = np.concatenate([turning, turning / 5]) + rng.normal(0.0, 1.0, (4, BLOCK))
         quality = (GOOD, GOOD, GOOD, uncertain(Reason.CLIPPED) if number == 70 else GOOD)
-        found.append(
-            SampleBlock(
-                unit="U1",
-                epoch=epoch,
-                first_index=first,
-                start_ns=1_767_225_600_000_000_000 + round(t[0] * 1e9),
-                rate_hz=RATE_HZ,
-                samples=samples.astype(np.float32),
-                channel_quality=quality,
-                slow={"speed": Reading(60.0 + 0.1 * np.sin(number / 9))},
-            )
-        )
+        start_ns = 1_767_225_600_000_000_000 + round(t[0] * 1e9)
+        samples = samples.astype(np.float32)
+        slow = {"speed": Reading(60.0 + 0.1 * np.sin(number / 9))}
+        block = SampleBlock("U1", epoch, first, start_ns, RATE_HZ, samples, quality, slow)
+        found.append(block)
         first += BLOCK
     return found
 

@@ -100,7 +100,7 @@ def pulses(turns: FloatArray) -> FloatArray:
     return np.where(turns % 1.0 < 0.02, 5.0, 0.0)
 
 
-def test_marks_lie_where_the_pulses_begin_and_a_shaft_at_rest_makes_none() -> None:
+def test_marks_lie_where_the_pulses_begin_also_before_and_behind_a_hole() -> None:
     marks = marks_of(pulses(TURN_HZ * T + 0.25))
 
     expected = (np.arange(1, marks.size + 1) - 0.25) / TURN_HZ * RATE_HZ
@@ -113,8 +113,6 @@ def test_marks_lie_where_the_pulses_begin_and_a_shaft_at_rest_makes_none() -> No
     assert marks_of(np.full(100, np.nan)).size == 0
     assert marks_of(np.zeros(100)).size == 0
 
-
-def test_marks_before_and_behind_a_hole_stay_where_they_are() -> None:
     signal = pulses(TURN_HZ * T + 0.25)
     whole = marks_of(signal)
     signal[4000:5000] = np.nan

@@ -93,15 +93,13 @@ def test_without_any_pair_the_last_known_growth_stands_in_and_may_have_changed()
     assert standard(lately.x_um) == pytest.approx(math.hypot(1.25, 5.0, 25.0) / math.sqrt(3.0))
 
 
-def test_an_axis_without_probes_leaves_the_other_but_no_eccentricity() -> None:
+def test_a_doubtful_gap_or_an_axis_without_probes_leaves_what_is_known_without_it() -> None:
     centre = locate_shaft(*gaps(60.0, -80.0, 0.0, ("near_x", "far_x")), CLEARANCE_UM)
 
     assert number(centre.y_um) == pytest.approx(-80.0)
     for reading in (centre.x_um, centre.eccentricity_ratio, centre.attitude_angle_deg):
         assert reading.quality == bad(Reason.SENSOR_FAILURE)
 
-
-def test_doubt_about_one_gap_is_doubt_about_the_position() -> None:
     x, y = gaps(30.0, -40.0)
     doubtful = replace(x.near, quality=uncertain(Reason.LOW_COVERAGE))
     centre = shaft_centre((doubtful, y.near), (2000.0, 2100.0), CLEARANCE_UM)

@@ -15,7 +15,7 @@ FILMS = {
 ISOTROPIC = {name: Film.proportional(1.0e9, 1.0e9) for name in FILMS}
 
 
-def test_mass_and_stiffness_are_symmetric_and_gyroscopic_coupling_does_no_work() -> None:
+def test_mass_and_stiffness_are_symmetric_and_a_bearing_without_a_film_is_refused() -> None:
     films = FILMS | {"UJB": Film.proportional(3.33e9, 1.11e9, -0.33e9)}
     matrices = rotor_matrices(PARAMETERS, films, 92.3)
 
@@ -28,6 +28,9 @@ def test_mass_and_stiffness_are_symmetric_and_gyroscopic_coupling_does_no_work()
 
     assert np.array_equal(gyroscopic, -gyroscopic.T)
     assert np.abs(gyroscopic).max() == PARAMETERS.polar_inertia_kg_m2
+
+    with pytest.raises(KeyError, match="TJB"):
+        rotor_matrices(PARAMETERS, {"UJB": CROSS_COUPLED, "LJB": CROSS_COUPLED}, 92.3)
 
 
 @pytest.mark.parametrize("frequency_hz", [0.1, 0.385, 1.538, 4.0, 20.0])
@@ -92,11 +95,6 @@ def test_unbalance_force_grows_with_the_grade_and_the_square_of_speed() -> None:
     assert unbalance_force_n(4.25, 92.3) == pytest.approx(75.6e3)
     assert unbalance_force_n(8.5, 92.3) == pytest.approx(2 * 75.6e3)
     assert unbalance_force_n(4.25, 46.15) == pytest.approx(75.6e3 / 4)
-
-
-def test_a_bearing_without_a_film_is_refused_by_name() -> None:
-    with pytest.raises(KeyError, match="TJB"):
-        rotor_matrices(PARAMETERS, {"UJB": CROSS_COUPLED, "LJB": CROSS_COUPLED}, 92.3)
 
 
 def test_effective_stiffness_is_the_magnitude_of_spring_and_dashpot_together() -> None:

@@ -44,7 +44,7 @@ def test_nothing_need_move_while_the_machine_stands(in_counts: Unit, results: Re
         assert readings[name].quality == bad(Reason.STANDSTILL)
 
 
-def test_exchanged_transducers_are_doubted_until_the_rotation_is_told(
+def test_exchanged_transducers_and_a_speed_that_the_line_contradicts_are_doubted(
     unit: Unit, results: Results, signals
 ) -> None:
     rows = signals(90.0)[[1, 0, 3, 2]]
@@ -53,9 +53,6 @@ def test_exchanged_transducers_are_doubted_until_the_rotation_is_told(
     told = results(rows, replace(unit, rotation_sense=-1))[-1].readings
     assert told["order1_k_eff_xx_n_per_m"].quality.reason is Reason.OK
     assert doubted["order1_roundness"].value == pytest.approx(-1.0, abs=0.01)
-
-
-def test_a_speed_channel_that_the_line_contradicts_is_doubted(results: Results, signals) -> None:
     newest = results(signals(90.0), speed_rpm=97.0)[-1]
     assert newest.readings["speed_rpm"].quality == uncertain(Reason.SPEED_IMPLAUSIBLE)
 

@@ -94,15 +94,13 @@ def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> No
         assert found == pytest.approx(stated, abs=0.01)
 
 
-def test_correlated_neighbours_count_where_they_are_used_and_only_there() -> None:
+def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
     every = neighbour_inflation(np.ones(9, dtype=bool))
     alone = neighbour_inflation(np.array([True, False, False, True]))
 
     assert every[4] == pytest.approx(CORRELATED_LINES)
     np.testing.assert_allclose(alone, 1.0 + np.array([0.0, 4 / 9 + 1 / 36, 4 / 9 + 1 / 36, 0.0]))
 
-
-def test_overlapping_segments_count_for_less_as_welch_found() -> None:
     assert independent_segments(24, 0.0) == 24.0
     assert independent_segments(24, 0.125) == pytest.approx(24.0, rel=1e-3)
     # Hann at 50 %: neighbours correlate by 1/6 (Welch 1967; Harris 1978, table I)

@@ -13,16 +13,7 @@ from core.quality import GOOD, Reason
 from service.live import LinkState, LiveView
 
 STALE_AFTER_S = 30.0
-BLOCK = SampleBlock(
-    unit="U1",
-    epoch=1,
-    first_index=0,
-    start_ns=0,
-    rate_hz=600.0,
-    samples=np.zeros((1, 60), dtype=np.float32),
-    channel_quality=(GOOD,),
-    slow={},
-)
+BLOCK = SampleBlock("U1", 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,))
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from service.store.port import StoredReadings, StoreError
 from service.store.sqlite import SqliteStore
 
 
-def bearing_named(name: str, **more: Any) -> Bearing:
+def bearing(name: str = "UJB", **more: Any) -> Bearing:
     return Bearing(name, 1e9, "sx", "sy", "bx", "by", 200.0, (2000.0, 2000.0), **more)
 
 
@@ -31,7 +31,7 @@ def reference(bearing: str = "UJB", x_um: float = 1998.5, unit: str = "U1") -> G
 @pytest.fixture
 def monitor() -> UnitMonitor:
     channels = tuple(Channel(id_, Measurand.GAP_UM, -1) for id_ in ("sx", "sy", "bx", "by"))
-    unit = Unit("U1", 92.3, 600.0, channels, (bearing_named("UJB"), bearing_named("LJB")))
+    unit = Unit("U1", 92.3, 600.0, channels, (bearing(), bearing("LJB")))
     return UnitMonitor(unit, AnalysisSettings())
 
 
@@ -140,23 +140,16 @@ async def test_while_the_store_cannot_be_read_the_references_stay(
 
 def test_opposite_gaps_are_taken_over_where_there_are_such_gaps_and_such_probes() -> None:
     both = GapReference("U1", "UJB", 7, "A. Name", (1e3, 2e3), (3e3, 4e3), ReferenceSource.MEASURED)
-    four = bearing_named(
-        "UJB", opposite_x="fx", opposite_y="fy", opposite_reference_um=(1.9e3, 2e3)
-    )
 
-    assert with_reference(four, reference()).opposite_reference_um == (1.9e3, 2e3)
-    assert with_reference(four, reference()).gap_reference_um == (1998.5, 2003.1)
-    assert with_reference(four, both).opposite_reference_um == (3e3, 4e3)
-    assert with_reference(bearing_named("UJB"), both).opposite_reference_um is None
+    assert with_reference(FOUR, reference()).opposite_reference_um == (1900.0, 1901.0)
+    assert with_reference(FOUR, reference()).gap_reference_um == (1998.5, 2003.1)
+    assert with_reference(FOUR, both).opposite_reference_um == (3e3, 4e3)
+    assert with_reference(bearing(), both).opposite_reference_um is None
 
 
 NOW = 1_767_225_600_000_000_000
 MINUTE = 60_000_000_000
 NONE = (None, None)
-
-
-def bearing(**probes: Any) -> Bearing:
-    return Bearing("UJB", 1e9, "sx", "sy", "bx", "by", 200.0, (2000.0, 2000.0), **probes)
 
 
 FOUR = bearing(opposite_x="fx", opposite_y="fy", opposite_reference_um=(1900.0, 1901.0))
@@ -204,11 +197,17 @@ def test_the_newest_mean_gaps_become_the_reference(age_min: float) -> None:
     assert measured_gaps(bearing(), newest(age_min), NOW) == ((1998.5, 2003.1), None)
 
 
-def test_opposite_gaps_are_measured_where_there_are_probes() -> None:
+def test_measured_gaps_include_opposite_ones_and_doubtful_ones_are_named() -> None:
     found = newest(opposite_gap_x_um=Reading(7.0), opposite_gap_y_um=Reading(8.0))
 
     assert measured_gaps(FOUR, found, NOW) == ((1998.5, 2003.1), (7.0, 8.0))
     assert measured_gaps(THREE, found, NOW) == ((1998.5, 2003.1), (7.0, 1901.0))
+
+    found = newest(gap_x_um=Reading(1998.5, uncertain(Reason.NON_STATIONARY)))
+
+    assert measured_gaps(bearing(), found, NOW) == ((1998.5, 2003.1), None)
+    assert doubts(found) == ["gap_x_um is uncertain: non_stationary"]
+    assert doubts(newest()) == []
 
 
 @pytest.mark.parametrize(
@@ -227,11 +226,3 @@ def test_gaps_that_are_old_or_unusable_are_refused(found: StoredReadings | None,
         measured_gaps(bearing(), found, NOW)
     with pytest.raises(ReferenceRefusedError, match=r"opposite_gap_y_um .* not_measured"):
         measured_gaps(FOUR, newest(opposite_gap_x_um=Reading(7.0)), NOW)
-
-
-def test_doubtful_gaps_are_taken_and_named() -> None:
-    found = newest(gap_x_um=Reading(1998.5, uncertain(Reason.NON_STATIONARY)))
-
-    assert measured_gaps(bearing(), found, NOW) == ((1998.5, 2003.1), None)
-    assert doubts(found) == ["gap_x_um is uncertain: non_stationary"]
-    assert doubts(newest()) == []

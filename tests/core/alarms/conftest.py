@@ -36,17 +36,11 @@ def block() -> BlockOf:
 
     def build(second: int, oil: Reading | float = 45.0, **changes: Any) -> SampleBlock:
         qualities = changes.pop("qualities", (GOOD,) * len(IDS))
-        return SampleBlock(
-            unit="U1",
-            epoch=1,
-            first_index=second * 100,
-            start_ns=second * NS_PER_S,
-            rate_hz=100.0,
-            samples=np.zeros((len(qualities), 100), dtype=np.float32),
-            channel_quality=tuple(qualities),
-            slow={"oil": oil if isinstance(oil, Reading) else Reading(oil)},
-            **changes,
-        )
+        index, start_ns = second * 100, second * NS_PER_S
+        samples = np.zeros((len(qualities), 100), dtype=np.float32)
+        slow = {"oil": oil if isinstance(oil, Reading) else Reading(oil)}
+        quality = tuple(qualities)
+        return SampleBlock("U1", 1, index, start_ns, 100.0, samples, quality, slow, **changes)
 
     return build
 

@@ -72,7 +72,7 @@ def test_a_baseline_tells_whether_its_film_changed_while_it_was_learned(
 N = 4000
 
 
-def test_scatter_that_grows_with_the_slope_is_put_down_to_position() -> None:
+def test_scatter_that_grows_with_the_slope_is_put_down_to_position_if_slopes_differ() -> None:
     random = np.random.default_rng(1)
     slope = random.uniform(0.0, 6.0, N)
     deviation = 0.006 * random.standard_normal(N) + 0.003 * slope * random.standard_normal(N)
@@ -81,9 +81,6 @@ def test_scatter_that_grows_with_the_slope_is_put_down_to_position() -> None:
     assert np.sqrt(found.variance(steep)) == pytest.approx(np.hypot(0.006, 0.015), rel=0.1)
     assert np.sqrt(found.lasting(steep)) == pytest.approx(0.015, rel=0.15)
     assert found.lasting(np.array([0.0])) == 0.0
-
-
-def test_slopes_that_are_all_alike_say_nothing_of_position() -> None:
     random = np.random.default_rng(2)
     found = slope_scatter(np.full(N, 4.0), 0.01 * random.standard_normal(N))
     assert found.lasting(np.array([4.0])) == 0.0

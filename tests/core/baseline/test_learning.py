@@ -49,16 +49,13 @@ def healthy(film_life: FilmLife) -> StiffnessHistory:
     return film_life(1)
 
 
-def test_what_never_changes_is_its_own_baseline(healthy: StiffnessHistory) -> None:
+def test_what_never_changes_is_its_own_baseline_and_a_stiffer_bracket_moves_both(
+    healthy: StiffnessHistory,
+) -> None:
     constant = learned(with_ln_k(healthy, np.full_like(healthy.ln_k, 20.0)))
     heights = constant.surface.at(FilmConditions.of(healthy))
     assert np.allclose(heights, 20.0, rtol=0.0, atol=1e-9)
     assert {cell.location for cell in constant.table.cells} == {20.0}
-
-
-def test_a_stiffer_bracket_setting_moves_baseline_and_deviation_alike(
-    healthy: StiffnessHistory,
-) -> None:
     moved = with_ln_k(healthy, healthy.ln_k + 0.5)
     before, after = learned(healthy), learned(moved)
     same = deviation(before, healthy)
@@ -176,7 +173,9 @@ def test_wrong_readings_hardly_move_a_baseline(healthy: StiffnessHistory, share:
     assert np.nanmedian(both) < 0.01
 
 
-def test_a_fault_in_the_last_quarter_of_learning_is_not_learned(film_life: FilmLife) -> None:
+def test_a_fault_or_a_few_days_or_what_had_not_settled_is_not_learned(
+    film_life: FilmLife, healthy: StiffnessHistory
+) -> None:
     def fall(hours: np.ndarray) -> np.ndarray:
         return np.where(hours > 90 * 24, np.log(0.8), 0.0)
 
@@ -185,10 +184,6 @@ def test_a_fault_in_the_last_quarter_of_learning_is_not_learned(film_life: FilmL
     assert np.nanmedian(np.abs(shift)) < 0.01
     assert spoiled.rejected_share > 0.15
 
-
-def test_from_a_few_days_or_what_had_not_settled_nothing_is_learned(
-    film_life: FilmLife, healthy: StiffnessHistory
-) -> None:
     assert baseline_of(film_life(1, days=15)).quantities == ()
     unsettled = np.zeros(len(healthy), np.bool_)
     assert learn(healthy, unsettled, ORIGIN, BaselineSettings()).quantities == ()

@@ -101,14 +101,13 @@ def test_a_large_loss_is_danger_with_its_size_and_a_rise_of_stiffness_is_found_t
     assert newest.finding.change == pytest.approx(np.log(0.9), abs=0.02)
 
 
-def test_spikes_raise_nothing(watch: Watch) -> None:
+def test_spikes_raise_nothing_and_where_nothing_was_learned_nothing_is_decided(
+    watch: Watch,
+) -> None:
     seen = watch(1, days=160)
     rows = np.arange(len(seen.later)) % 40
     spiky = replace(seen.later, ln_k=seen.later.ln_k - np.where(rows < 2, 1.5, 0.0))
     assert replace(seen, later=spiky).whole().raised().size == 0
-
-
-def test_nothing_is_decided_where_nothing_was_learned(watch: Watch) -> None:
     seen = watch(1, change=loss(0.5, LATER_H))
     elsewhere = replace(seen.later, oil_temperature_c=seen.later.oil_temperature_c + 60.0)
     found = replace(seen, later=elsewhere).whole()

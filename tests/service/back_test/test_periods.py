@@ -36,15 +36,12 @@ def test_learning_ends_where_told_and_short_periods_are_not_compared() -> None:
     assert periods_of(DAYS, [event(10)], Learning(20))[0] == Period(1, 0, 10, 10)
 
 
-def test_times_need_an_offset() -> None:
+def test_times_need_an_offset_and_an_event_is_a_place_a_time_and_words() -> None:
     assert time_ns_of("2025-01-01T02:00:00.000001+02:00") == 1_735_689_600_000_001_000
     with pytest.raises(ValueError, match="needs an offset from UTC"):
         time_ns_of("2025-01-01T02:00:00")
     with pytest.raises(ValueError, match="is not a time like"):
         time_ns_of("yesterday")
-
-
-def test_an_event_is_a_place_a_time_and_words() -> None:
     time_ns = 1_735_689_600 * 10**9
     of_unit = event_of("U1 2025-01-01T00:00:00Z new pads, LJB")
     assert of_unit == MachineEvent("U1", None, time_ns, "new pads, LJB")

@@ -52,7 +52,9 @@ def rules(plant_of: PlantOf) -> Callable[[str], BearingRules]:
     return build
 
 
-def test_without_limits_nothing_of_a_bearing_is_watched(plant_of: PlantOf) -> None:
+def test_without_limits_nothing_of_a_bearing_is_watched_and_in_a_replay_neither_link_nor_clock(
+    plant_of: PlantOf,
+) -> None:
     plant = plant_of()
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.LIVE)
@@ -63,15 +65,26 @@ def test_without_limits_nothing_of_a_bearing_is_watched(plant_of: PlantOf) -> No
     assert rules.clock is not None
     assert rules.clock.offset.limits == Limits(2.0, deadband=0.2)
 
+    rules = rules_of(plant.unit[0], plant.alarms, Origin.REPLAY)
 
-def test_limits_of_a_bearing_become_its_rules(rules: Callable[[str], BearingRules]) -> None:
+    assert (rules.link, rules.clock) == (None, None)
+    assert captures_of(plant, Origin.REPLAY, None)._histories == {}  # type: ignore[arg-type]
+    assert set(captures_of(plant, Origin.LIVE, None)._histories) == {"U1", "U2"}  # type: ignore[arg-type]
+
+
+def test_limits_of_a_bearing_become_its_rules_at_speed_unless_said_otherwise(
+    rules: Callable[[str], BearingRules],
+) -> None:
     found = rules(
         "alarms.shaft_order1_um_pk = { alert = 150.0, danger = 250.0, on_delay_s = 0.0 }\n"
         "alarms.oil_temperature_c = { danger = 75.0, deadband = 2.0, off_delay_s = 1.5 }\n"
         "alarms.shaft_overall_um_pp = { alert = 300.0,"
         ' states = ["part_load", "run_down"], latching = true }\n'
         "alarms.gap_um = { danger_below = 400.0, alert_below = 600.0,"
-        " alert = 2400.0, danger = 2600.0 }"
+        " alert = 2400.0, danger = 2600.0 }\n"
+        "alarms.bearing_overall_mm_s_rms = { alert = 2.0 }\n"
+        "alarms.eccentricity_ratio = { danger = 0.9 }\n"
+        "alarms.shaft_order1_change_um_pk = { alert = 30.0 }"
     )
 
     assert found.shaft_order1 == LimitRule(
@@ -85,17 +98,6 @@ def test_limits_of_a_bearing_become_its_rules(rules: Callable[[str], BearingRule
     assert found.shaft_overall.rule.is_latching
     assert found.gap is not None
     assert found.gap.limits == Limits(2400.0, 2600.0, 10.0, 600.0, 400.0)
-
-
-def test_limits_of_vibration_count_at_speed_unless_said_otherwise(
-    rules: Callable[[str], BearingRules],
-) -> None:
-    found = rules(
-        "alarms.bearing_overall_mm_s_rms = { alert = 2.0 }\n"
-        "alarms.eccentricity_ratio = { danger = 0.9 }\n"
-        "alarms.shaft_order1_change_um_pk = { alert = 30.0 }"
-    )
-
     for rule in (found.bearing_overall, found.eccentricity, found.shaft_change):
         assert isinstance(rule, LimitRule)
         assert rule.states == AT_SPEED
@@ -130,16 +132,6 @@ def test_a_reference_holds_in_each_state_it_names(plant_of: PlantOf) -> None:
     vectors = {"shaft_x": OrderVector(60.0), "bearing_y": OrderVector(20.0)}
     expected = [VectorReference("U1", "UJB", state, vectors) for state in (PART, FULL)]
     assert sorted(found, key=lambda r: r.state) == expected
-
-
-def test_a_replay_has_no_rules_for_link_and_clock_and_keeps_no_captures(plant_of: PlantOf) -> None:
-    plant = plant_of()
-
-    rules = rules_of(plant.unit[0], plant.alarms, Origin.REPLAY)
-
-    assert (rules.link, rules.clock) == (None, None)
-    assert captures_of(plant, Origin.REPLAY, None)._histories == {}  # type: ignore[arg-type]
-    assert set(captures_of(plant, Origin.LIVE, None)._histories) == {"U1", "U2"}  # type: ignore[arg-type]
 
 
 def test_clocks_captures_and_chattering_can_be_set(plant_of: PlantOf) -> None:

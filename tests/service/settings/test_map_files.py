@@ -78,6 +78,7 @@ def test_a_wrong_value_of_a_map_is_refused_with_line_key_and_fix(
 ) -> None:
     assert old in MINIMAL
     assert said in mistakes(MINIMAL.replace(old, new, 1))
+    assert "value: Field required" in mistakes("")
 
 
 @pytest.mark.parametrize(
@@ -107,9 +108,3 @@ def test_a_wrong_line_behind_a_map_is_refused_with_key_and_fix(
     mistakes, text: str, said: str
 ) -> None:
     assert said in mistakes(f"{MINIMAL}{text}\n")
-
-
-def test_a_file_that_is_empty_or_none_is_refused(tmp_path: Path, mistakes) -> None:
-    assert "value: Field required" in mistakes("")
-    with pytest.raises(TomlFileError, match="No such file"):
-        load_map_file(tmp_path / "absent.toml")

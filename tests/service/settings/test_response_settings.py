@@ -15,11 +15,9 @@ from service.settings.response import FOLDER, ResponseSettings, response_of
 PARTS: TypeAdapter[tuple[ResponseSettings, ...]] = TypeAdapter(tuple[ResponseSettings, ...])
 
 
-def test_a_transducer_without_response_is_flat() -> None:
-    assert response_of(()) is None
-
-
-def test_the_parts_of_a_response_work_one_after_the_other(tmp_path: Path) -> None:
+def test_a_transducer_is_flat_or_the_parts_of_its_response_work_one_after_the_other(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "amplifier.csv").write_text("frequency_hz,magnitude,phase_deg\n1,1,0\n2,1,0\n")
     text = """[{"kind": "high_pass", "corner_hz": 0.5, "order": 2},
                {"kind": "resonance", "natural_hz": 2500.0, "damping": 0.02},
@@ -34,6 +32,8 @@ def test_the_parts_of_a_response_work_one_after_the_other(tmp_path: Path) -> Non
             ResponseTable((1.0, 2.0), (1.0, 1.0), (0.0, 0.0)),
         )
     )
+
+    assert response_of(()) is None
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,9 @@ address = 1
 """
 
 
-def test_a_line_that_two_units_are_read_on_is_refused(plant_text: str, mistakes) -> None:
+def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
+    plant_text: str, mistakes, changed
+) -> None:
     text = plant_text.replace(HOST, 'device = "/dev/ttyUSB0"')
     line = text.rpartition("device =")[0].count("\n") + 1
 
@@ -26,8 +28,6 @@ def test_a_line_that_two_units_are_read_on_is_refused(plant_text: str, mistakes)
     assert said.startswith(f"{line}: unit[2].source.device = '/dev/ttyUSB0'")
     assert "is read by source of unit[1] already: a serial line has one source" in said
 
-
-def test_a_second_device_on_the_line_of_the_first_is_refused(changed, mistakes) -> None:
     text, _ = changed(HOST, 'device = "/dev/ttyUSB0"')
     first, unit_1, unit_2 = text.split("\n[[unit]]\n")
 

@@ -16,7 +16,7 @@ UJB = "unit[1].bearing[1]."
 
 
 KIND, HOST = 'kind = "modbus_ring"', 'host = "127.0.0.1"\nport = 0'
-SLOW = f"{UNIT_1}slow_channel"
+SLOW, OIL = f"{UNIT_1}slow_channel", 're = "ujb_oil_temperature"'
 SIMULATION = f"{UNIT_1}simulation."
 BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
 
@@ -53,12 +53,7 @@ BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
         ('_x = "ujb_shaft_x"', '_x = "z"', f"{UJB}shaft_x = 'z'", "there are ujb_shaft_x, ujb_"),
         ('_x = "ujb_bearing_x"', '_x = "ujb_shaft_x"', f"{UJB}bearing_x = 'ujb_", "used twice"),
         ('l = "speed"', 'l = "rpm"', f"{UNIT_1}speed_channel = 'rpm'", "there are speed, active_"),
-        (
-            're = "ujb_oil_temperature"',
-            're = "speed"',
-            f"{UJB}oil_temperature = 'speed'",
-            "in degC",
-        ),
+        (OIL, 're = "speed"', f"{UJB}oil_temperature = 'speed'", "in degC"),
         ("minimum = 0.0", "minimum = 200.0", f"{SLOW}[1].minimum = 200.0", "maximum"),
         ('"127.0.0.1"', '"0.0.0.0"', "service.host = '0.0.0.0'", "[service.tls]"),
         ("seed = 1\n", "seed = -1\n", f"{SIMULATION}seed = -1", "greater than or equal to 0"),
