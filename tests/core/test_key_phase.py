@@ -70,7 +70,7 @@ def test_edges_without_slope_still_give_angle_and_speed(speed_rpm: float) -> Non
 def test_edges_lie_between_the_samples_and_are_exact_where_they_slope() -> None:
     ramp = np.array([0.0, 0.0, 0.1, 0.7, 1.0, 1.0, 0.0, 0.0, 0.3, 0.9, 1.0, 0.0])
     assert rising_edges(ramp) == pytest.approx([2 + 2 / 3, 8 + 1 / 3])
-    """Behind an anti-alias filter an edge takes a few samples."""
+    # behind an anti-alias filter an edge takes a few samples
     turns = turned(92.3, 0.6 * math.pi)
     sloped = np.interp(turns % 1.0, [0.0, 0.01, 0.03, 0.04, 0.99, 1.0], [2.5, 5, 5, 0, 0, 2.5])
     found = read_key_phase(sloped, RATE_HZ)

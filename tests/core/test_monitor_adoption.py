@@ -26,7 +26,9 @@ def with_reference(unit: Unit, gap_reference_um: tuple[float, float]) -> Unit:
     return replace(unit, bearings=(replace(bearing, gap_reference_um=gap_reference_um),))
 
 
-def test_a_new_reference_moves_the_shaft_centre_from_the_next_result_on(unit: Unit, stream) -> None:
+def test_a_new_reference_moves_the_shaft_centre_and_nothing_else_from_the_next_result_on(
+    unit: Unit, stream
+) -> None:
     monitor = UnitMonitor(unit, AnalysisSettings())
     before = [a for block in stream[:3] for a in monitor.ingest(block)]
 
@@ -40,8 +42,6 @@ def test_a_new_reference_moves_the_shaft_centre_from_the_next_result_on(unit: Un
     assert after[0].window.n_segments == before[-1].window.n_segments + 1
     assert monitor.unit.bearings[0].gap_reference_um == (1970.0, 2000.0)
 
-
-def test_nothing_but_the_position_depends_on_the_reference(unit: Unit, stream) -> None:
     results = []
     for reference in ((2000.0, 2000.0), (1970.0, 2000.0)):
         monitor = UnitMonitor(unit, AnalysisSettings())

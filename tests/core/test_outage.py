@@ -61,15 +61,15 @@ def test_whatever_was_recorded_before_all_records_together_are_the_hole() -> Non
         assert sorted(covered) == list(range(1000, int(last)))
 
 
-def test_a_device_that_counts_anew_leaves_times_and_a_number_that_is_called_estimated() -> None:
+def test_a_device_that_counts_anew_leaves_an_estimate_and_what_it_counted_before_a_look_exactly() -> (
+    None
+):
     anew = at(0, epoch=8, shift_s=60.0)
 
     assert outage(KEPT, anew) == [
         Gap(7, 1000, 5000, anew.start_ns, time_ns(1000), is_estimated=True)
     ]
 
-
-def test_what_a_restarted_device_counted_before_anybody_looked_is_exact() -> None:
     anew = at(250, epoch=8, shift_s=60.0)
     begin_ns = T0 + 60_000_000_000
 

@@ -107,13 +107,20 @@ def test_velocity_has_the_power_of_its_band_after_what_the_transducer_takes_away
     assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
 
 
-def test_a_shaft_that_no_displacement_is_measured_of_has_none(measure: Measure, unit: Unit) -> None:
+def test_without_a_displacement_or_a_key_phase_there_is_no_shaft_motion_or_no_phase(
+    measure: Measure, unit: Unit
+) -> None:
     shafts = tuple(Channel(id_, Measurand.VELOCITY_MM_S) for id_ in ("sx", "sy"))
     there = replace(unit, channels=(*shafts, *unit.channels[2:]))
     found = measure(*[tone(60.0, TURN_HZ)] * 4, there=there)
 
     for name in ("overall_shaft_x_um_pp", "overall_shaft_um_pk"):
         assert found[name].quality == bad(Reason.NOT_MEASURED)
+
+    turning = tone(60.0, TURN_HZ)
+    found = measure(2e3 + turning, 2e3 + turning, turning, turning)
+
+    assert found["order1_shaft_x_phase_deg"].quality == bad(Reason.NOT_MEASURED)
 
 
 @pytest.mark.parametrize("mark_s", [0.0, 0.2, 0.5])
@@ -129,10 +136,3 @@ def test_a_phase_is_the_same_whenever_a_record_begins(
     assert found["order1_shaft_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)
     assert found["order1_shaft_y_phase_deg"].value == pytest.approx(300.0, abs=0.5)
     assert found["order1_bearing_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)
-
-
-def test_without_a_key_phase_there_is_no_phase(measure: Measure) -> None:
-    turning = tone(60.0, TURN_HZ)
-    found = measure(2e3 + turning, 2e3 + turning, turning, turning)
-
-    assert found["order1_shaft_x_phase_deg"].quality == bad(Reason.NOT_MEASURED)

@@ -78,12 +78,6 @@ def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted() -> None:
     np.testing.assert_array_equal(ring.read(0, 15).samples[0], np.arange(15))
 
 
-def test_samples_before_the_first_block_were_never_offered() -> None:
-    ring = Ring(2, CAPACITY)
-    assert ring.write(block(5000, 10, rejected=(Rejection("torn", 50),))) is None
-    assert ring.account.n_offered == 10
-
-
 def test_a_restarted_device_begins_a_new_count_without_a_giant_gap() -> None:
     ring = Ring(2, CAPACITY)
     ring.write(block(4_000_000_000, 10))
@@ -97,7 +91,9 @@ def test_a_restarted_device_begins_a_new_count_without_a_giant_gap() -> None:
     assert not ring.holds(0, 6)  # the rest are old samples of another epoch
 
 
-def test_a_window_has_the_worst_quality_and_the_mean_slow_reading_of_its_time() -> None:
+def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_all_blocks_have() -> (
+    None
+):
     ring = Ring(2, CAPACITY)
     clipped = (bad(Reason.CLIPPED), GOOD)
     ring.write(block(0, 10, channel_quality=clipped, slow={"oil": Reading(99.0)}))
@@ -108,6 +104,11 @@ def test_a_window_has_the_worst_quality_and_the_mean_slow_reading_of_its_time() 
     assert window.slow["oil"].value == 45.0
     assert ring.read(15, 30).slow["oil"].value == pytest.approx((5 * 40.0 + 10 * 50.0) / 15)
     assert ring.read(9, 30).channel_quality == (bad(Reason.CLIPPED), GOOD)
+    ring = Ring(2, CAPACITY)
+    ring.write(block(0, 10, slow={"oil": Reading(40.0), "power": Reading(1.0)}))
+    ring.write(block(10, 10, slow={"oil": Reading(50.0)}))
+    slow = ring.read(0, 20).slow
+    assert (slow["oil"].value, slow["power"]) == (45.0, missing(Reason.NOT_MEASURED))
 
 
 def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing() -> None:
@@ -120,7 +121,7 @@ def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing() 
     assert ring.holds(40_000, 40_010)
 
 
-def test_a_block_that_comes_twice_with_what_was_rejected_before_it_counts_once() -> None:
+def test_what_was_rejected_before_a_block_counts_once_and_before_the_first_never() -> None:
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
     torn = block(15, 10, rejected=(Rejection("torn", 5),))
@@ -129,6 +130,9 @@ def test_a_block_that_comes_twice_with_what_was_rejected_before_it_counts_once()
     account = ring.account
     assert (account.rejected, account.n_gap, account.n_repeated) == ({"torn": 5}, 0, 20)
     assert account.n_offered == account.n_stored + 5 == 25
+    ring = Ring(2, CAPACITY)
+    assert ring.write(block(5000, 10, rejected=(Rejection("torn", 50),))) is None
+    assert ring.account.n_offered == 10
 
 
 @pytest.mark.parametrize("refused", [(5,), (1, 4), (2, 7), (9, -1)])
@@ -140,14 +144,6 @@ def test_no_more_is_rejected_than_the_index_leaves_room_for(refused: tuple[int, 
     account = ring.account
     assert (account.n_gap, sum(account.rejected.values()), account.n_offered) == (0, 2, 22)
     assert min(account.rejected.values()) > 0
-
-
-def test_a_slow_reading_that_only_some_blocks_have_is_not_measured() -> None:
-    ring = Ring(2, CAPACITY)
-    ring.write(block(0, 10, slow={"oil": Reading(40.0), "power": Reading(1.0)}))
-    ring.write(block(10, 10, slow={"oil": Reading(50.0)}))
-    slow = ring.read(0, 20).slow
-    assert (slow["oil"].value, slow["power"]) == (45.0, missing(Reason.NOT_MEASURED))
 
 
 def test_a_block_with_other_channels_is_refused_naming_both() -> None:

@@ -20,9 +20,6 @@ class VirtualClock:
         self._sleepers: list[tuple[float, int, asyncio.Future[None]]] = []
         self._n = 0
 
-    def now_ns(self) -> int:
-        return round(self._now_s * 1e9)
-
     def monotonic_s(self) -> float:
         return self._now_s
 

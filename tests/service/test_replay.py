@@ -57,12 +57,11 @@ def over() -> threading.Event:
     return event
 
 
-async def test_a_device_that_stands_still_after_its_recording_ends_the_stream(over) -> None:
+async def test_a_device_that_stands_still_after_its_recording_ends_the_stream_without_a_clock(
+    over,
+) -> None:
     assert await taken(PlayedOut(Standing([FIRST, SECOND]), over)) == [FIRST, SECOND]
     assert await taken(PlayedOut(Standing([], refuses=True), over)) == []
-
-
-async def test_a_device_that_plays_the_past_has_no_clock_that_could_be_off(over) -> None:
     off = DeviceClock(offset_s=-28e6, drift_ppm=5e5, u_drift_ppm=1.0)
     [played] = await taken(PlayedOut(Standing([block(1, off)]), over))
     assert played.clock is None

@@ -51,7 +51,7 @@ def test_what_calls_for_somebody_is_counted_and_nothing_else() -> None:
     assert found.n_by_level == {ALERT: 2, DANGER: 1}
 
 
-def test_the_worst_ten_minutes_are_found_and_more_than_ten_alarms_are_a_flood() -> None:
+def test_the_worst_ten_minutes_and_the_most_frequent_alarms_are_found() -> None:
     found = figures([event(t) for t in (595.0, 600.0, 1000.0, 1194.9, 1195.0, 5000.0)])
 
     assert found.most_in_10_min == 4
@@ -59,8 +59,6 @@ def test_the_worst_ten_minutes_are_found_and_more_than_ten_alarms_are_a_flood() 
     flood, none = (figures([event(600.0 + i) for i in range(n)]) for n in (11, 10))
     assert (flood.share_in_flood, none.share_in_flood) == (pytest.approx(1 / 144), 0.0)
 
-
-def test_the_most_frequent_alarms_come_first_with_their_shares() -> None:
     found = figures([event(n, subject=s) for n, s in enumerate("AABACA")])
 
     assert [(f.alarm, f.n_alarms) for f in found.most_frequent] == [

@@ -57,15 +57,12 @@ def test_a_warm_up_lasts_on_through_changes_of_load() -> None:
     assert settled == [False] * 36 + [True] * 12
 
 
-def test_without_speed_or_power_or_after_a_gap_the_state_is_unknown() -> None:
+def test_without_speed_or_power_or_after_a_gap_the_state_is_unknown_and_time_goes_on() -> None:
     before = advance(NEVER_SEEN, OperatingReading(0, 92.3, 200.0), LIMITS)
     after = advance(before, OperatingReading(120 * MINUTE_NS, 50.0, 0.0), LIMITS)
     assert after.state is OperatingState.UNKNOWN
     states = [o.state for o in run([float("nan"), 92.3], [200.0, float("nan")])]
     assert states == [OperatingState.UNKNOWN] * 2
-
-
-def test_time_cannot_stand_still() -> None:
     operation = advance(NEVER_SEEN, OperatingReading(5, 92.3, 200.0), LIMITS)
     with pytest.raises(ValueError, match="not after 5 ns"):
         advance(operation, OperatingReading(5, 92.3, 200.0), LIMITS)
@@ -106,7 +103,6 @@ def one(grid: CellGrid, e: float, t: float, attitude_deg: float = 0.0) -> tuple[
 def test_a_reading_lies_in_the_cell_whose_middle_is_nearest_also_in_frost() -> None:
     grid = CellGrid(0.05, 2.5, attitude_width_deg=30.0)
     assert grid.centre(one(grid, 0.32, 41.0, 725.0)) == pytest.approx((0.325, 41.25, 15.0))
-    grid = CellGrid(0.05, 2.5, attitude_width_deg=30.0)
     assert one(grid, 0.0, -0.1, -10.0) == (0, -1, 11)
     nan, some = float("nan"), 0.3
     assert not CellGrid().is_known(FilmConditions.one(some, nan, some))[0]

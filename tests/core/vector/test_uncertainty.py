@@ -41,7 +41,7 @@ def test_transducers_bracket_and_the_unknown_coherence_are_the_systematic_part(r
     assert share[SPREAD] > 0.0
 
 
-def test_a_rack_asked_more_often_than_it_measures_is_not_believed_more(rack) -> None:
+def test_a_rack_that_repeats_itself_or_is_asked_too_often_is_not_believed_more(rack) -> None:
     rng = np.random.default_rng(7)
     measured = np.array([[60.0], [60.0], [20.0], [20.0]]) * (1 + 0.05 * rng.normal(size=(4, 12)))
     often = watch(rack(), blocks_of(np.repeat(measured, 5, axis=1)))[-1]
@@ -50,6 +50,10 @@ def test_a_rack_asked_more_often_than_it_measures_is_not_believed_more(rack) -> 
     name = "order1_k_eff_xx_n_per_m"
     assert often.readings[name].value == pytest.approx(once.readings[name].value)
     assert often.readings[name].u_random == pytest.approx(once.readings[name].u_random, rel=0.05)
+
+    newest = watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.0))[-1]
+
+    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.reason is Reason.FEW_SEGMENTS
 
 
 def test_a_rack_that_averages_longer_than_a_poll_is_not_believed_more(rack) -> None:
@@ -67,12 +71,6 @@ def test_a_rack_that_averages_longer_than_a_poll_is_not_believed_more(rack) -> N
     truth = 20.0 / 60.0 * K_B
     missed = [abs(r.value - truth) > 2.0 * u for r, u in zip(results, stated, strict=True)]
     assert sum(missed) <= 12
-
-
-def test_a_rack_that_repeats_itself_is_doubted(rack) -> None:
-    newest = watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.0))[-1]
-
-    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.reason is Reason.FEW_SEGMENTS
 
 
 FILM = 0.5e9 + 1j * 0.04e9

@@ -104,7 +104,9 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
     assert {alarm[1:4] for alarm in alarms} >= {("U2", "LJB", "x"), ("U2", "LJB", "y")}
 
 
-def test_the_damage_is_told_with_its_evidence(two_units: Any, found: Found) -> None:
+def test_the_damage_is_told_with_its_evidence_and_a_fault_that_was_learned_is_doubted(
+    two_units: Any, found: Found, histories: Histories
+) -> None:
     alarm = next(a for a in found.alarms if (a.unit, a.bearing) == ("U2", "LJB"))
     begin = alarm.begin
     assert rfc3339(two_units.damaged_ns) < begin < rfc3339(two_units.damaged_ns + 3 * DAY_NS)
@@ -118,6 +120,13 @@ def test_the_damage_is_told_with_its_evidence(two_units: Any, found: Found) -> N
     )
     assert alarm.cause.reason != "the response of the shaft has not been learned"
     assert alarm.cause.film_share is not None
+    place = ("U2", "LJB")
+    until_ns = two_units.damaged_ns + 50 * DAY_NS
+    learning = Learning(days=30, until_ns=until_ns)
+    found = run_back_test({place: histories[place]}, BackTestRules(learning))
+    (doubt,) = found.doubts
+    assert doubt.startswith("U2 LJB baseline 1: x changed by -")
+    assert doubt.endswith("the service would leave it to an engineer")
 
 
 def test_causes_are_told_by_the_newest_readings_of_all_bearings(
@@ -186,16 +195,6 @@ def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
     assert not any(
         a.bearing == "LJB" and a.begin >= rfc3339(two_units.damaged_ns) for a in found.alarms
     )
-
-
-def test_a_fault_that_was_learned_is_doubted(two_units: Any, histories: Histories) -> None:
-    place = ("U2", "LJB")
-    until_ns = two_units.damaged_ns + 50 * DAY_NS
-    learning = Learning(days=30, until_ns=until_ns)
-    found = run_back_test({place: histories[place]}, BackTestRules(learning))
-    (doubt,) = found.doubts
-    assert doubt.startswith("U2 LJB baseline 1: x changed by -")
-    assert doubt.endswith("the service would leave it to an engineer")
 
 
 def test_an_event_of_a_bearing_without_readings_is_refused(
