@@ -7,6 +7,7 @@ import pytest
 from rigs.tiers import fast_and_long
 
 from acquisition.arrival import Arrival
+from acquisition.clock import FastClock
 from acquisition.clock_estimate import ClockEstimate
 
 NS = 1_000_000_000
@@ -108,3 +109,21 @@ def test_a_host_that_was_suspended_takes_that_for_no_drift() -> None:
         awake = Arrival(HOST_NS + round((n + slept_s) * NS), float(n))
         estimate.add(1, round(RATE_HZ * (n + slept_s)), RATE_HZ, None, awake)
     assert estimate.reading().drift_ppm == pytest.approx(0.0, abs=0.01)
+
+
+async def test_a_fast_clock_passes_a_day_in_a_fiftieth_of_it(stepped_clock) -> None:
+    clock = FastClock(stepped_clock, 50.0)
+    start_ns = clock.now_ns()
+    assert start_ns == stepped_clock.now_ns()
+
+    await clock.sleep(86_400.0)
+
+    assert stepped_clock.monotonic_s() == pytest.approx(1728.0)
+    assert clock.monotonic_s() == pytest.approx(86_400.0)
+    assert clock.now_ns() - start_ns == 86_400_000_000_000
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan")])
+def test_a_clock_that_does_not_run_forward_is_refused(stepped_clock, speed) -> None:
+    with pytest.raises(ValueError, match="positive speed"):
+        FastClock(stepped_clock, speed)

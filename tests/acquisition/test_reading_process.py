@@ -1,9 +1,12 @@
-"""The process that reads foreign files has little, and less where it is given less."""
+"""Reading foreign files: libraries that are missing, and limits of the reading process."""
 
 import subprocess
 import sys
 
 import pytest
+
+from acquisition.errors import ConfigError
+from acquisition.extras import library
 
 CONFINED = """
 import resource
@@ -21,3 +24,10 @@ def test_limits_are_never_raised(given: int, memory: int) -> None:
     command = [sys.executable, "-c", script]
     found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert found.stdout.split() == [str(memory), "1000"]
+
+
+def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
+    with pytest.raises(
+        ConfigError, match=r"^XYZ needs absent_one: pip install 'padwatch\[imports\]'$"
+    ):
+        library("absent_one", "XYZ")

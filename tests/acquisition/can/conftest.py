@@ -147,21 +147,20 @@ def source_of(counts_calibration) -> Callable[..., CanSource]:
     return build
 
 
-async def blocks_of(source: CanSource, epoch: int, stop_index: int) -> list[SampleBlock]:
-    """Everything a source delivers up to a sample."""
-    blocks = []
-    async with source.connect() as stream:
-        async for block in stream:
-            blocks.append(block)
-            if block.epoch == epoch and block.stop_index >= stop_index:
-                return blocks
-    raise AssertionError("the stream has ended")
-
-
 @pytest.fixture
 def read_up_to() -> Callable:
-    """`blocks_of`: everything a source delivers up to a sample of an epoch."""
-    return blocks_of
+    """Reads everything a source delivers up to a sample of an epoch."""
+
+    async def read(source: CanSource, epoch: int, stop_index: int) -> list[SampleBlock]:
+        blocks = []
+        async with source.connect() as stream:
+            async for block in stream:
+                blocks.append(block)
+                if block.epoch == epoch and block.stop_index >= stop_index:
+                    return blocks
+        raise AssertionError("the stream has ended")
+
+    return read
 
 
 @pytest.fixture

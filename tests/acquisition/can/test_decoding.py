@@ -1,12 +1,17 @@
-"""The compiled layout reads what cantools reads, for any signal in any place."""
+"""The compiled layout reads what cantools reads, in any place and in multiplexed messages."""
 
+from pathlib import Path
+
+import can
 import cantools
 import numpy as np
 import pytest
 
-from acquisition.can.dbc import load_dbc
+from acquisition.can.dbc import load_dbc, parse_dbc
 from acquisition.can.layout import FrameLayout, byte_offset, scalar_reader
-from acquisition.errors import FrameError
+from acquisition.can.survey import Survey
+from acquisition.errors import ConfigError, FrameError
+from core.blocks import Rejection
 
 N_FRAMES = 20
 
@@ -81,3 +86,96 @@ def test_a_multiplexed_message_cannot_be_read_at_a_value_it_does_not_have(tmp_pa
         read(b"\0\x0e" + bytes(6))
     with pytest.raises(FrameError, match="M"):
         read(b"\5\x0e" + bytes(6))
+
+
+START_NS = 1_767_225_600_000_000_000
+DBC = """VERSION ""
+BU_: N
+BO_ 300 M: 8 N
+ SG_ which M : 0|4@1+ (1,0) [0|0] "" N
+ SG_ count : 4|12@1+ (1,0) [0|0] "" N
+ SG_ a m0 : 16|16@1- (1,0) [0|0] "V" N
+ SG_ b m0 : 32|16@1- (1,0) [0|0] "V" N
+ SG_ c m1 : 16|16@1- (1,0) [0|0] "V" N
+ SG_ d m1 : 39|16@0- (1,0) [0|0] "V" N
+ SG_ e m2 : 16|16@1- (1,0) [0|0] "V" N
+"""
+
+
+def frame(which: int, count: int, *words: int):
+    head = (which | count % 4096 << 4).to_bytes(2, "little")
+    body = b"".join((w % 2**15).to_bytes(2, "little") for w in words)
+    return 300, (head + body).ljust(8, b"\0")
+
+
+def instant(number: int):
+    d = (number + 3) % 2**15
+    swapped = (d & 0xFF) << 8 | d >> 8
+    return [
+        frame(0, number, number, number + 1),
+        frame(1, number, number + 2, swapped) if swapped < 2**15 else _raw(number, d),
+        frame(7, number, 99),
+    ]
+
+
+def _raw(number: int, d: int):
+    key, data = frame(1, number, number + 2, 0)
+    return key, data[:4] + d.to_bytes(2, "big") + data[6:]
+
+
+@pytest.fixture
+def assembler_with(settings_of, assembler_by):
+    """Builds the assembler of four channels with some counters."""
+    signals = {n: f"M.{n}" for n in "abcd"}
+    return lambda counters: assembler_by(settings_of(DBC, signals, counters=counters))
+
+
+@pytest.mark.parametrize("counters", [("M.count",), ()], ids=["counted", "uncounted"])
+def test_the_parts_of_an_instant_are_put_together(counters, assembler_with):
+    assembler = assembler_with(counters)
+    blocks = []
+    for first in range(0, 9000, 30):
+        frames = [f for n in range(first, first + 30) for f in instant(n)]
+        blocks += assembler.take(frames, START_NS + round((first + 30) / 600 * 1e9))
+    samples = np.concatenate([block.counts for block in blocks], axis=1)
+    expected = (np.arange(9000) + np.arange(4)[:, np.newaxis]) % 2**15
+    np.testing.assert_array_equal(samples, expected)
+    assert blocks[-1].stop_index == 9000
+
+
+def test_a_lost_part_drops_the_instant(assembler_with):
+    assembler = assembler_with(("M.count",))
+    frames = [f for n in range(10) for f in (instant(n)[:1] if n == 4 else instant(n))]
+    blocks = assembler.take(frames, START_NS)
+    assert [(b.first_index, b.stop_index) for b in blocks] == [(0, 4), (5, 10)]
+    assert blocks[1].rejected == (Rejection("incomplete_frames", 1),)
+
+
+@pytest.mark.parametrize(
+    ("signals", "words"),
+    [
+        ("M.a M.c", "must all be in one message"),
+        ("M.count", "in every frame of a multiplexed message"),
+    ],
+)
+def test_a_channel_has_samples_of_one_part(signals, words, settings_of, assembler_by):
+    with pytest.raises(ConfigError, match=words):
+        assembler_by(settings_of(DBC, {"a": signals}))
+
+
+@pytest.mark.parametrize("inner", ["", "m0M"], ids=["once", "twice over"])
+def test_a_probe_shows_a_multiplexed_message_though_the_dbc_lacks_some_of_its_values(inner):
+    text = (
+        'VERSION ""\nBU_: N\nBO_ 200 X: 2 N\n SG_ outer M : 0|4@1+ (1,0) [0|0] "" N\n'
+        f' SG_ inner {inner or "m0"} : 4|4@1+ (1,0) [0|0] "" N\n'
+        ' SG_ y m1 : 8|8@1+ (1,0) [0|0] "" N\n'
+    )
+    if inner:
+        text += "SG_MUL_VAL_ 200 y inner 1-1;\nSG_MUL_VAL_ 200 inner outer 0-0;\n"
+    survey = Survey(parse_dbc(text, Path("x.dbc")))
+    for first in (0x10, 0x20, 0x01, 0x0F):
+        survey.add(can.Message(arbitration_id=200, is_extended_id=False, data=bytes([first, 7])))
+    [look] = survey.look(1.0).messages
+    spans = {span.name: (span.minimum, span.maximum) for span in look.signals}
+    assert spans["y"] == (7.0, 7.0)
+    assert spans["outer"] == ((0.0, 0.0) if inner else (0.0, 1.0))

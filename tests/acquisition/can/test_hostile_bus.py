@@ -1,16 +1,23 @@
 """C1 to C10 over the real slcan wire: nothing false is accepted, what is lost is counted."""
 
 import asyncio
+import hashlib
+import itertools
 import threading
 from collections import Counter
+from contextlib import AsyncExitStack
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs.tiers import covering
+from rigs.tiers import covering, fast_and_long
 
+from acquisition.daq.can_bus import CanBusServer
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.delivery import Delivery
 from acquisition.errors import LinkError
+from acquisition.raw import FeedEndedError
 
 N_EACH = 200
 N_CHANNELS = 4
@@ -172,3 +179,143 @@ async def test_a_stalled_reader_drops_frames_counts_them_and_finds_the_gap(
     assert watch.lost.total() > 0
     n_stored = sum(block.n_samples for block in watch.blocks)
     assert n_stored + watch.lost.total() == device.ledger.n_samples("U1")
+
+
+N_BLOCKS = 40
+MOST_BELIEVED = 200
+"""Samples that may pass until it is noticed: a third of a second."""
+
+
+class Twin:
+    """What a second module measures; it began to count elsewhere."""
+
+    def __init__(self, feed, ahead: int) -> None:
+        self._feed = feed
+        self._ahead = ahead
+
+    def advance(self, n_samples: int):
+        raw = self._feed.advance(n_samples)
+        counts = ((raw.counts.astype(int) + 1000) % 2**15).astype(np.int16)
+        return replace(raw, first_index=raw.first_index + self._ahead, counts=counts)
+
+
+async def read_to_the_end(stream) -> tuple[int, str]:
+    """How many samples came until the link was given up, and why it was."""
+    n_samples = 0
+    try:
+        async for block in stream:
+            n_samples += block.n_samples
+    except LinkError as error:
+        return n_samples, str(error)
+    raise AssertionError("the stream has ended")
+
+
+@pytest.mark.parametrize(("ahead", "fd"), covering([0, 3, 50, 100_000], [True, False]))
+async def test_two_modules_with_the_same_ids_are_not_believed_until_one_is_unplugged(
+    fd, ahead, shape_of, source_of, counting_feed
+):
+    shape = shape_of(fd=fd)
+    device = CanDevice(counting_feed(n_channels=4), shape)
+    twin = CanDevice(Twin(counting_feed(n_channels=4), ahead), shape)
+    channel = f"two senders {fd} {ahead}"
+    async with AsyncExitStack() as plugs:
+        server = await plugs.enter_async_context(CanBusServer(device, channel=channel))
+        source = source_of(shape, server.endpoint, stale_after_s=1.0)
+        async with CanBusServer(twin, channel=channel) as second, source.connect() as stream:
+            for _ in range(N_BLOCKS):
+                server.produce()
+                second.produce()
+            n_samples, reason = await read_to_the_end(stream)
+        assert "no credible sample" in reason
+        assert "do two devices send the same ids?" in reason
+        assert n_samples <= MOST_BELIEVED
+        server.produce(60)  # one is unplugged: that it is alone must show first
+        async with source.connect() as stream:
+            block = await anext(stream)
+    assert block.stop_index <= (N_BLOCKS + 60) * 50
+    index = np.arange(block.first_index, block.stop_index)
+    np.testing.assert_array_equal(block.samples[0], index % 2**15)
+
+
+async def test_a_module_that_sends_each_frame_twice_is_believed(shape, device, source_of):
+    async with CanBusServer(device, channel="each frame twice") as server:
+        source = source_of(shape, server.endpoint)
+        server.inject("repeat", N_BLOCKS * 50 * len(shape.waves))
+        async with source.connect() as stream:
+            server.produce(N_BLOCKS)
+            blocks = [await anext(stream) for _ in range(N_BLOCKS)]
+    assert blocks[-1].stop_index == N_BLOCKS * 50
+    assert set(source.refused_frames) == {"duplicate_frame"}
+
+
+LONG_IDS = {"extended": True, "base_id": 0x18FF0100}
+KINDS = {
+    "classic": {},
+    "fd": {"fd": True},
+    "classic, long ids": LONG_IDS,
+    "fd, long ids": {"fd": True, **LONG_IDS},
+}
+
+
+def fingerprint(blocks) -> list[str]:
+    """A hash of everything in a block but how the host's clock stands."""
+    return [
+        hashlib.sha256(
+            repr(
+                (
+                    b.unit, b.epoch, b.first_index, b.start_ns, b.rate_hz, b.samples.tobytes(),
+                    b.samples.dtype, b.samples.shape, b.channel_quality, sorted(b.slow.items()),
+                    b.rejected, b.stamp_fault,
+                )
+            ).encode()
+        ).hexdigest()
+        for b in blocks
+    ]  # fmt: skip
+
+
+def straight(feed, calibration, n_samples: int = 50) -> list:
+    delivery = Delivery(calibration)
+    blocks = []
+    try:
+        while True:
+            blocks += delivery.take(feed.advance(n_samples))
+    except FeedEndedError:
+        return blocks
+
+
+@pytest.fixture
+def both_ways(eventful_feed, shape_of, source_of, counts_calibration, read_up_to):
+    """Blocks of a feed straight from the converter, those over the wire, and what was refused."""
+
+    async def read(feed: dict, shape: dict, n_samples: int = 50):
+        direct = straight(eventful_feed(**feed), counts_calibration(n_channels=4), n_samples)
+        shape = shape_of(**shape)
+        device = CanDevice(eventful_feed(**feed), shape, block_samples=n_samples)
+        async with SlcanTcpServer(device, on_demand=True) as server:
+            source = source_of(shape, server.endpoint, when_full="wait")
+            wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
+            await server.run()
+        return direct, wired, source.refused_frames
+
+    return read
+
+
+@pytest.mark.parametrize("seed", fast_and_long(1, 2))
+@pytest.mark.parametrize("floats", [False, True], ids=["counts", "floats"])
+@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
+    fd, floats, seed, both_ways
+):
+    feed, shape = {"floats": floats, "seed": seed}, {"fd": fd, "floats": floats}
+    direct, wired, refused = await both_ways(feed, shape)
+    assert fingerprint(wired) == fingerprint(direct)
+    assert len({b.epoch for b in direct}) > 1
+    assert any(a.stop_index < b.first_index for a, b in itertools.pairwise(direct))
+    assert refused == {}
+
+
+@pytest.mark.parametrize(("n_samples", "kind"), covering([1, 3, 48, 51], list(KINDS)))
+async def test_blocks_of_any_length_come_through(kind, n_samples, both_ways):
+    """Also where they end within a frame of five samples."""
+    direct, wired, _ = await both_ways({"n_blocks": 200}, KINDS[kind], n_samples)
+    assert fingerprint(wired) == fingerprint(direct)

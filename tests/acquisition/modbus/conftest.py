@@ -2,13 +2,11 @@
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from functools import partial
 
 import pytest
 from rigs.hostile_modbus import HostileLine, HostileServer
 from rigs.modbus import transport_of
 from rigs.polled import CALIBRATION, Follower, device_of, map_of
-from rigs.queues import queue_plant
 
 from acquisition.clock import SystemClock
 from acquisition.daq.map_device import MapDevice
@@ -130,12 +128,6 @@ def plant(stepped_clock) -> Callable:
             yield source, device, server, clock
 
     return build
-
-
-@pytest.fixture
-def queues(counting_feed, counts_calibration, stepped_clock) -> Callable:
-    """Serves queues of a layout, on a stepped clock; other settings as keywords."""
-    return partial(queue_plant, counting_feed(), counts_calibration(), stepped_clock)
 
 
 class Bench:

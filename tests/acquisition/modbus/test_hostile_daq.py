@@ -4,8 +4,7 @@ import asyncio
 from contextlib import AsyncExitStack
 
 import pytest
-from rigs.hostile_sources import KINDS, Trial, lies_to
-from rigs.wrong_replies import COMMON, CONTENTS
+from rigs.hostile_sources import COMMON, CONTENTS, KINDS, Trial, lies_to
 
 FEW = 4
 MANY = {"tcp": 100, "rtu": 20}

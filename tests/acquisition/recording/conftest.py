@@ -16,11 +16,12 @@ MADE_BY = "padwatch in a test"
 START_NS = 1_767_225_600_000_000_000
 
 
-def recorded_unit(n_channels: int = 2, n_slow: int = 2, rate_hz: float = 600.0) -> RecordedUnit:
+@pytest.fixture(scope="session")
+def unit() -> RecordedUnit:
     """Probes of -8 V at 2 mm, and slow channels in degC from -10 to 120."""
     return RecordedUnit(
         unit="U1",
-        rate_hz=rate_hz,
+        rate_hz=600.0,
         channels=tuple(
             RecordedChannel(
                 id=f"c{n}",
@@ -30,11 +31,11 @@ def recorded_unit(n_channels: int = 2, n_slow: int = 2, rate_hz: float = 600.0) 
                 ok_min_v=-11.0,
                 ok_max_v=11.0,
             )
-            for n in range(n_channels)
+            for n in range(2)
         ),
         slow_channels=tuple(
             RecordedSlowChannel(id=f"slow{n}", unit="degC", minimum=-10.0, maximum=120.0)
-            for n in range(n_slow)
+            for n in range(2)
         ),
     )
 
@@ -51,11 +52,6 @@ def numbered_block(first_index: int, n_samples: int, epoch: int = 1, **changes: 
         "slow": (45.0, math.nan),
     }
     return RawBlock(**(values | changes))
-
-
-@pytest.fixture(scope="session")
-def unit() -> RecordedUnit:
-    return recorded_unit()
 
 
 @pytest.fixture(scope="session")
