@@ -97,6 +97,8 @@ def test_many_or_missing_or_unknown_or_uneven_columns_are_refused_briefly() -> N
         histories_from_columns({**rows, "colour": rows["unit"]})
     with pytest.raises(ValueError, match="unequal length"):
         histories_from_columns({**rows, "state": ["part_load"]})
+    with pytest.raises(ValueError, match=r"power_mw: shape \(4,\), expected \(5,\)"):
+        replace(history(), power_mw=np.ones(4))
 
 
 def test_states_that_are_told_settle_as_those_that_are_followed() -> None:
@@ -149,8 +151,3 @@ def test_impossible_columns_are_refused_with_their_row(
     wrong[row] = value
     with pytest.raises(ValueError, match=says):
         replace(history(), **{column: wrong})
-
-
-def test_a_column_of_another_length_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"power_mw: shape \(4,\), expected \(5,\)"):
-        replace(history(), power_mw=np.ones(4))

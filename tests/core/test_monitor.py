@@ -49,7 +49,9 @@ def test_results_come_with_each_hop_however_the_samples_are_cut(
         assert [a.time_ns for a in other] == pytest.approx([a.time_ns for a in single], abs=1)
 
 
-def test_the_machine_reads_its_stiffness_and_position(results: Results, signals) -> None:
+def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(
+    results: Results, signals
+) -> None:
     *few, newest = results(signals(60.0, gaps_um=GAPS_UM))
     value = {name: reading.value for name, reading in newest.readings.items()}
     assert value["order1_shaft_x_um_pk"] == pytest.approx(60.0, rel=1e-3)
@@ -64,6 +66,13 @@ def test_the_machine_reads_its_stiffness_and_position(results: Results, signals)
     assert newest.window.coverage == 1.0
     reasons = [a.readings["order1_k_eff_xx_n_per_m"].quality.reason for a in (*few, newest)]
     assert reasons == [Reason.FEW_SEGMENTS] * 3 + [Reason.OK]
+    orbit = results(signals(14.0))[-1].orbit
+    assert orbit is not None
+    n = orbit.shaft_x_um.size
+    assert n == round(3 * 60 / 92.3 * RATE_HZ)
+    turn = 2 * np.pi * 92.3 / 60 * np.arange(SEGMENT - n, SEGMENT) / RATE_HZ
+    np.testing.assert_allclose(orbit.shaft_x_um, 60 * np.cos(turn), atol=1.5)
+    np.testing.assert_allclose(orbit.shaft_y_um, 60 * np.sin(turn), atol=1.5)
 
 
 def test_a_vortex_off_its_nominal_order_is_found_and_read_true(results: Results, signals) -> None:
@@ -130,16 +139,6 @@ def test_a_standing_machine_has_no_orders_and_the_line_gives_a_speed_that_nobody
     assert newest.readings["speed_rpm"].value == pytest.approx(92.3, rel=2e-3)
     assert newest.readings["order1_shaft_x_um_pk"].value == pytest.approx(60.0, rel=3e-3)
     assert newest.readings["order1_shaft_x_um_pk"].quality.reason is Reason.SPEED_UNKNOWN
-
-
-def test_the_orbit_is_the_newest_turns_of_the_shaft(results: Results, signals) -> None:
-    orbit = results(signals(14.0))[-1].orbit
-    assert orbit is not None
-    n = orbit.shaft_x_um.size
-    assert n == round(3 * 60 / 92.3 * RATE_HZ)
-    turn = 2 * np.pi * 92.3 / 60 * np.arange(SEGMENT - n, SEGMENT) / RATE_HZ
-    np.testing.assert_allclose(orbit.shaft_x_um, 60 * np.cos(turn), atol=1.5)
-    np.testing.assert_allclose(orbit.shaft_y_um, 60 * np.sin(turn), atol=1.5)
 
 
 def test_what_came_before_an_outage_or_a_restart_is_in_no_average_after_it(

@@ -68,7 +68,7 @@ def test_running_speed_alone_is_left_of_a_motion_with_vortex_harmonic_and_noise(
     assert np.max(np.abs(alone[inner] - x[inner])) < 1.5
 
 
-def test_a_motion_that_grows_is_followed() -> None:
+def test_a_motion_that_grows_is_followed_across_short_holes_and_not_across_long_ones() -> None:
     x, _ = on_ellipse(60.0, 40.0, 0.0, 1)
 
     size = np.abs(order_phasors(x * np.linspace(0.5, 1.5, T.size), RATE_HZ, TURN_HZ))
@@ -76,8 +76,6 @@ def test_a_motion_that_grows_is_followed() -> None:
     at = [T.size // 4, MIDDLE, 3 * T.size // 4]
     assert size[at] == pytest.approx([45.0, 60.0, 75.0], rel=0.01)
 
-
-def test_short_holes_are_bridged_and_long_ones_stay() -> None:
     x, _ = on_ellipse(60.0, 40.0, 0.0, 1)
     x[3000:3100] = np.nan
     x[6000:11000] = np.nan

@@ -61,9 +61,7 @@ def test_whatever_was_recorded_before_all_records_together_are_the_hole() -> Non
         assert sorted(covered) == list(range(1000, int(last)))
 
 
-def test_a_device_that_counts_anew_leaves_an_estimate_and_what_it_counted_before_a_look_exactly() -> (
-    None
-):
+def test_a_device_that_counts_anew_leaves_an_estimate_and_what_it_has_counted() -> None:
     anew = at(0, epoch=8, shift_s=60.0)
 
     assert outage(KEPT, anew) == [

@@ -43,7 +43,7 @@ def standard(reading: Reading) -> float:
     return math.hypot(reading.u_random, reading.u_systematic)
 
 
-def test_four_probes_tell_displacement_from_growth() -> None:
+def test_four_probes_tell_displacement_from_growth_and_two_say_what_they_take_for_it() -> None:
     centre = locate_shaft(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
 
     assert number(centre.x_um) == pytest.approx(60.0)
@@ -53,8 +53,6 @@ def test_four_probes_tell_displacement_from_growth() -> None:
     assert number(centre.attitude_angle_deg) == pytest.approx(-53.13, abs=0.01)
     assert centre.eccentricity_ratio.quality == GOOD
 
-
-def test_two_probes_take_growth_for_displacement_and_say_by_how_much() -> None:
     x, y = gaps(60.0, -80.0, 35.0)
     two = replace(x, far=None), replace(y, far=None)
     centre = locate_shaft(*two, CLEARANCE_UM)

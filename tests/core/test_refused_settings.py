@@ -14,10 +14,13 @@ from core.condition.operating_limits import OperatingLimits
 from core.decision.limits import ChangeLimits
 from core.dynamic_settings import DynamicSettings
 from core.excitation import LineLimits
+from core.transducer_response import ResponseTable
 from core.uncertainty import BearingAccuracy
 from core.vector_settings import VectorSettings
 
 Operating = partial(OperatingLimits, rated_speed_rpm=92.3)
+PAIR, ZEROS = (1.0, 2.0), (0.0, 0.0)
+Sheet = partial(ResponseTable, frequency_hz=PAIR, magnitude=PAIR, phase_deg=ZEROS)
 Vector = partial(VectorSettings, n_polls=60)
 SHARES = ("shaft_gain", "bearing_gain", "bracket_stiffness", "probe_noise")
 
@@ -67,6 +70,12 @@ SHARES = ("shaft_gain", "bearing_gain", "bracket_stiffness", "probe_noise")
         (Operating, {"rated_power_mw": 330.0, "full_load_above": -1.0}, "full_load_above = -1 "),
         (Operating, {"rated_power_mw": 330.0, "full_load_above": 0.06}, "full_load_above = 0.06"),
         (Operating, {"rated_power_mw": 330.0, "speed_hysteresis": 0.1}, "hysteresis of 0.1"),
+        (Sheet, {"frequency_hz": (1.0,), "magnitude": (1.0,), "phase_deg": (0.0,)}, "two or more"),
+        (Sheet, {"magnitude": (1.0,)}, "two or more whole points"),
+        (Sheet, {"frequency_hz": (0.0, 2.0)}, "above 0 Hz"),
+        (Sheet, {"frequency_hz": (2.0, 1.0)}, "must rise"),
+        (Sheet, {"magnitude": (0.0, 1.0)}, "above 0, got 0"),
+        (Sheet, {"magnitude": (1.0, math.nan)}, "finite"),
         (Vector, {"hop_polls": 0}, "polls"),
         (Vector, {"hop_polls": 61}, "polls"),
         (Vector, {"min_polls": 1}, "polls"),

@@ -192,12 +192,9 @@ def test_gaps_that_do_not_fit_the_probes_are_refused(
         given_gaps(of, near, opposite)
 
 
-@pytest.mark.parametrize("age_min", [0.0, 9.9, -9.9])
-def test_the_newest_mean_gaps_become_the_reference(age_min: float) -> None:
-    assert measured_gaps(bearing(), newest(age_min), NOW) == ((1998.5, 2003.1), None)
-
-
-def test_measured_gaps_include_opposite_ones_and_doubtful_ones_are_named() -> None:
+def test_the_newest_mean_gaps_become_the_reference_and_doubtful_ones_are_named() -> None:
+    for age_min in (0.0, 9.9, -9.9):
+        assert measured_gaps(bearing(), newest(age_min), NOW) == ((1998.5, 2003.1), None)
     found = newest(opposite_gap_x_um=Reading(7.0), opposite_gap_y_um=Reading(8.0))
 
     assert measured_gaps(FOUR, found, NOW) == ((1998.5, 2003.1), (7.0, 8.0))

@@ -15,7 +15,7 @@ def runner_result(*arguments: str) -> tuple[int, str]:
     return result.exit_code, result.stdout
 
 
-def test_validate_prints_every_table_and_how_far_off_it_is() -> None:
+def test_validate_prints_every_table_or_as_json_a_row_for_every_figure() -> None:
     exit_code, text = runner_result()
 
     assert exit_code == 0
@@ -24,8 +24,6 @@ def test_validate_prints_every_table_and_how_far_off_it_is() -> None:
     assert "80 amplitudes" in text
     assert "20 of 20 stiffnesses" in text
 
-
-def test_validate_as_json_has_a_row_for_every_figure() -> None:
     exit_code, text = runner_result("--json")
     rows = json.loads(text)
 

@@ -29,7 +29,9 @@ def changes(alarms: UnitAlarms, conditions: Mapping[str, Condition], now_ns: int
     return [event.change.value for told in news for event in told.events]
 
 
-def test_films_have_an_alarm_in_each_direction_if_asked_for(alarms: UnitAlarms, unit: Unit) -> None:
+def test_films_have_an_alarm_in_each_direction_that_announces_a_loss_with_its_size(
+    alarms: UnitAlarms, unit: Unit
+) -> None:
     ids = [alarm.identity.id for alarm in alarms.alarms]
     assert [id_ for id_ in ids if "stiffness" in id_] == [FILM_X, "U1:UJB:stiffness_y"]
     unwatched = UnitAlarms(unit, UnitRules())
@@ -37,8 +39,6 @@ def test_films_have_an_alarm_in_each_direction_if_asked_for(alarms: UnitAlarms, 
     with pytest.raises(KeyError):
         unwatched.films({FILM_X: LOST}, 0)
 
-
-def test_a_loss_of_stiffness_is_announced_at_once_with_its_size(alarms: UnitAlarms) -> None:
     [news] = alarms.films({FILM_X: LOST}, 7)
 
     [event] = news.events

@@ -94,7 +94,7 @@ def test_too_little_motion_gives_no_stiffness(rack, amplitudes, changes, reason)
     assert newest.readings["stiffness_xx_n_per_m"].quality.reason is reason
 
 
-def test_a_lost_probe_is_never_shown_as_a_number(rack) -> None:
+def test_a_lost_probe_is_never_shown_as_a_number_and_a_flagged_one_enters_no_average(rack) -> None:
     monitor = rack()
     watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=48))
     lost = {0: bad(Reason.SENSOR_FAILURE)}
@@ -105,8 +105,6 @@ def test_a_lost_probe_is_never_shown_as_a_number(rack) -> None:
     assert newest.readings["order1_k_eff_yy_n_per_m"].value is not None
     assert newest.quality.level is Level.BAD
 
-
-def test_no_number_that_a_rack_flags_enters_an_average(rack) -> None:
     monitor = rack()
     watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=40, noise=0.0))
     wrong = {0: bad(Reason.CLIPPED)}
@@ -134,13 +132,26 @@ def test_a_standing_machine_gives_nothing_and_one_without_a_speed_the_rated_one_
     assert newest.readings["order1_k_eff_xx_n_per_m"].quality.level is Level.UNCERTAIN
 
 
-def test_gaps_give_the_shaft_centre(rack) -> None:
+def test_gaps_give_the_shaft_centre_which_moves_with_a_new_reference_alone(rack) -> None:
     stream = polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, noise=1e-6)
     newest = watch(rack(AMPLITUDES + GAPS), stream)[-1]
 
     assert newest.readings["gap_x_um"].value == pytest.approx(1970.0, rel=1e-4)
     assert newest.readings["shaft_centre_x_um"].value == pytest.approx(30.0, abs=0.1)
     assert newest.readings["eccentricity_ratio"].value == pytest.approx(0.25, abs=0.001)
+
+    monitor = rack(AMPLITUDES + GAPS)
+    stream = polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, n=24, noise=0.0)
+    before = watch(monitor, stream[:12])[-1]
+    [bearing] = monitor.unit.bearings
+    moved = replace(bearing, gap_reference_um=(1970.0, 1960.0))
+    monitor.adopt(replace(monitor.unit, bearings=(moved,)))
+    after = watch(monitor, stream[12:])[-1]
+
+    assert before.readings["eccentricity_ratio"].value == pytest.approx(0.25)
+    assert after.readings["eccentricity_ratio"].value == pytest.approx(0.0)
+    with pytest.raises(ValueError, match="rated_speed_rpm is 100"):
+        monitor.adopt(replace(monitor.unit, rated_speed_rpm=100.0))
 
 
 def test_the_vortex_order_is_its_own_line_or_switched_off(rack) -> None:
@@ -183,21 +194,6 @@ def test_a_restart_begins_a_new_average(rack) -> None:
     assert newest.window.n_segments == 12
     assert newest.window.epoch == 2
     assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(40.0)
-
-
-def test_a_new_reference_moves_the_centre_and_nothing_else_may_change(rack) -> None:
-    monitor = rack(AMPLITUDES + GAPS)
-    stream = polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, n=24, noise=0.0)
-    before = watch(monitor, stream[:12])[-1]
-    [bearing] = monitor.unit.bearings
-    moved = replace(bearing, gap_reference_um=(1970.0, 1960.0))
-    monitor.adopt(replace(monitor.unit, bearings=(moved,)))
-    after = watch(monitor, stream[12:])[-1]
-
-    assert before.readings["eccentricity_ratio"].value == pytest.approx(0.25)
-    assert after.readings["eccentricity_ratio"].value == pytest.approx(0.0)
-    with pytest.raises(ValueError, match="rated_speed_rpm is 100"):
-        monitor.adopt(replace(monitor.unit, rated_speed_rpm=100.0))
 
 
 def test_a_block_of_something_else_is_refused(rack) -> None:

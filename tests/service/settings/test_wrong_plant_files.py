@@ -134,13 +134,22 @@ def test_several_mistakes_are_all_named_at_once(plant_text: str, mistakes: Mista
     assert any("plant.nmae = 'Demo plant': unknown key" in line for line in found)
 
 
-def test_lines_are_counted_as_editors_count_them(plant_text: str, mistakes: Mistakes) -> None:
+def test_lines_are_counted_as_editors_count_them_also_where_a_file_is_not_utf_8(
+    plant_text: str, mistakes: Mistakes
+) -> None:
     text = f"# a comment with \u2028 and \x85\r\n{plant_text.replace('= 1.18e9', '= 1.18', 1)}"
 
     [found] = mistakes(text)
 
     line = plant_text[: plant_text.index("= 1.18e9")].count("\n") + 2
     assert found.startswith(f"{line}: {UJB}bracket_stiffness_n_per_m")
+
+    latin_1 = plant_text.replace('"Demo plant"', '"Tucuruí"').encode("latin-1")
+
+    [found] = mistakes(latin_1)
+
+    assert found.startswith(f"{plant_text[: plant_text.index('Demo plant')].count(chr(10)) + 1}: ")
+    assert "not UTF-8" in found
 
 
 @pytest.mark.parametrize(
@@ -162,17 +171,6 @@ def test_a_monstrous_value_is_refused_in_a_short_line(
 
     assert said in found
     assert len(found) < 300
-
-
-def test_a_file_that_is_not_utf_8_is_refused_with_the_line(
-    plant_text: str, mistakes: Mistakes
-) -> None:
-    latin_1 = plant_text.replace('"Demo plant"', '"Tucuruí"').encode("latin-1")
-
-    [found] = mistakes(latin_1)
-
-    assert found.startswith(f"{plant_text[: plant_text.index('Demo plant')].count(chr(10)) + 1}: ")
-    assert "not UTF-8" in found
 
 
 def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> None:
