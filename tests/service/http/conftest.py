@@ -163,3 +163,9 @@ async def start() -> AsyncIterator[Start]:
             return await stack.enter_async_context(running(settings, hosts or []))
 
         yield begin
+
+
+@pytest.fixture(name="running")
+async def running_server(start: Start) -> Running:
+    """A server with the limits of a plant."""
+    return await start()

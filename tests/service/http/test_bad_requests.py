@@ -4,7 +4,9 @@ import json
 
 import pytest
 
-KNOWN_HOST = "Host: localhost\r\n"
+GET = b"GET / HTTP/1.1\r\nHost: localhost\r\n"
+POST = b"POST / HTTP/1.1\r\nHost: localhost\r\n"
+CHUNKED = POST + b"Transfer-Encoding: chunked\r\n"
 
 
 @pytest.mark.parametrize(
@@ -15,36 +17,24 @@ KNOWN_HOST = "Host: localhost\r\n"
         (b"GET /\xff\xfe HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
         (b"CONNECT localhost:22 HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
         (b"GET / HTTP/1.1\r\n\r\n", 400),
-        (b"GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n", 400),
+        (GET + b"Host: localhost\r\n\r\n", 400),
         (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", 421),
         (b"GET / HTTP/1.1\r\nHost: localhost.evil.example:80\r\n\r\n", 421),
         (b"GET / HTTP/1.1\r\nHost: localhost@evil.example\r\n\r\n", 421),
         (b"GET /" + b"a" * 9000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n", 414),
-        (b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * 17_000 + b"\r\n\r\n", 431),
-        (b"GET / HTTP/1.1\r\nHost: localhost\r\n" + b"X: a\r\n" * 4000 + b"\r\n", 431),
-        (b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * 300_000, 431),
-        (b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n", 400),
-        (
-            b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
-            400,
-        ),
-        (
-            b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 3\r\n"
-            b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
-            400,
-        ),
-        (b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nz\r\n", 400),
-        (
-            b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n"
-            b"0\r\nTrailer: x\r\n\r\n",
-            400,
-        ),
-        (b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 209715200\r\n\r\n", 413),
-        (b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9" + b"9" * 18 + b"\r\n\r\n", 413),
+        (GET + b"X: " + b"a" * 17_000 + b"\r\n\r\n", 431),
+        (GET + b"X: a\r\n" * 4000 + b"\r\n", 431),
+        (GET + b"X: " + b"a" * 300_000, 431),
+        (POST + b"Content-Length: -1\r\n\r\n", 400),
+        (POST + b"Content-Length: 1\r\nContent-Length: 2\r\n\r\n", 400),
+        (POST + b"Content-Length: 3\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 400),
+        (CHUNKED + b"\r\nz\r\n", 400),
+        (CHUNKED + b"\r\n0\r\nTrailer: x\r\n\r\n", 400),
+        (POST + b"Content-Length: 209715200\r\n\r\n", 413),
+        (POST + b"Content-Length: 9" + b"9" * 18 + b"\r\n\r\n", 413),
     ],
 )
-async def test_a_bad_request_is_refused(start, request_: bytes, status: int, caplog) -> None:
-    running = await start()
+async def test_a_bad_request_is_refused(running, request_: bytes, status: int, caplog) -> None:
     client = await running.client()
 
     await client.send(request_)
@@ -58,10 +48,9 @@ async def test_a_bad_request_is_refused(start, request_: bytes, status: int, cap
     assert not caplog.records
 
 
-async def test_a_long_header_in_small_pieces_is_refused(start) -> None:
-    running = await start()
+async def test_a_long_header_in_small_pieces_is_refused(running) -> None:
     client = await running.client()
-    await client.send(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: ")
+    await client.send(GET + b"X: ")
     for _ in range(100):
         await client.send(b"a" * 1000)
         if running.server.open.limits and len(running.server.open) == 0:
@@ -70,10 +59,9 @@ async def test_a_long_header_in_small_pieces_is_refused(start) -> None:
     assert await client.status() == 431
 
 
-async def test_many_requests_ahead_are_answered_in_order_and_no_further(start) -> None:
-    running = await start()
+async def test_many_requests_ahead_are_answered_in_order_and_no_further(running) -> None:
     client = await running.client()
-    await client.send(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" * 5000)
+    await client.send((GET + b"\r\n") * 5000)
 
     statuses = []
     while status := await client.status():
@@ -84,8 +72,7 @@ async def test_many_requests_ahead_are_answered_in_order_and_no_further(start) -
     assert running.app.n_asked == 9
 
 
-async def test_an_upgrade_is_answered_as_a_plain_request(start, caplog) -> None:
-    running = await start()
+async def test_an_upgrade_is_answered_as_a_plain_request(running, caplog) -> None:
     client = await running.ask("/", head="Connection: Upgrade\r\nUpgrade: h2c\r\n")
 
     assert await client.status() == 200

@@ -9,14 +9,7 @@ from service.http.json_depth import is_deeper_than
 MIB = 1024 * 1024
 
 
-async def post(running, body: bytes):
-    client = await running.ask("/", "POST", f"Content-Length: {len(body)}\r\n")
-    await client.send(body)
-    return client
-
-
-async def test_a_body_arrives_whole(start) -> None:
-    running = await start()
+async def test_a_body_arrives_whole(running) -> None:
     client = await running.ask("/", "POST", "Transfer-Encoding: chunked\r\n")
     for _ in range(3):
         await client.send(b"4\r\nabcd\r\n")
@@ -39,18 +32,16 @@ async def test_a_body_arrives_whole(start) -> None:
         (b"a" * (64 * 1024 + 1), 413),
     ],
 )
-async def test_a_bad_body_is_refused(start, body: bytes, status: int) -> None:
-    running = await start()
-
-    client = await post(running, body)
+async def test_a_bad_body_is_refused(running, body: bytes, status: int) -> None:
+    client = await running.ask("/", "POST", f"Content-Length: {len(body)}\r\n")
+    await client.send(body)
 
     assert await client.status() == status
     assert running.app.n_asked == (status == 200)
 
 
 @pytest.mark.parametrize("is_chunked", [False, True])
-async def test_two_hundred_mebibytes_cost_no_memory(start, is_chunked: bool) -> None:
-    running = await start()
+async def test_two_hundred_mebibytes_cost_no_memory(running, is_chunked: bool) -> None:
     head = "Transfer-Encoding: chunked\r\n" if is_chunked else f"Content-Length: {200 * MIB}\r\n"
     piece = b"%x\r\n%s\r\n" % (MIB, b"a" * MIB) if is_chunked else b"a" * MIB
     client = await running.ask("/", "POST", head)
@@ -67,23 +58,20 @@ async def test_two_hundred_mebibytes_cost_no_memory(start, is_chunked: bool) -> 
     assert running.app.n_asked == 0
 
 
-async def test_chunks_without_end_are_cut_off(start) -> None:
-    running = await start()
+@pytest.mark.parametrize(
+    ("sent", "status", "after_s"),
+    [
+        (b"10000\r\n" + b"a" * 65536 + b"\r\n1\r\na\r\n", 413, 4.1),
+        (b"1;a=" + b"b" * 300_000, 400, 0.0),
+    ],
+)
+async def test_chunks_without_end_are_cut_off(
+    running, sent: bytes, status: int, after_s: float
+) -> None:
     client = await running.ask("/", "POST", "Transfer-Encoding: chunked\r\n")
-    await client.send(b"10000\r\n" + b"a" * 65536 + b"\r\n1\r\na\r\n")
-    assert await client.status() == 413
-
-    running.pass_time(4.1)
-
-    assert await client.is_closed()
-
-
-async def test_chunk_extensions_without_end_are_cut_off(start) -> None:
-    running = await start()
-    client = await running.ask("/", "POST", "Transfer-Encoding: chunked\r\n")
-    await client.send(b"1;a=" + b"b" * 300_000)
-
-    assert await client.status() == 400
+    await client.send(sent)
+    assert await client.status() == status
+    running.pass_time(after_s)
     assert await client.is_closed()
 
 
