@@ -49,10 +49,8 @@ class Bench:
 
 @pytest.fixture
 def bench(path: Path, deed: Callable[..., Deed]) -> Bench:
-    store = SqliteStore(path)
-    for n in range(N_ENTRIES):
-        store.audit.record([deed(n)])
-    store.close()
+    with closing(SqliteStore(path)) as store:
+        store.audit.record([deed(n) for n in range(N_ENTRIES)])
     return Bench(path)
 
 
@@ -190,9 +188,8 @@ def test_the_first_wrong_entry_is_named(bench: Bench) -> None:
 def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
     bench: Bench, tmp_path: Path, deed: Callable[..., Deed]
 ) -> None:
-    other = SqliteStore(tmp_path / "other.sqlite3")
-    other.audit.record([deed(n, actor="somebody else") for n in range(N_ENTRIES)])
-    other.close()
+    with closing(SqliteStore(tmp_path / "other.sqlite3")) as other:
+        other.audit.record([deed(n, actor="somebody else") for n in range(N_ENTRIES)])
     bench.path.write_bytes((tmp_path / "other.sqlite3").read_bytes())
 
     found: Any = verify_trail(bench.path).finding

@@ -1,6 +1,5 @@
 """Entries follow one another, whoever writes them, and are never changed."""
 
-import random
 import sqlite3
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -100,10 +99,8 @@ def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, dee
 
 
 def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Build) -> None:
-    other = SqliteStore(path)
-    with ThreadPoolExecutor(6) as pool:
+    with closing(SqliteStore(path)) as other, ThreadPoolExecutor(6) as pool:
         list(pool.map(lambda n: (store, other)[n % 2].audit.record([deed(n)] * 3), range(24)))
-    other.close()
 
     verdict = verify_trail(path)
     assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 72, 0)
@@ -119,9 +116,8 @@ def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(
     head_path(path).write_bytes(before)  # as if the process had ended in between
 
     after_crash = verify_trail(path)
-    again = SqliteStore(path)
-    again.audit.record([deed(3)])
-    again.close()
+    with closing(SqliteStore(path)) as again:
+        again.audit.record([deed(3)])
     repaired = verify_trail(path)
 
     assert (after_crash.finding, after_crash.n_behind, after_crash.told) == (None, 2, ())
@@ -166,13 +162,10 @@ def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
 
 
 def test_a_database_that_was_put_in_the_place_of_another_tells_so(path: Path, deed: Build) -> None:
-    first = SqliteStore(path)
-    first.audit.record([deed(0)])
-    first.close()
-    path.unlink()
-    second = SqliteStore(path)
-    second.audit.record([deed(0)])
-    second.close()
+    for _ in range(2):
+        path.unlink(missing_ok=True)
+        with closing(SqliteStore(path)) as store:
+            store.audit.record([deed(0)])
     assert verify_trail(path).told == (1,)
 
 
@@ -226,8 +219,7 @@ def test_a_trail_is_verified_while_others_write(
         writing = pool.map(lambda n: store.audit.record([deed(n)]), range(100))
         verdicts = [verify_trail(path) for _ in range(30)]
         list(writing)
-    assert [v.finding for v in verdicts] == [None] * 30
-    assert random.Random(1).choice(verdicts).told == ()  # noqa: S311
+    assert [(v.finding, v.told) for v in verdicts] == [(None, ())] * 30
 
 
 def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:

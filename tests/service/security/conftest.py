@@ -33,10 +33,15 @@ def database(database_file: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def access(database: Path) -> Iterator[AccessStore]:
-    store = SqliteStore(database)
-    yield store.access
-    store.close()
+def store(database: Path) -> Iterator[SqliteStore]:
+    opened = SqliteStore(database)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def access(store: SqliteStore) -> AccessStore:
+    return store.access
 
 
 @pytest.fixture

@@ -1,15 +1,10 @@
 """Every change of who may come in is in the audit trail, and nothing secret is."""
 
 import json
-from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
-
-import pytest
 
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import AuditEntry, Source
-from service.security.passwords import Hashing
 from service.security.people import People, create_key
 from service.security.roles import Role
 from service.store.access_port import AccessRefusedError
@@ -18,13 +13,6 @@ from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000
 PASSWORD = "rotor rope gauge"  # noqa: S105
-
-
-@pytest.fixture
-def store(database: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(database)
-    yield opened
-    opened.close()
 
 
 def told(store: SqliteStore) -> list[AuditEntry]:
@@ -37,9 +25,9 @@ def told(store: SqliteStore) -> list[AuditEntry]:
 
 
 def test_every_change_is_told_with_what_was_before_and_after(
-    store: SqliteStore, hashing: Hashing
+    store: SqliteStore, people: People
 ) -> None:
-    people, accounts = People(store.access, hashing), store.access.accounts
+    accounts = store.access.accounts
     token = people.offer_set_up(T0)
     assert token is not None
     with acting_as(Acting(Source.COMMAND_LINE, "anna on host", "anna")):
@@ -71,8 +59,8 @@ def test_every_change_is_told_with_what_was_before_and_after(
         assert secret not in str(entries)
 
 
-def test_what_is_refused_is_not_told_as_done(store: SqliteStore, hashing: Hashing) -> None:
-    people, accounts = People(store.access, hashing), store.access.accounts
+def test_what_is_refused_is_not_told_as_done(store: SqliteStore, people: People) -> None:
+    accounts = store.access.accounts
     people.add("anna", Role.ADMIN, PASSWORD, T0)
     people.add("berta", Role.VIEWER, PASSWORD, T0)
     before = told(store)

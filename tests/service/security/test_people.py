@@ -148,15 +148,6 @@ def test_a_key_opens_as_what_it_was_made_for_until_its_day(
     assert shown not in repr(access.keys.all())
 
 
-def test_a_revoked_key_opens_nothing_ever_again(access: AccessStore, doors: Doors) -> None:
-    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
-    assert access.keys.revoke(key.id, T0 + S)
-    assert not access.keys.revoke(key.id, T0 + 2 * S)
-    assert doors.machine(shown, T0 + S) is Refusal.REVOKED
-    (stored,) = access.keys.all()
-    assert (stored.revoked_ns, stored.state(T0 + 99 * NS_PER_DAY)) == (T0 + S, KeyState.REVOKED)
-
-
 def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
     access: AccessStore, doors: Doors
 ) -> None:
@@ -191,11 +182,15 @@ def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access: AccessStore
         create_key(access, "historian", Role.ADMIN, ("U1",), 30, T0)
 
 
-def test_the_database_itself_refuses_to_bring_a_key_back(
-    access: AccessStore, database: Path
+def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
+    access: AccessStore, doors: Doors, database: Path
 ) -> None:
-    key, _ = create_key(access, "historian", Role.VIEWER, (), 30, T0)
-    access.keys.revoke(key.id, T0)
+    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    assert access.keys.revoke(key.id, T0 + S)
+    assert not access.keys.revoke(key.id, T0 + 2 * S)
+    assert doors.machine(shown, T0 + S) is Refusal.REVOKED
+    (stored,) = access.keys.all()
+    assert (stored.revoked_ns, stored.state(T0 + 99 * NS_PER_DAY)) == (T0 + S, KeyState.REVOKED)
     for statement, words in (
         ("UPDATE api_key SET revoked_ns = NULL", "stays revoked"),
         ("UPDATE api_key SET expires_ns = expires_ns + 1", "kept as they were made"),
