@@ -11,17 +11,22 @@ from typing import Any
 import httpx2
 import pytest
 from fastapi import FastAPI
+from rigs.capturing import ALERT, T0
 from rigs.database_copy import copy_database
 from rigs.probes import Probes
 
 from acquisition.calibration import calibrate
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
+from core.alarms.life_cycle import advance
 from core.assessment import Assessment
+from core.blocks import SampleBlock
 from core.monitor import UnitMonitor
 from service.alarms.engine import AlarmEngine
 from service.alarms.start import alarm_engine
 from service.api.app import create_app
 from service.api.context import Context
 from service.api.in_process import InProcess
+from service.capture.file import CaptureFile
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.delivery.deliveries import Deliveries
 from service.evidence.keeper import EvidenceKeeper
@@ -128,6 +133,12 @@ class Service:
         assert response.status_code == status, response.text
         return problem_of(response)
 
+    async def refused(self, path: str, status: int, body: Any, **headers: str) -> dict[str, Any]:
+        """The problem document of an action that must be refused."""
+        response = await self.client.post(path, json=body, headers=headers)
+        assert response.status_code == status, body
+        return problem_of(response)
+
 
 Serve = Callable[[PlantFile, Path], Service]
 
@@ -149,12 +160,6 @@ def as_problem() -> Callable[[httpx2.Response], dict[str, Any]]:
     return problem_of
 
 
-def with_folder(plant: PlantFile, folder: Path) -> PlantFile:
-    """The same plant with its data in a folder."""
-    service = plant.service.model_copy(update={"data_folder": str(folder)})
-    return plant.model_copy(update={"service": service})
-
-
 async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
     """Build a service that has just started: nothing is connected, nothing recorded yet."""
     clock = SetClock()
@@ -168,7 +173,8 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
     captures = captures_of(plant, Origin.REPLAY, clock)
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_keeper(plant, machines, store.films, clock)
-    own = with_folder(plant, folder)
+    service = plant.service.model_copy(update={"data_folder": str(folder)})
+    own = plant.model_copy(update={"service": service})
     evidence = evidence_of(own, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)
     loops: dict[str, str | None] = {}
@@ -247,6 +253,22 @@ async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> Async
 def running(service: Service, assessments: list[Assessment]) -> Service:
     """U1 connected, its results shown and stored; U2 never connected."""
     return show(service, assessments)
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> Callable[..., Path]:
+    """Puts a recording of blocks, made for an alarm, where captures are."""
+
+    def make(unit: str, blocks: list[SampleBlock], writer: Any, at_s: int = 0) -> Path:
+        alarm = Alarm(AlarmIdentity(unit, "UJB", AlarmKind.SHAFT_X))
+        _, events = advance(alarm, ALERT, T0 + at_s * 1_000_000_000, AlarmRule())
+        file = CaptureFile(tmp_path / "captures", events[0], writer)
+        file.write(blocks)
+        file.finish(events)
+        assert file.finished is not None
+        return file.finished
+
+    return make
 
 
 @pytest.fixture

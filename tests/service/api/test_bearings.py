@@ -13,6 +13,7 @@ from service.live import LinkState
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 K = "order1_k_eff_xx_n_per_m"
+WHOLE = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
 
 
 @pytest.fixture
@@ -148,21 +149,14 @@ async def test_trends_are_the_stored_readings_to_the_last_bit_or_in_buckets(
 
 async def test_trends_are_filtered_by_condition(read_only: Any, found: list[Assessment]) -> None:
     eccentricity = sorted(a.readings["eccentricity_ratio"].value or 0.0 for a in found)
-    whole = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z", "quantity": K}
-
-    above = await read_only.json(f"{UJB}/trends", **whole, eccentricity_min=repr(eccentricity[2]))
-    between = await read_only.json(
-        f"{UJB}/trends",
-        **whole,
-        eccentricity_min=repr(eccentricity[1]),
-        eccentricity_max=repr(eccentricity[3]),
-    )
-    hot = await read_only.json(f"{UJB}/trends", **whole, oil_temperature_min=90)
-
-    def n(body: Any) -> int:
-        return sum(body["series"][K]["count"])
-
-    assert (n(above), n(between), n(hot)) == (4, 3, 0)
+    low, middle, high = (repr(value) for value in eccentricity[1:4])
+    for bounds, n in (
+        ({"eccentricity_min": middle}, 4),
+        ({"eccentricity_min": low, "eccentricity_max": high}, 3),
+        ({"oil_temperature_min": 90}, 0),
+    ):
+        body = await read_only.json(f"{UJB}/trends", **WHOLE, quantity=K, **bounds)
+        assert sum(body["series"][K]["count"]) == n
 
 
 async def test_a_hole_in_the_trend_is_a_point_without_a_value(
@@ -171,9 +165,7 @@ async def test_a_hole_in_the_trend_is_a_point_without_a_value(
     late = replace(found[-1], time_ns=found[-1].time_ns + 600_000_000_000)
     running.store.append([late], [])
 
-    body = await running.json(
-        f"{UJB}/trends", start="2026-01-01T00:00:00Z", end="2026-01-02T00:00:00Z", quantity=K
-    )
+    body = await running.json(f"{UJB}/trends", **WHOLE, quantity=K)
 
     assert body["series"][K]["mean"][-2] is None
     assert body["series"][K]["worst_level"][-2] is None

@@ -37,8 +37,7 @@ async def test_a_full_disk_and_a_dead_loop_are_named_and_make_it_unready_but_not
     assert (full.status_code, full.json()["status"]) == (503, "not ready")
     assert full.json()["checks"]["store"] == "disk I/O error"
     assert overview["store"] == {"error": "disk I/O error", "n_unstored": 3}
-    assert response.status_code == 503
-    assert response.json()["status"] == "not ready"
+    assert (response.status_code, response.json()["status"]) == (503, "not ready")
     assert response.json()["checks"]["loop record"] == "alive"
     assert response.json()["checks"]["loop alarms"] == "has ended"
     assert (await running.get("/livez")).status_code == 200

@@ -2,12 +2,12 @@
 
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from typing import Any
 
 import httpx2
 import pytest
 
-from core.assessment import Assessment
 from service.store import trends
 
 AsProblem = Callable[[httpx2.Response], dict[str, Any]]
@@ -37,39 +37,31 @@ async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only: Any) -> N
 @pytest.mark.parametrize(
     ("parameter", "value", "said"),
     [
-        ("max_points", 0, "greater than or equal to 2"),
-        ("max_points", -5, "greater than or equal to 2"),
+        ("max_points", 1, "greater than or equal to 2"),
         ("max_points", 1_000_000_000, "less than or equal to 5000"),
         ("max_points", "9" * 5000, ""),
         ("max_points", "many", "valid integer"),
-        ("max_points", "", "valid integer"),
         ("max_points", "2.5", "valid integer"),
         ("start", "2026-01-03T00:00:00Z", "must be before end"),
         ("start", "2026-01-02T00:00:00Z", "must be before end"),
         ("start", "2026-01-01T00:00:00", "offset from UTC"),
-        ("start", "2026-01-01", "offset from UTC"),
         ("start", "yesterday", "written like 2026-11-21T08:00:00Z"),
         ("start", "2026", "written like 2026-11-21T08:00:00Z"),
         ("start", "1767225600", "written like 2026-11-21T08:00:00Z"),
-        ("start", "-1767225600", "written like"),
         ("start", "1e-5", ""),
         ("start", "2026-02-30T00:00:00Z", "day value is outside expected range"),
         ("start", "2026-01-01T25:00:00Z", "valid datetime"),
         ("start", "+10000-01-01T00:00:00Z", ""),
         ("end", "2025-01-01T00:00:00Z", "must be before end"),
         ("end", "", "written like"),
-        ("end", "2026-01-02T00:00:00", "offset from UTC"),
         ("eccentricity_min", "nan", "finite number"),
-        ("eccentricity_max", "inf", "finite number"),
-        ("oil_temperature_min", "-inf", "finite number"),
-        ("oil_temperature_max", "NaN", "finite number"),
         ("oil_temperature_max", "warm", "valid number"),
         ("quantity", "stiffness", "not in the catalogue"),
-        ("quantity", "", "not in the catalogue"),
+        ("state", "overload", "'full_load'"),
+        ("group_by", "weekday", ""),
         ("quantity", ["speed_rpm", "speed"], "not in the catalogue"),
         ("quantity", ["speed_rpm"] * 41, "at most 40"),
         ("max_point", 10, "there is no parameter 'max_point' here; known: quantity, state"),
-        ("eccentricity_mn", 0.2, "there is no parameter"),
     ],
 )
 async def test_a_wrong_query_is_answered_with_the_parameter_and_what_is_allowed(
@@ -128,13 +120,9 @@ async def test_a_range_that_could_take_all_memory_is_refused(
     assert problem["detail"].startswith("more than 3 single readings would have to be read")
 
 
-async def test_a_store_that_cannot_be_read_is_503_without_its_innards(
-    running: Any, assessments: list[Assessment]
-) -> None:
-    assert assessments
-    connection = sqlite3.connect(running.store._path)
-    connection.executescript("DROP TABLE gap; ALTER TABLE assessment RENAME TO gone")
-    connection.close()
+async def test_a_store_that_cannot_be_read_is_503_without_its_innards(running: Any) -> None:
+    with closing(sqlite3.connect(running.store._path)) as connection:
+        connection.executescript("DROP TABLE gap; ALTER TABLE assessment RENAME TO gone")
 
     for path, query in ((TRENDS, GOOD), ("/api/v1/units/U1/gaps", WHOLE)):
         problem = await running.problem(path, 503, **query)

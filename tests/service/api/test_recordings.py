@@ -8,34 +8,24 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs.capturing import ALERT, BLOCK, T0, block, recorded_unit
+from rigs.capturing import BLOCK, block, recorded_unit
 
 from acquisition.recording.reader import open_recording
 from acquisition.recording.writer import RecordingWriter
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.life_cycle import advance
-from service.capture.file import CaptureFile
+from core.alarms.alarm import AlarmKind
 
 RECORDINGS = "/api/v1/recordings"
 Keep = Callable[..., Path]
 
 
 @pytest.fixture
-def keep(tmp_path: Path) -> Keep:
+def keep(capture: Keep) -> Keep:
     """Puts a recording of some blocks where captures are; the fourth block is missing."""
 
     def make(at_s: int, unit: str = "U1", lost: bool = False) -> Path:
-        alarm = Alarm(AlarmIdentity(unit, "UJB", AlarmKind.SHAFT_X))
-        _, events = advance(alarm, ALERT, T0 + at_s * 1_000_000_000, AlarmRule())
-
-        def writer(folder: Path, made_by: str) -> RecordingWriter:
-            return RecordingWriter(folder, recorded_unit(unit), made_by)
-
-        file = CaptureFile(tmp_path / "captures", events[0], writer)
-        file.write([block(n, unit, lost and n == 1) for n in (0, 1, 2, 4)])
-        file.finish(events)
-        assert file.finished is not None
-        return file.finished
+        blocks = [block(n, unit, lost and n == 1) for n in (0, 1, 2, 4)]
+        recorded = recorded_unit(unit)
+        return capture(unit, blocks, lambda to, by: RecordingWriter(to, recorded, by), at_s)
 
     return make
 
@@ -130,18 +120,10 @@ async def test_no_name_leads_out_of_the_folder_of_recordings(
 ) -> None:
     folder = keep(10)
     (tmp_path / "captures" / "link").symlink_to(tmp_path)
-    folder.with_name(f"{folder.name}-2.incomplete").mkdir()
+    unfinished = folder.with_name(f"{folder.name}-2.incomplete")
+    unfinished.mkdir()
 
-    names = (
-        "%2e%2e",
-        "..%2f..%2fpasswd",
-        "link",
-        "U1",
-        f"{folder.name}-2.incomplete",
-        "a" * 121,
-        "-x",
-    )
-    for name in names:
+    for name in ("%2e%2e", "..%2f..%2fpasswd", "link", "U1", unfinished.name, "a" * 121, "-x"):
         for what in ("", "/files.zip", "/samples.csv"):
             response = await service.get(f"{RECORDINGS}/{name}{what}")
             assert response.status_code in (404, 422), f"{name}{what}"

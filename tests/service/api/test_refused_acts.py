@@ -1,8 +1,8 @@
 """What is asked wrongly of alarms, or while nothing can be stored, is refused and not done."""
 
 import sqlite3
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from typing import Any
 
 import httpx2
@@ -11,9 +11,6 @@ from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, SHELVE, Probes, post
 
 from core.quality import Reason
 from service.api import in_process
-
-AsProblem = Callable[[httpx2.Response], dict[str, Any]]
-
 
 WRONG_BODIES: list[tuple[str, Any, str]] = [
     (ACKNOWLEDGE, {"actor": "A. Name"}, "occurrence"),
@@ -31,16 +28,15 @@ WRONG_BODIES: list[tuple[str, Any, str]] = [
 
 
 async def test_what_is_asked_wrongly_is_named_and_changes_nothing(
-    service: Any, probes: Probes, as_problem: AsProblem
+    service: Any, probes: Probes
 ) -> None:
     probes.send(3, Reason.SENSOR_FAILURE)
     before = await service.json(ALARMS)
 
     for path, body, named in WRONG_BODIES:
-        answer = await post(service, path, body)
+        problem = await service.refused(path, 422, body)
 
-        assert answer.status_code == 422, body
-        assert [mistake["parameter"] for mistake in as_problem(answer)["errors"]] == [named]
+        assert [mistake["parameter"] for mistake in problem["errors"]] == [named]
         assert (await service.json(ALARMS))["alarms"] == before["alarms"]
     # a form of another page is no request either
     text, plain = '{"actor": "A. Name", "occurrence": 1}', {"Content-Type": "text/plain"}
@@ -48,18 +44,16 @@ async def test_what_is_asked_wrongly_is_named_and_changes_nothing(
     assert form.status_code == 422
 
 
-async def test_an_unknown_alarm_is_not_found(read_only: Any, as_problem: AsProblem) -> None:
+async def test_an_unknown_alarm_is_not_found(read_only: Any) -> None:
     for alarm in ("U1:nothing:channel_not_ok", "U9:x:y", "%00", "U1", ":::"):
-        answer = await post(read_only, f"{ALARMS}/{alarm}/unshelve", ANNA)
-
-        assert answer.status_code == 404
-        assert as_problem(answer)["title"] == "Unknown alarm"
+        problem = await read_only.refused(f"{ALARMS}/{alarm}/unshelve", 404, ANNA)
+        assert problem["title"] == "Unknown alarm"
     for alarm in ("U1:nothing:link_lost", "U9:link:link_lost", "plant:store:results_lost", "x"):
         assert alarm in (await read_only.problem(f"{ALARMS}/{alarm}", 404))["detail"]
 
 
 async def test_no_page_of_another_site_acknowledges_but_the_dashboard_itself_does(
-    service: Any, probes: Probes, as_problem: AsProblem
+    service: Any, probes: Probes
 ) -> None:
     probes.send(3, Reason.SENSOR_FAILURE)
     body = {**ANNA, "occurrence": 1}
@@ -70,9 +64,7 @@ async def test_no_page_of_another_site_acknowledges_but_the_dashboard_itself_doe
         {"Sec-Fetch-Site": "cross-site"},
         {"Sec-Fetch-Site": "same-site"},
     ):
-        answer = await post(service, ACKNOWLEDGE, body, **headers)
-        assert answer.status_code == 403, headers
-        as_problem(answer)
+        await service.refused(ACKNOWLEDGE, 403, body, **headers)
         [alarm] = (await service.json(ALARMS))["alarms"]
         assert alarm["state"] == "unacknowledged"
     own = {"Origin": "http://padwatch", "Sec-Fetch-Site": "same-origin"}
@@ -102,46 +94,33 @@ async def test_a_wrong_question_is_refused_by_name(read_only: Any) -> None:
         assert problem["errors"][0]["parameter"] == named
 
 
-async def test_while_nothing_can_be_stored_nothing_is_done(
-    service: Any, probes: Probes, as_problem: AsProblem
+@contextmanager
+def refusing(service: Any, table: str) -> Iterator[None]:
+    """Let the database refuse new rows of a table, as a full disk does."""
+    with closing(sqlite3.connect(service.store._path)) as connection:
+        connection.execute(
+            f"CREATE TRIGGER no BEFORE INSERT ON {table} BEGIN SELECT RAISE(ABORT, 'full'); END"
+        )
+        yield
+        connection.execute("DROP TRIGGER no")
+
+
+@pytest.mark.parametrize(
+    ("table", "title"),
+    [("high_water", "Nothing was done"), ("alarm_event", "Not on the disk yet")],
+)
+async def test_an_acknowledgement_that_cannot_be_stored_is_refused_and_may_be_repeated(
+    service: Any, probes: Probes, monkeypatch: pytest.MonkeyPatch, table: str, title: str
 ) -> None:
+    body = {**ANNA, "occurrence": 1}
     probes.send(3, Reason.SENSOR_FAILURE)
     await probes.stored()
-    with closing(sqlite3.connect(service.store._path)) as connection, connection:
-        connection.execute(
-            "CREATE TRIGGER no BEFORE INSERT ON high_water BEGIN SELECT RAISE(ABORT, 'full'); END"
-        )
-
-    answer = await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})
-
-    assert answer.status_code == 503
-    assert as_problem(answer)["title"] == "Nothing was done"
-    (alarm,) = (await service.json(ALARMS))["alarms"]
-    assert (alarm["state"], alarm["is_acknowledged"]) == ("unacknowledged", False)
-    with closing(sqlite3.connect(service.store._path)) as connection, connection:
-        connection.execute("DROP TRIGGER no")
-    assert (await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})).status_code == 200
-
-
-async def test_what_cannot_be_stored_is_said_and_kept(
-    service: Any, probes: Probes, monkeypatch: pytest.MonkeyPatch, as_problem: AsProblem
-) -> None:
-    monkeypatch.setattr(in_process, "STORED_WITHIN_S", 0.05)
-    probes.send(3, Reason.SENSOR_FAILURE)
-    await probes.stored()
-    with sqlite3.connect(service.store._path) as connection:
-        connection.execute(
-            "CREATE TRIGGER no BEFORE INSERT ON alarm_event BEGIN SELECT RAISE(ABORT, 'full'); END"
-        )
-
-    answer = await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})
-
-    assert answer.status_code == 503
-    assert as_problem(answer)["title"] == "Not on the disk yet"
-    assert not service.store.alarms()[0].is_acknowledged
-    with sqlite3.connect(service.store._path) as connection:
-        connection.execute("DROP TRIGGER no")
-    connection.close()
-    monkeypatch.setattr(in_process, "STORED_WITHIN_S", 30.0)
-    assert (await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})).status_code == 200
+    with refusing(service, table), monkeypatch.context() as impatient:
+        impatient.setattr(in_process, "STORED_WITHIN_S", 0.05)
+        assert (await service.refused(ACKNOWLEDGE, 503, body))["title"] == title
+        assert not service.store.alarms()[0].is_acknowledged
+    if table == "high_water":
+        (alarm,) = (await service.json(ALARMS))["alarms"]
+        assert (alarm["state"], alarm["is_acknowledged"]) == ("unacknowledged", False)
+    assert (await post(service, ACKNOWLEDGE, body)).status_code == 200
     assert service.store.alarms()[0].is_acknowledged

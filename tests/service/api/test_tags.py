@@ -1,6 +1,6 @@
 """Answers have tags: who has seen one already is told that nothing is new, and only then."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -64,10 +64,6 @@ async def test_who_has_an_answer_already_is_not_sent_it_again(running: Any) -> N
     assert refused.headers["padwatch-time"] == same.headers["padwatch-time"]
 
 
-async def tags_of(service: Any, paths: Iterable[str]) -> list[str]:
-    return [(await ask(service, path)).headers["etag"] for path in paths]
-
-
 async def test_whatever_changes_is_news(running: Any, assessments: list[Assessment]) -> None:
     latest, spectrum = (f"units/U1/bearings/UJB/{what}" for what in ("latest", "spectrum"))
     trends = f"units/U1/bearings/UJB/trends?{RANGE}&quantity=speed_rpm"
@@ -91,7 +87,7 @@ async def test_whatever_changes_is_news(running: Any, assessments: list[Assessme
         ),
     ]
     for change, paths in changes:
-        before = await tags_of(running, paths)
+        before = [(await ask(running, path)).headers["etag"] for path in paths]
         change()
         for path, tag in zip(paths, before, strict=True):
             assert (await ask(running, path, tag)).status_code == 200, path

@@ -91,14 +91,6 @@ async def test_cells_of_a_trend_are_as_wide_as_the_grid_and_share_no_reading(see
     ]
 
 
-async def test_an_unknown_state_or_grouping_is_refused(seen: Any) -> None:
-    state = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, state="overload")
-    group = await seen.problem(TRENDS, 422, **WHOLE, quantity=K, group_by="weekday")
-
-    assert "'full_load'" in state["detail"]
-    assert group["errors"][0]["parameter"] == "group_by"
-
-
 async def test_more_groups_than_anybody_looks_at_are_refused(
     service: Any, assessment: Callable[..., Assessment]
 ) -> None:

@@ -67,11 +67,9 @@ async def test_wrong_cursors_are_refused(stored: Any) -> None:
     for cursor in ("", "next", "-1", "1e9", "9" * 20, "first; DROP TABLE assessment"):
         problem = await stored.problem(f"{UJB}/trends", 422, **WHOLE, quantity=K, cursor=cursor)
         assert problem["errors"][0]["parameter"] == "cursor"
-    groups = {"cursor": "first", "group_by": "state"}
-    assert (
-        "group_by"
-        in (await stored.problem(f"{UJB}/trends", 422, **WHOLE, quantity=K, **groups))["detail"]
-    )
+    groups = {"quantity": K, "cursor": "first", "group_by": "state"}
+    problem = await stored.problem(f"{UJB}/trends", 422, **WHOLE, **groups)
+    assert "group_by" in problem["detail"]
     beyond = await stored.json(f"{UJB}/trends", **WHOLE, quantity=K, cursor="9" * 19)
     assert (beyond["time"], beyond["next_cursor"]) == ([], None)
 

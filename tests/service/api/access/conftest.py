@@ -64,10 +64,6 @@ def token_of(answer: httpx2.Response) -> str:
     return token
 
 
-def cheap_hashing() -> Hashing:
-    return Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
-
-
 @pytest.fixture
 def access(service: Any) -> Access:
     """A second application over the same store, which asks everybody."""
@@ -85,9 +81,8 @@ def access(service: Any) -> Access:
         timings=Timings(context.units, service.clock),
         clock=service.clock,
     )
-    desk = AccessDesk(
-        service.store.access, service.clock, asks_everybody=True, hashing=cheap_hashing()
-    )
+    hashing = Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
+    desk = AccessDesk(service.store.access, service.clock, asks_everybody=True, hashing=hashing)
     app = create_app(replace(context, access=desk, metrics=partial(scrape, watched)))
     return Access(desk, app, service)
 

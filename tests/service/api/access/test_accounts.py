@@ -101,8 +101,7 @@ async def test_beside_an_action_stands_who_has_logged_in_whatever_the_body_says(
     first = (await service.json("/api/v1/audit"))["entries"][0]
     assert (local.status_code, first["actor"], first["action"]) == (201, "local", "key.created")
     service.alarms.link("U1", False, "no route")
-    service.clock.s += 60.0
-    service.clock.ns += 60_000_000_000
+    service.clock.step(60_000_000_000)
     service.alarms.tick()
     [alarm] = [a.identity.id for a in service.alarms.alarms if a.level is not None]
     key = access.key(Role.OPERATOR)

@@ -1,6 +1,8 @@
 """Every operation × role × state of what is shown: let in is exactly who is declared here."""
 
+import json
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import pytest
@@ -22,6 +24,11 @@ class Row(NamedTuple):
 
 
 FILM = "/api/v1/units/{unit}/bearings/{bearing}"
+OF_BEARING = (
+    *("latest", "spectrum", "orbit", "trends", "spectra", "motion", "shaft-centre", "references"),
+    *("film", "film/readings", "baselines", "order1-references"),
+)
+"""What is shown of a bearing below its address."""
 ALARM = "/api/v1/alarms/{alarm}"
 RECORDING = "/api/v1/recordings/{recording}"
 
@@ -47,18 +54,8 @@ TABLE = {
     "GET /api/v1/delivery": Row("viewer", NO_UNIT),
     "GET /api/v1/audit": Row("engineer", PLANT),
     f"GET {FILM}": Row("viewer"),
-    f"GET {FILM}/latest": Row("viewer"),
+    **{f"GET {FILM}/{name}": Row("viewer") for name in OF_BEARING},
     f"GET {FILM}/budgets/{{quantity}}": Row("viewer"),
-    f"GET {FILM}/spectrum": Row("viewer"),
-    f"GET {FILM}/orbit": Row("viewer"),
-    f"GET {FILM}/trends": Row("viewer"),
-    f"GET {FILM}/spectra": Row("viewer"),
-    f"GET {FILM}/motion": Row("viewer"),
-    f"GET {FILM}/shaft-centre": Row("viewer"),
-    f"GET {FILM}/references": Row("viewer"),
-    f"GET {FILM}/film": Row("viewer"),
-    f"GET {FILM}/film/readings": Row("viewer"),
-    f"GET {FILM}/baselines": Row("viewer"),
     f"GET {FILM}/baselines/{{version}}": Row("viewer"),
     f"GET {FILM}/baselines/{{version}}/export": Row("viewer"),
     f"POST {FILM}/baselines/{{version}}/accept": Row("engineer"),
@@ -66,7 +63,6 @@ TABLE = {
     f"POST {FILM}/baselines/freeze": Row("engineer"),
     f"POST {FILM}/baselines/thaw": Row("engineer"),
     f"POST {FILM}/baselines/renew": Row("engineer"),
-    f"GET {FILM}/order1-references": Row("viewer"),
     f"POST {FILM}/order1-references": Row("engineer"),
     "GET /api/v1/alarms": Row("viewer", PLANT),
     "GET /api/v1/alarms/events": Row("viewer", PLANT),
@@ -181,6 +177,14 @@ def test_the_table_has_a_row_for_each_operation_and_the_description_says_the_sam
     assert undescribed == {
         *("/", "/static/{path:path}", "/static/plotly.min.js", "/api/v1/openapi.json"),
     }
+
+
+def test_whoever_asks_for_the_description_while_it_is_made_gets_all_of_it(access: Any) -> None:
+    whole = json.dumps(access.app.openapi())
+    access.app.openapi_schema = None
+    with ThreadPoolExecutor(4) as threads:
+        asked = [threads.submit(lambda: json.dumps(access.app.openapi())) for _ in range(4)]
+    assert {each.result() for each in asked} == {whole}
 
 
 @pytest.mark.parametrize(("state", "way"), covering(("wrong", "expired", "revoked"), WAYS))

@@ -33,8 +33,7 @@ class Pair:
 
     def pass_time(self, seconds: float) -> None:
         """Let time pass for both, whose clocks agree."""
-        self.service.clock.s += seconds
-        self.service.clock.ns += round(seconds * 1e9)
+        self.service.clock.step(round(seconds * 1e9))
 
     async def json(self, path: str) -> Any:
         answer = await self.client.get(path)
@@ -44,20 +43,13 @@ class Pair:
 
 def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, CarryingOut]:
     """What a process that analyses adds to the service."""
-    units = [unit.id for unit in plant.unit]
+    held = [*(unit.id for unit in plant.unit), PLANT]
     parts = (service.alarms, service.films)
-    reporter = Reporter(
-        name,
-        plant.unit,
-        lambda: [*units, PLANT],
-        service.live,
-        *parts,
-        service.store.unit_states,
-        service.clock,
+    store, clock = service.store, service.clock
+    return (
+        Reporter(name, plant.unit, lambda: held, service.live, *parts, store.unit_states, clock),
+        CarryingOut(name, lambda: held, *parts, service.recorder, store, clock),
     )
-    held = lambda: [*units, PLANT]  # noqa: E731
-    carrying_out = CarryingOut(name, held, *parts, service.recorder, service.store, service.clock)
-    return reporter, carrying_out
 
 
 @pytest.fixture

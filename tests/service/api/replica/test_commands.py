@@ -103,7 +103,7 @@ async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await raise_alarm(pair)
-    monkeypatch.setattr(Asking, "_answer", _killed)
+    monkeypatch.setattr(Asking, "_answer", _killed_in)
     with pytest.raises(KeyboardInterrupt):
         await post(pair, "acknowledge", occurrence=1)
     pair.pass_time(60.0)
@@ -111,10 +111,6 @@ async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(
 
     assert not pair.service.alarms.alarm(LINK).is_acknowledged
     assert pair.service.store.commands.open(["U1"]) == []
-
-
-async def _killed(*_: object) -> None:
-    raise KeyboardInterrupt
 
 
 async def test_a_process_killed_before_its_commit_leaves_the_command_to_the_next(
