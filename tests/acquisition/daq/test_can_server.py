@@ -1,12 +1,14 @@
-"""The simulated CAN DAQ: its examples, its pace, its end, its faults on command."""
+"""The simulated CAN DAQ: examples, pace, end and faults; and links to simulated serial lines."""
 
 import asyncio
 import itertools
+import os
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rigs.can import shape_of
 from rigs.tiers import fast_and_long
 
 from acquisition.clock import SystemClock
@@ -15,6 +17,8 @@ from acquisition.daq.can_dbc import daq_dbc
 from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_shape import CanShape, DaqSignal, dbc_name
 from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import RtuRingServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.raw import FeedEndedError
 
@@ -202,3 +206,43 @@ def test_every_number_of_channels_fits(numbers, n_slow, fd, floats):
             names = list(shape.sample_names(channel.id))
             assert [name for name in carried if name in names] == names
         assert all(m.length <= (64 if fd else 8) for m in shape.messages)
+
+
+@pytest.fixture(params=["modbus", "can"])
+def serve(request, counting_feed, counts_calibration):
+    def served(link: Path):
+        if request.param == "modbus":
+            return RtuRingServer(RingDevice(counting_feed()), link=link)
+        shape = shape_of(counts_calibration(), fd=False)
+        return SlcanPtyServer(CanDevice(counting_feed(), shape), link=link)
+
+    return served
+
+
+async def test_what_a_killed_daq_left_behind_is_replaced_and_cleared(serve, tmp_path):
+    line = tmp_path / "line"
+    line.symlink_to("/dev/pts/99999")
+    async with serve(line):
+        assert line.is_char_device()
+    assert not line.is_symlink()
+
+
+@pytest.mark.parametrize("what", ["a port", "a port by its id", "a file"])
+async def test_the_port_of_a_real_device_is_never_taken_away(serve, tmp_path, what):
+    line = tmp_path / "line"
+    if what == "a port by its id":
+        line.symlink_to("/dev/ttyUSB0")
+    elif what == "a file":
+        line.write_text("kept")
+    else:
+        os.mkfifo(line)
+    before = line.lstat()
+    with pytest.raises(ConfigError, match=f"{line}: something else is there; .* a free name"):
+        await serve(line).__aenter__()
+    after = line.lstat()
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+
+
+async def test_a_link_that_cannot_be_made_is_a_lost_link(serve, tmp_path):
+    with pytest.raises(LinkError, match="nowhere/line: cannot be made: No such file"):
+        await serve(tmp_path / "nowhere" / "line").__aenter__()

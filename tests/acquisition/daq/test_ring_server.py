@@ -60,9 +60,8 @@ class Turnstile:
             await self._turned.wait_for(lambda: self.slept_s)
 
 
-async def test_a_paced_device_keeps_to_the_clock_however_late_it_wakes(counting_feed):
+async def test_a_paced_device_keeps_to_the_clock_however_late_it_wakes(device):
     clock = Turnstile()
-    device = RingDevice(counting_feed())
     slot_s = device.layout.slot_duration_s
     async with ModbusRingServer(device, clock):
         await clock.first_sleep()
@@ -72,9 +71,8 @@ async def test_a_paced_device_keeps_to_the_clock_however_late_it_wakes(counting_
             assert device.ledger.n_samples("U1") == 50 * max(1, n_passed)
 
 
-async def test_a_device_samples_on_while_nobody_serves_it(counting_feed):
+async def test_a_device_samples_on_while_nobody_serves_it(device):
     clock = Turnstile()
-    device = RingDevice(counting_feed())
     server = ModbusRingServer(device, clock)
     async with server:
         await clock.first_sleep()
@@ -167,8 +165,7 @@ def test_the_ledger_books_what_was_offered_lost_or_not(counting_feed):
     assert ledger.n_samples("U8") == 50
 
 
-def test_a_restarted_device_has_an_empty_ring_and_counts_from_zero(counting_feed):
-    device = RingDevice(counting_feed())
+def test_a_restarted_device_has_an_empty_ring_and_counts_from_zero(device):
     device.produce(5)
     device.restart()
     assert (device.newest, slot_in(device, 0).first_index) == (0, 0)

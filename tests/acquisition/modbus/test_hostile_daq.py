@@ -9,7 +9,7 @@ from rigs.hostile_sources import COMMON, CONTENTS, KINDS, Trial, lies_to
 FEW = 4
 MANY = {"tcp": 100, "rtu": 20}
 N_AT_ONCE = {"tcp": 20, "rtu": 5}
-"""A line tells a wrong reply by its time-out only, and many lines together outlast it."""
+"""On a busy machine, replies of many lines at once would all come after the time-out."""
 
 OF_RIGHT_FORM = [
     COMMON["fewer registers"],  # a queue may be that short
