@@ -69,16 +69,13 @@ def test_an_epoch_that_the_device_tells_is_taken_as_it_is(counts: Counts) -> Non
     assert counts.placed(at(60, late_s=1800.0, epoch=8)).epoch == 8
 
 
-def test_another_process_goes_on_in_the_same_count(counts: Counts) -> None:
+def test_another_process_goes_on_in_the_same_count_whatever_its_clock_says(counts: Counts) -> None:
     anew = counts.placed(at(0, late_s=1700.0))
     other = Counts()
     other.go_on(counts.count)
     assert place(other.again(at(0, late_s=1700.0))) == place(anew)
     following = at(60, late_s=1700.0)
     assert place(other.placed(following)) == place(counts.placed(following))
-
-
-def test_what_is_seen_once_more_is_not_judged_by_a_clock_that_was_put_back() -> None:
     counts = Counts()
     counts.placed(at(MILLION))
     counts.placed(at(MILLION + 60, late_s=-3600.0))

@@ -128,7 +128,6 @@ def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why() -> Non
     assert len(whole.rows(2, 2)) == 0
     ln_k = history().ln_k.copy()
     ln_k[1, 2] = np.nan
-    whole = history()
     columns = {**vars(whole), "ln_k": ln_k}
     del columns["evidence"]
     assert StiffnessHistory(**columns).evidence[1].tolist() == [0, 0, Evidence.BAD_QUALITY, 0, 0]

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from core.account import Gap
 from core.blocks import SampleBlock
@@ -30,11 +29,8 @@ KEPT = Reach(7, 1000, time_ns(1000))
 
 def test_a_device_that_went_on_counting_makes_the_hole_exact() -> None:
     assert outage(KEPT, at(4321)) == [Gap(7, 1000, 3321, time_ns(4321), time_ns(1000))]
-
-
-@pytest.mark.parametrize("index", [1000, 990, 0])
-def test_what_follows_or_comes_once_more_is_no_hole(index: int) -> None:
-    assert outage(KEPT, at(index)) == []
+    for follows_or_comes_again in (1000, 990, 0):
+        assert outage(KEPT, at(follows_or_comes_again)) == []
 
 
 def test_what_is_recorded_already_is_not_recorded_twice_unless_in_an_earlier_count() -> None:

@@ -56,7 +56,7 @@ def at_line() -> tuple[Budget, Budget]:
     return ratio, transfer_budgets(transfer, accuracy, runout_um_pk=0.1)[0]
 
 
-def test_each_estimator_names_what_reaches_it_and_gains_limit_a_well_excited_line(
+def test_each_estimator_names_what_reaches_it_and_without_motion_has_no_budget(
     at_line: tuple[Budget, Budget],
 ) -> None:
     ratio, transfer = ({line.name for line in budget.lines} for budget in at_line)
@@ -71,9 +71,6 @@ def test_each_estimator_names_what_reaches_it_and_gains_limit_a_well_excited_lin
         assert lines["runout"] == pytest.approx(0.1 / SHAFT_UM_PK / math.sqrt(3.0), rel=0.03)
         # Slightly more than its share, as the bracket's inertia is taken off.
         assert lines["bracket stiffness"] == pytest.approx(0.1 / math.sqrt(3.0), rel=0.005)
-
-
-def test_without_coherence_or_motion_there_is_no_budget_of_equation_5() -> None:
     still = average(
         np.array([1.5]), np.zeros((9, 4, 1), dtype=complex), np.ones((9, 4), dtype=bool)
     )

@@ -38,11 +38,18 @@ def test_the_level_is_that_of_the_limits_give_or_take_the_deadband(
     assert LIMITS.passed(value, level) == level
 
 
-def test_a_value_is_told_with_the_limit_it_has_passed_or_would_pass_first() -> None:
+def test_a_value_is_told_with_its_limit_and_a_doubtful_one_raises_but_does_not_clear() -> None:
     assert judge(Reading(210.0), LIMITS, None).limit == 200.0
     assert judge(Reading(160.0), LIMITS, None).limit == 150.0
     assert judge(Reading(10.0), LIMITS, None).limit == 150.0
     assert judge(Reading(10.0), Limits(danger=200.0), None).limit == 200.0
+
+    doubt = uncertain(Reason.SPEED_IMPLAUSIBLE)
+
+    assert judge(Reading(210.0, doubt), LIMITS, None).level is DANGER
+    assert not judge(Reading(10.0, doubt), LIMITS, ALERT).is_known
+    assert judge(Reading(10.0, doubt), LIMITS, None).is_known
+    assert judge(Reading(10.0, uncertain(Reason.FEW_SEGMENTS)), LIMITS, ALERT).is_known
 
 
 @pytest.mark.parametrize("reason", [Reason.SENSOR_FAILURE, Reason.DEAD, Reason.NOT_MEASURED])
@@ -52,15 +59,6 @@ def test_a_reading_without_a_number_is_unknown_and_standstill_alone_hides(reason
     assert (condition.is_known, condition.reason) == (False, reason)
     assert condition.suppressed_by is None
     assert judge(missing(Reason.STANDSTILL), LIMITS, DANGER).suppressed_by == "standstill"
-
-
-def test_a_reading_beside_its_line_raises_but_does_not_clear() -> None:
-    doubt = uncertain(Reason.SPEED_IMPLAUSIBLE)
-
-    assert judge(Reading(210.0, doubt), LIMITS, None).level is DANGER
-    assert not judge(Reading(10.0, doubt), LIMITS, ALERT).is_known
-    assert judge(Reading(10.0, doubt), LIMITS, None).is_known
-    assert judge(Reading(10.0, uncertain(Reason.FEW_SEGMENTS)), LIMITS, ALERT).is_known
 
 
 def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> None:

@@ -116,12 +116,12 @@ def test_an_alarm_that_a_stop_hides_has_not_returned_and_is_told_again(machine: 
     assert machine.state(SPAN) is AlarmState.UNACKNOWLEDGED
 
 
-def test_where_the_state_is_not_known_nothing_is_suppressed(machine: Machine) -> None:
+def test_where_the_state_is_not_known_nothing_is_suppressed_but_by_standing(
+    machine: Machine,
+) -> None:
     assert machine.runs(None, overall_shaft_x_um_pp=210.0) == ["overall_shaft_x raised"]
     assert not [a for a in machine.alarms.alarms if a.suppressed_by is not None]
 
-
-def test_a_unit_whose_load_nobody_measures_is_at_least_known_to_stand(machine: Machine) -> None:
     standing = machine.runs(None, speed_rpm=missing(Reason.STANDSTILL), eccentricity_ratio=0.99)
 
     assert "eccentricity_ratio raised" not in standing

@@ -140,17 +140,14 @@ def test_a_reason_says_why_a_reading_is_bad(written: Written) -> None:
         read_histories(written(reason=["clipped"] * N_ROWS))
 
 
-def test_a_file_that_is_cut_off_anywhere_is_refused(written: Written) -> None:
+def test_a_file_that_is_cut_off_anywhere_or_has_too_many_rows_is_refused(
+    written: Written, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = written()
     whole = path.read_bytes()
     for size in range(4, len(whole), 97):
         path.write_bytes(whole[:size])
         assert refusal(path) == "not a complete Parquet file"
-
-
-def test_more_rows_than_are_read_are_refused_by_the_footer(
-    written: Written, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr("service.back_test.parquet_rows.MAX_ROWS", N_ROWS - 1)
     assert refusal(written()) == "20 rows; at most 19 are read"
 

@@ -16,7 +16,7 @@ def event(day: float, text: str = "overhaul") -> MachineEvent:
     return MachineEvent("U1", None, round(day * DAY_NS), text)
 
 
-def test_each_event_begins_to_learn_anew_unless_it_is_before_or_after_all_readings() -> None:
+def test_each_event_begins_to_learn_anew_and_learning_ends_where_told() -> None:
     assert periods_of(DAYS, [], Learning(30)) == [Period(1, 0, 30, 100)]
     events = [event(70.5, "second"), event(50, "first")]
     assert periods_of(DAYS, events, Learning(20)) == [
@@ -27,9 +27,6 @@ def test_each_event_begins_to_learn_anew_unless_it_is_before_or_after_all_readin
     assert periods_of(DAYS + DAY_NS, [event(0), event(200)], Learning(30)) == [
         Period(1, 0, 30, 100, "overhaul")
     ]
-
-
-def test_learning_ends_where_told_and_short_periods_are_not_compared() -> None:
     learning = Learning(20, until_ns=10 * DAY_NS)
     learned = [period.learned for period in periods_of(DAYS, [event(50)], learning)]
     assert learned == [10, 70]
