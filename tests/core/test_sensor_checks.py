@@ -28,7 +28,7 @@ def judged(samples: npt.NDArray[np.floating], turning: bool = True) -> Quality:
     return signal_quality(rms, float(counts.mean()), MM_S_PER_COUNT, turning, DEFAULT_LIMITS)
 
 
-def test_a_healthy_channel_moves_by_more_than_a_count_a_stuck_or_dead_one_does_not() -> None:
+def test_of_eight_samples_or_more_a_healthy_channel_moves_by_more_than_a_count() -> None:
     time_s = np.arange(N_SAMPLES) / 600.0
     assert judged(0.002 * np.sin(2 * np.pi * 1.538 * time_s)) == GOOD
     assert judged(0.001 * RANDOM.standard_normal(N_SAMPLES)) == GOOD
@@ -37,6 +37,8 @@ def test_a_healthy_channel_moves_by_more_than_a_count_a_stuck_or_dead_one_does_n
     assert judged(flicker) == bad(Reason.DEAD)
     assert judged(np.zeros(N_SAMPLES)) == bad(Reason.DEAD)
     assert judged(flicker + 0.5, turning=False) == GOOD
+    with pytest.raises(ValueError, match="needs 8 samples or more, got 7"):
+        quietest_rms(np.zeros((1, 7)))
 
 
 @pytest.mark.parametrize("from_sample", [1000, 4000, 7168])
@@ -60,11 +62,6 @@ def test_a_resolution_may_be_unknown_or_negative(
     rms: float, mean: float, per_count: float, quality: Quality
 ) -> None:
     assert signal_quality(rms, mean, per_count, True, DEFAULT_LIMITS) == quality
-
-
-def test_too_few_samples_for_a_judgement_are_refused() -> None:
-    with pytest.raises(ValueError, match="needs 8 samples or more, got 7"):
-        quietest_rms(np.zeros((1, 7)))
 
 
 def share(x: complex, y: complex) -> float:

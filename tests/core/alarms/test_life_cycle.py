@@ -111,7 +111,9 @@ def test_what_comes_again_while_it_is_latched_is_a_new_occurrence(life: Make) ->
     assert (alarm.alarm.level, alarm.alarm.state) == (AlarmLevel.ALERT, AlarmState.ACKNOWLEDGED)
 
 
-def test_a_shelved_alarm_comes_back_by_itself_and_is_announced_if_it_is_active(life: Make) -> None:
+def test_a_shelved_alarm_comes_back_by_itself_and_what_was_raised_meanwhile_waits(
+    life: Make,
+) -> None:
     alarm = life()
     alarm.find(ALERT, 0)
     alarm.ask(Acknowledge("A. Name", 1))
@@ -125,8 +127,6 @@ def test_a_shelved_alarm_comes_back_by_itself_and_is_announced_if_it_is_active(l
     assert back.state is AlarmState.UNACKNOWLEDGED
     assert (event.change, event.time_ns, event.actor) == ("unshelved", 50, "")
 
-
-def test_what_is_raised_and_returns_on_the_shelf_still_waits_to_be_seen(life: Make) -> None:
     alarm = life()
     with pytest.raises(ActionRefusedError, match="has passed already"):
         alarm.ask(Shelve("A. Name", "too late", 50), 50)
