@@ -21,6 +21,7 @@ $(STAMP): requirements/run.txt requirements/build.txt pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) -r requirements/run.txt -r requirements/build.txt
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m compileall -q -j 0 core acquisition service
 	touch $@
 
 $(DEV_STAMP): $(STAMP) requirements/dev.txt

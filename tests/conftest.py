@@ -11,6 +11,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 import asyncio
+import gc
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -37,11 +38,23 @@ hypothesis_settings.load_profile("padwatch")
 START_NS = 1_767_225_600 * NS_PER_S
 
 
+LENGTHY = ("tests/system/", "tests/torture/")
+"""Tests that start programs: they come first, so that no worker is left with one at the end."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Refuse a test that would be in two tiers."""
+    """Refuse a test that would be in two tiers; begin with those that take long."""
+    items.sort(key=lambda item: not item.nodeid.startswith(LENGTHY))
     for item in items:
         if item.get_closest_marker("long") and item.get_closest_marker("torture"):
             raise pytest.UsageError(f"{item.nodeid} is marked both long and torture")
+
+
+def pytest_collection_finish() -> None:
+    """Keep thousands of collected tests out of every later look of the garbage collector."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -4,10 +4,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 FUZZ = Path(__file__).parents[2] / "benchmarks" / "fuzz.py"
 PATIENCE_S = 280.0
 
 
+@pytest.mark.long
 def test_nothing_made_up_is_taken_for_a_valid_request_or_breaks_the_service() -> None:
     short = ["--examples", "1", "--phases", "examples,fuzzing", "--past-years", "0", "--no-daq"]
     command = [sys.executable, str(FUZZ), *short, "--seed", "7", "--roles", "no login"]
