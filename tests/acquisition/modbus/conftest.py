@@ -172,7 +172,7 @@ def linked(bench_server):
 
     def build(**settings) -> ModbusLink:
         transport = transport_of(bench_server)
-        links.append(ModbusLink(LinkSettings(transport=transport, **{"timeout_s": 5.0} | settings)))
+        links.append(ModbusLink(LinkSettings(transport=transport, **{"timeout_s": 0.6} | settings)))
         return links[-1]
 
     yield build
