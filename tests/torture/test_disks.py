@@ -51,7 +51,7 @@ def small_disk(folder: Path, mib: float) -> Iterator[Path]:
     libc = ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
     size = f"size={round(mib * 2**20)}".encode()
     if libc.mount(b"padwatch", os.fsencode(folder), b"tmpfs", 0, size) != 0:
-        pytest.skip(f"a disk cannot be mounted here: {os.strerror(ctypes.get_errno())}")
+        pytest.skip(f"needs a disk to mount: {os.strerror(ctypes.get_errno())}")
     try:
         yield folder
     finally:

@@ -12,7 +12,7 @@ const ROLES = { act_on_alarms: "operator", change_measuring: "engineer", read_au
 
 let known = null;
 
-/** Whether a change of a password has not been answered, and nobody has logged in since. */
+/** Whether a password change is unconfirmed; the next login ends that. */
 let isPasswordUncertain = false;
 
 /** `{ login_required, set_up_needed, name, role, permissions }`; null until the service has said. */

@@ -93,7 +93,7 @@ PATIENCE_S = 20.0
 
 
 class SetClock:
-    """The host's clock is off by what somebody sets; the steady one is not."""
+    """Host clock that a test may set; the monotonic clock does not change with it."""
 
     def __init__(self) -> None:
         self.steady_s, self.off_s = 1000.0, 0.0

@@ -207,7 +207,7 @@ WORDS = "as seen in the field|not open"
 
 
 def raised(kind: type[Exception]) -> Exception:
-    """An exception of a kind, some of which are particular about their arguments."""
+    """Build an exception; some classes need arguments of their own."""
     if kind is cantools.database.errors.UnsupportedDatabaseFormatError:
         n_formats = len(inspect.signature(kind).parameters)
         return kind(*[ValueError("as seen in the field")] * n_formats)

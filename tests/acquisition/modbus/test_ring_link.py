@@ -130,7 +130,7 @@ LIMIT_PPM = 200.0
 
 
 def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
-    """What is told every ten seconds of a ring on a line that takes 3 ms and at times some more."""
+    """Clock estimate every ten seconds for a ring whose link takes 3 ms, at times more."""
     random, estimate = np.random.default_rng(seed), ClockEstimate()
     slot_s = slot_samples / RATE_HZ
     begun_s = random.uniform(0.0, slot_s)

@@ -21,7 +21,7 @@ max_retry_s = 1.0
 
 @pytest.fixture(scope="session")
 def receiver_port() -> Iterator[int]:
-    """Where the plant delivers its alarms; nobody listens there, and nobody else can."""
+    """Port of an alarm receiver that refuses connections; it stays reserved."""
     with socket.socket() as held:
         held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         held.bind(("127.0.0.1", 0))
