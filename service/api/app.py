@@ -2,7 +2,7 @@
 
 from importlib.metadata import version
 
-from fastapi import Depends, FastAPI
+from fastapi import Depends
 
 from service.api.access.account_routes import account_router
 from service.api.access.application import GuardedApi
@@ -51,7 +51,7 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 """
 
 
-def create_app(context: Context) -> FastAPI:
+def create_app(context: Context) -> GuardedApi:
     """Put the application together."""
     app = GuardedApi(
         title="padwatch",

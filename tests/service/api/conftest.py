@@ -13,6 +13,7 @@ import pytest
 from fastapi import FastAPI
 from rigs.capturing import ALERT, T0
 from rigs.database_copy import copy_database
+from rigs.described import described_app
 from rigs.probes import Probes
 
 from acquisition.calibration import calibrate
@@ -23,7 +24,6 @@ from core.blocks import SampleBlock
 from core.monitor import UnitMonitor
 from service.alarms.engine import AlarmEngine
 from service.alarms.start import alarm_engine
-from service.api.app import create_app
 from service.api.context import Context
 from service.api.in_process import InProcess
 from service.capture.file import CaptureFile
@@ -106,7 +106,7 @@ class Service:
     @cached_property
     def app(self) -> FastAPI:
         """The application, built for the first test that sends a request to it."""
-        return create_app(self.context)
+        return described_app(self.context)
 
     @cached_property
     def client(self) -> httpx2.AsyncClient:

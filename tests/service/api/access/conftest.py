@@ -8,9 +8,9 @@ from typing import Any
 import httpx2
 import pytest
 from argon2 import PasswordHasher
+from rigs.described import described_app
 
 from service.api.access.desk import AccessDesk
-from service.api.app import create_app
 from service.bus import Bus
 from service.metrics.scrape import scrape
 from service.metrics.timings import Timings
@@ -83,7 +83,7 @@ def access(service: Any) -> Access:
     )
     hashing = Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
     desk = AccessDesk(service.store.access, service.clock, asks_everybody=True, hashing=hashing)
-    app = create_app(replace(context, access=desk, metrics=partial(scrape, watched)))
+    app = described_app(replace(context, access=desk, metrics=partial(scrape, watched)))
     return Access(desk, app, service)
 
 

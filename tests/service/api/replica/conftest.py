@@ -6,9 +6,9 @@ from typing import Any
 
 import httpx2
 import pytest
+from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
-from service.api.app import create_app
 from service.heartbeats import Heartbeats
 from service.replica.carrying_out import CarryingOut
 from service.replica.reporter import Reporter
@@ -57,7 +57,7 @@ async def pair(running: Any, plant: PlantFile) -> AsyncIterator[Pair]:
     """Both, and the replica has seen two reports: it knows that somebody is alive."""
     reporter, carrying_out = process_of(running, plant, "one")
     replica = await replica_on(plant, running.store, running.clock)
-    app = create_app(replica_context(replica, None, None, Heartbeats(running.clock)))
+    app = described_app(replica_context(replica, None, None, Heartbeats(running.clock)))
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         both = Pair(running, replica, client, reporter, carrying_out)
