@@ -14,8 +14,9 @@ HEADER = "Padwatch-Edition"
 
 @cache
 def edition() -> str:
-    """The program's version and the dashboard's files in short, such as ``0.6.0-1f2e3d4c``."""
+    """The versions of program and chart library and the files in short: ``0.6.0-1f2e3d4c``."""
     tags = "".join(f"{path} {asset.etag}" for path, asset in sorted(pages().items()))
+    tags += version("plotly")
     return f"{version('padwatch')}-{hashlib.sha256(tags.encode()).hexdigest()[:8]}"
 
 

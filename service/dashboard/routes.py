@@ -1,9 +1,12 @@
 """Routes of the dashboard: one page, its files, and the chart library from its own package."""
 
+from functools import cache
+
 from fastapi import APIRouter, HTTPException, Request, Response
 
 from service.api.access.declared import OPEN
 from service.dashboard.assets import Asset, pages, plotly
+from service.dashboard.edition import edition
 
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
@@ -16,37 +19,50 @@ SECURITY_HEADERS = {
 """No script but our own files. Plotly adds style elements of its own, hence the inline styles."""
 
 REVALIDATE = "no-cache"
-"""A page from before an upgrade must never talk to the service from after it."""
+"""The page itself is asked for each time: it names the files of the edition that is running."""
 
-KEEP_A_WEEK = "public, max-age=604800"
-"""For the five megabytes of the chart library, which only change with its package."""
+KEEP = "public, max-age=31536000, immutable"
+"""A file of one edition never changes, so a browser need not ask for it again."""
+
+
+@cache
+def index() -> Asset:
+    """The page, which names the files of this edition."""
+    page = pages()["index.html"]
+    body = page.body.replace(b"/static/", f"/static/{edition()}/".encode())
+    return Asset(body, page.media_type)
 
 
 def dashboard_router() -> APIRouter:
-    """Build the routes ``/``, ``/static/…`` and ``/static/plotly.min.js``."""
+    """Build the routes ``/``, ``/static/EDITION/…`` and ``/static/EDITION/plotly.min.js``."""
     router = APIRouter(include_in_schema=False, dependencies=[OPEN])
     router.add_api_route("/", _index, methods=["GET", "HEAD"])
-    router.add_api_route("/static/plotly.min.js", _plotly, methods=["GET", "HEAD"])
-    router.add_api_route("/static/{path:path}", _file, methods=["GET", "HEAD"])
+    router.add_api_route("/static/{made}/plotly.min.js", _plotly, methods=["GET", "HEAD"])
+    router.add_api_route("/static/{made}/{path:path}", _file, methods=["GET", "HEAD"])
     return router
 
 
-# Plain functions: FastAPI runs them in a worker thread, away from the acquisition's event loop.
+# A page has some 130 files. They are in memory, so that none waits for a thread: twelve browsers
+# that open it at once would otherwise use up the places that there are for requests.
 
 
-def _index(request: Request) -> Response:
-    return _sent(pages()["index.html"], request, REVALIDATE)
+async def _index(request: Request) -> Response:
+    return _sent(index(), request, REVALIDATE)
 
 
-def _plotly(request: Request) -> Response:
-    return _sent(plotly(), request, KEEP_A_WEEK)
+def _plotly(made: str, request: Request) -> Response:
+    """In a thread: the first time, five megabytes are compressed."""
+    return _sent_from(made, plotly(), request)
 
 
-def _file(path: str, request: Request) -> Response:
-    asset = pages().get(path)
-    if asset is None:
-        raise HTTPException(404, f"the dashboard has no file {path}")
-    return _sent(asset, request, REVALIDATE)
+async def _file(made: str, path: str, request: Request) -> Response:
+    return _sent_from(made, pages().get(path), request)
+
+
+def _sent_from(made: str, asset: Asset | None, request: Request) -> Response:
+    if asset is None or made != edition():
+        raise HTTPException(404, f"the dashboard has no file {request.url.path}")
+    return _sent(asset, request, KEEP)
 
 
 def _sent(asset: Asset, request: Request, caching: str) -> Response:

@@ -7,6 +7,11 @@ import pytest
 from playwright.async_api import Locator, Page, expect
 from real_plant import PASSWORD
 
+from service.dashboard.edition import edition
+
+FILES = f"/static/{edition()}/"
+"""Where the modules of the dashboard are."""
+
 A_NUMBER = re.compile(r"\d")
 CHARTS = ("stiffness-trend", "amplitude-trend", "orbit", "centre", "spectrum")
 """Of the page of a bearing."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from on_screen import (
     A_NUMBER,
+    FILES,
     assert_fits,
     await_charts,
     await_orbit,
@@ -19,7 +20,8 @@ AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "
 SEGMENTS = {":unit": "U1", ":bearing": "UJB"}
 BEARING = "#/units/U1/bearings/UJB"
 
-PATTERNS = "import('/static/pages.js').then(({ PAGES }) => PAGES.map(({ pattern }) => pattern))"
+PATTERNS = f"""import('{FILES}pages.js')
+    .then(({{ PAGES }}) => PAGES.map(({{ pattern }}) => pattern))"""
 WAITING = "Asking the service."
 BAND = "getComputedStyle(document.body).backgroundColor"
 GRAVE = """async () => {

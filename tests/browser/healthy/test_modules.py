@@ -1,16 +1,17 @@
 """Single modules of the dashboard, run in the browser without a page of the plant."""
 
+from on_screen import FILES
 from playwright.async_api import Page
 
-EMPTY = "static/padwatch.svg"
+EMPTY = FILES[1:] + "padwatch.svg"
 """A page of the plant that runs nothing by itself."""
 
-CALL = """
-async ([module, name, ...given]) => (await import(`/static/${module}.js`))[name](...given)
+CALL = f"""
+async ([module, name, ...given]) => (await import(`{FILES}${{module}}.js`))[name](...given)
 """
 
-DRAWN_WITHOUT_A_SIZE = """async () => {
-  const { orbitPicture } = await import("/static/charts/orbit_picture.js");
+DRAWN_WITHOUT_A_SIZE = """async (files) => {
+  const { orbitPicture } = await import(`${files}charts/orbit_picture.js`);
   const trace = [1, 2, 3];
   const clip = {
     startS: 0, rate_hz: 1, n_samples: 3, turnS: 1, mark: [], order1: null,
@@ -86,4 +87,4 @@ async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> 
 
 async def test_an_orbit_may_be_drawn_before_its_place_on_the_page_has_a_size(plant, page) -> None:
     await page.goto(plant.url)
-    await page.evaluate(DRAWN_WITHOUT_A_SIZE)
+    await page.evaluate(DRAWN_WITHOUT_A_SIZE, FILES)

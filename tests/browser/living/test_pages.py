@@ -1,6 +1,6 @@
 """Pages of a plant with a past: audit trail, bearings of a unit side by side, and on a phone."""
 
-from on_screen import A_NUMBER, assert_fits, await_charts, freeze
+from on_screen import A_NUMBER, FILES, assert_fits, await_charts, freeze
 from playwright.async_api import expect
 
 BEARING = "#/units/U1/bearings/UJB"
@@ -13,9 +13,9 @@ WIDEST = {
 }
 HREFS = "links => links.map(link => link.getAttribute('href'))"
 LEADS_SOMEWHERE = """
-async (addresses) => {
-  const { routeOf } = await import("/static/route.js");
-  const { PAGES } = await import("/static/pages.js");
+async ([files, addresses]) => {
+  const { routeOf } = await import(`${files}route.js`);
+  const { PAGES } = await import(`${files}pages.js`);
   return addresses.map((address) => routeOf(address, PAGES) !== null);
 }
 """
@@ -65,7 +65,7 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     await expect(page.locator(".unit-recordings")).not_to_contain_text("Asking the service.")
     ways = await table.locator(".ways a").evaluate_all(HREFS)
     assert len(ways) == 15
-    assert all(await page.evaluate(LEADS_SOMEWHERE, ways))
+    assert all(await page.evaluate(LEADS_SOMEWHERE, [FILES, ways]))
     assert complaints == []
 
 

@@ -1,6 +1,7 @@
-"""How the dashboard's files travel: complete, uncached where they change, under their edition."""
+"""How the dashboard's files travel: complete, kept by browsers, under their edition."""
 
 import gzip
+import re
 
 import pytest
 from fastapi import FastAPI
@@ -11,6 +12,7 @@ from service.dashboard.assets import Asset, pages, plotly
 from service.dashboard.edition import EditionHeader, edition
 from service.dashboard.routes import dashboard_router
 
+FILES = f"/static/{edition()}/"
 AS_IS = {"Accept-Encoding": "identity"}
 
 
@@ -32,21 +34,30 @@ def test_no_inline_script_may_run_on_any_page(client) -> None:
     assert "<script>" not in answer.text
 
 
-def test_every_file_that_a_page_names_is_there(client) -> None:
-    for path, asset in pages().items():
-        answer = client.get(f"/static/{path}", headers=AS_IS)
-        assert answer.content == asset.body, path
-        assert answer.headers["cache-control"] == "no-cache"
+def test_the_page_is_asked_for_each_time_and_its_files_once_for_each_edition(client) -> None:
+    page = client.get("/", headers=AS_IS)
+    assert page.headers["cache-control"] == "no-cache"
+    named = re.findall(r'(?:href|src)="(/[^"]+)"', page.text)
+    assert len(named) > 10
+    for path in [*named, *(FILES + path for path in pages())]:
+        answer = client.get(path, headers=AS_IS)
+        assert answer.status_code == 200, path
+        assert answer.content == pages()[path.removeprefix(FILES)].body, path
+        assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
 
 
-def test_the_chart_library_is_the_installed_one_and_may_be_kept(client) -> None:
-    answer = client.get("/static/plotly.min.js", headers=AS_IS)
+def test_a_page_of_another_edition_gets_no_file_of_this_one(client) -> None:
+    for path in ("app.js", "plotly.min.js"):
+        assert client.get(f"/static/0.0.1-12345678/{path}").status_code == 404
+
+
+def test_the_chart_library_is_the_installed_one(client) -> None:
+    answer = client.get(FILES + "plotly.min.js", headers=AS_IS)
     assert answer.content == plotly().body
     assert b"plotly.js v" in answer.content[:200]
-    assert "max-age=604800" in answer.headers["cache-control"]
 
 
-@pytest.mark.parametrize("path", ["/", "/static/app.js", "/static/plotly.min.js"])
+@pytest.mark.parametrize("path", ["/", FILES + "app.js", FILES + "plotly.min.js"])
 def test_a_browser_that_has_the_file_is_not_sent_it_again(client, path) -> None:
     etag = client.get(path).headers["etag"]
     again = client.get(path, headers={"If-None-Match": etag})
@@ -57,8 +68,8 @@ def test_a_browser_that_has_the_file_is_not_sent_it_again(client, path) -> None:
 
 
 def test_packed_and_plain_are_the_same_file_with_different_tags(client) -> None:
-    plain = client.get("/static/app.js", headers=AS_IS)
-    packed = client.get("/static/app.js", headers={"Accept-Encoding": "gzip"})
+    plain = client.get(FILES + "app.js", headers=AS_IS)
+    packed = client.get(FILES + "app.js", headers={"Accept-Encoding": "gzip"})
     assert packed.headers["content-encoding"] == "gzip"
     assert packed.content == plain.content == gzip.decompress(pages()["app.js"].gzipped)
     assert packed.headers["etag"] != plain.headers["etag"]
@@ -66,7 +77,7 @@ def test_packed_and_plain_are_the_same_file_with_different_tags(client) -> None:
 
 @pytest.mark.parametrize("path", ["nothing.js", "../routes.py", "%2e%2e/routes.py", "charts", ""])
 def test_nothing_else_is_served(client, path) -> None:
-    assert client.get(f"/static/{path}").status_code == 404
+    assert client.get(FILES + path).status_code == 404
 
 
 def test_every_answer_names_the_edition_even_a_refusal() -> None:

@@ -14,7 +14,7 @@ export function plotly() {
 function loaded() {
   return new Promise((resolve, reject) => {
     const script = document.createElement("script");
-    script.src = "/static/plotly.min.js";
+    script.src = new URL("../plotly.min.js", import.meta.url).href;
     script.onload = () => resolve(globalThis.Plotly);
     script.onerror = () => {
       script.remove();

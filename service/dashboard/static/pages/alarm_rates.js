@@ -6,7 +6,7 @@ import { formatFixed } from "../format.js";
 
 /** Returns `{ node, draw(rates), fail(sentence) }`. */
 export function ratesLine() {
-  const node = element("p", { class: "panel alarm-rates", "aria-label": "Alarm rates" }, "");
+  const node = element("section", { class: "panel alarm-rates", "aria-label": "Alarm rates" }, "");
   return {
     node,
     draw(rates) {
