@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from inspect import iscoroutinefunction
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,8 @@ PATIENCE_MS = 90_000
 
 expect.set_options(timeout=PATIENCE_MS)
 
+SHARED_LOOP = pytest.mark.asyncio(loop_scope="session")
+
 QUIET = [
     "--no-sandbox",
     "--disable-gpu",
@@ -35,11 +38,21 @@ QUIET = [
 
 
 @pytest.hookimpl(tryfirst=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Say so before the factory of event loops is set: it would be made anew for each test.
+
+    With it the browser would be started anew, too.
+    """
+    if iscoroutinefunction(metafunc.function):
+        metafunc.definition.add_marker(SHARED_LOOP, append=False)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run all tests here in the event loop of the browser that they share."""
     for item in items:
         if Path(__file__).parent in item.path.parents and is_async_test(item):
-            item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)
+            item.add_marker(SHARED_LOOP, append=False)
 
 
 @pytest.fixture(scope="session")
