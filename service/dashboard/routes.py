@@ -25,20 +25,24 @@ KEEP = "public, max-age=31536000, immutable"
 """A file of one edition never changes, so a browser need not ask for it again."""
 
 
+def files() -> str:
+    """Below what the files of this edition are."""
+    return f"/static/{edition()}/"
+
+
 @cache
 def index() -> Asset:
     """The page, which names the files of this edition."""
     page = pages()["index.html"]
-    body = page.body.replace(b"/static/", f"/static/{edition()}/".encode())
-    return Asset(body, page.media_type)
+    return Asset(page.body.replace(b"/static/", files().encode()), page.media_type)
 
 
 def dashboard_router() -> APIRouter:
     """Build the routes ``/``, ``/static/EDITION/…`` and ``/static/EDITION/plotly.min.js``."""
     router = APIRouter(include_in_schema=False, dependencies=[OPEN])
     router.add_api_route("/", _index, methods=["GET", "HEAD"])
-    router.add_api_route("/static/{made}/plotly.min.js", _plotly, methods=["GET", "HEAD"])
-    router.add_api_route("/static/{made}/{path:path}", _file, methods=["GET", "HEAD"])
+    router.add_api_route(f"{files()}plotly.min.js", _plotly, methods=["GET", "HEAD"])
+    router.add_api_route("/static/{path:path}", _file, methods=["GET", "HEAD"])
     return router
 
 
@@ -50,18 +54,16 @@ async def _index(request: Request) -> Response:
     return _sent(index(), request, REVALIDATE)
 
 
-def _plotly(made: str, request: Request) -> Response:
+def _plotly(request: Request) -> Response:
     """In a thread: the first time, five megabytes are compressed."""
-    return _sent_from(made, plotly(), request)
+    return _sent(plotly(), request, KEEP)
 
 
-async def _file(made: str, path: str, request: Request) -> Response:
-    return _sent_from(made, pages().get(path), request)
-
-
-def _sent_from(made: str, asset: Asset | None, request: Request) -> Response:
+async def _file(path: str, request: Request) -> Response:
+    made, _, name = path.partition("/")
+    asset = pages().get(name)
     if asset is None or made != edition():
-        raise HTTPException(404, f"the dashboard has no file {request.url.path}")
+        raise HTTPException(404, f"the dashboard has no file {path}")
     return _sent(asset, request, KEEP)
 
 

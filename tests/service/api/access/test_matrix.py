@@ -177,7 +177,7 @@ def test_the_table_has_a_row_for_each_operation_and_the_description_says_the_sam
     undescribed = {each.path for name, each in access.app.declared.items() if name not in TABLE}
 
     assert undescribed == {
-        *("/", "/static/{made}/{path:path}", "/static/{made}/plotly.min.js"),
+        *("/", "/static/{path:path}", FILES + "plotly.min.js"),
         "/api/v1/openapi.json",
     }
 
