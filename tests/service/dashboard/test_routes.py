@@ -1,25 +1,36 @@
 """How the dashboard's files travel: complete, kept by browsers, under their edition."""
 
+import asyncio
 import gzip
 import re
+from collections import Counter
+from collections.abc import Iterator
 
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
+from starlette.types import Message
 
 from service.dashboard import edition as told
 from service.dashboard.assets import Asset, pages, plotly
 from service.dashboard.edition import EditionHeader, edition
 from service.dashboard.routes import dashboard_router
+from service.http.answers import BoundedAnswers
+from service.settings.http_limits import HttpLimitSettings
 
 FILES = f"/static/{edition()}/"
 AS_IS = {"Accept-Encoding": "identity"}
 
 
 @pytest.fixture
-def client() -> TestClient:
-    app = FastAPI()
-    app.include_router(dashboard_router())
+def app() -> FastAPI:
+    made = FastAPI()
+    made.include_router(dashboard_router())
+    return made
+
+
+@pytest.fixture
+def client(app: FastAPI) -> TestClient:
     return TestClient(app)
 
 
@@ -44,6 +55,40 @@ def test_the_page_is_asked_for_each_time_and_its_files_once_for_each_edition(cli
         assert answer.status_code == 200, path
         assert answer.content == pages()[path.removeprefix(FILES)].body, path
         assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+
+
+async def test_twenty_browsers_that_open_the_dashboard_at_once_all_get_every_file(
+    app: FastAPI,
+) -> None:
+    some = list(pages())[::4]
+    bounded = BoundedAnswers(app, HttpLimitSettings())
+    found: Counter[int] = Counter()
+
+    async def get(path: str) -> None:
+        async def receive() -> Message:
+            return {"type": "http.request", "body": b"", "more_body": False}
+
+        async def send(message: Message) -> None:
+            await asyncio.sleep(0)  # others get their turn meanwhile, as on a network
+            if message["type"] == "http.response.start":
+                found[message["status"]] += 1
+
+        packed = (b"accept-encoding", b"gzip")
+        scope = {"type": "http", "method": "GET", "path": path, "headers": [packed]}
+        await bounded({**scope, "query_string": b"", "root_path": ""}, receive, send)
+
+    async def connection(paths: Iterator[str]) -> None:
+        for path in paths:
+            await get(path)
+
+    async def browser() -> None:
+        await get("/")
+        paths = iter([FILES + "plotly.min.js", *(FILES + path for path in some)])
+        await asyncio.gather(*(connection(paths) for _ in range(6)))
+
+    await asyncio.gather(*(browser() for _ in range(20)))
+
+    assert found == {200: 20 * (2 + len(some))}
 
 
 def test_a_page_of_another_edition_gets_no_file_of_this_one(client) -> None:
