@@ -26,7 +26,7 @@ KEEP = "public, max-age=31536000, immutable"
 
 
 def files() -> str:
-    """Below what the files of this edition are."""
+    """Path below which the files of this edition are served."""
     return f"/static/{edition()}/"
 
 

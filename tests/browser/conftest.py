@@ -39,9 +39,9 @@ QUIET = [
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Say so before the factory of event loops is set: it would be made anew for each test.
+    """Mark tests before pytest-asyncio chooses the scope of their event loop.
 
-    With it the browser would be started anew, too.
+    Marked later, each test gets a new loop, and with it a new browser.
     """
     if iscoroutinefunction(metafunc.function):
         metafunc.definition.add_marker(SHARED_LOOP, append=False)
