@@ -61,6 +61,12 @@ class CrossSpectrum:
         return np.minimum(coherence, 1.0)
 
 
+NO_SPECTRUM = CrossSpectrum(
+    np.zeros(0), np.zeros((0, 4, 4), complex), np.zeros((0, 4, 4)), np.zeros((4, 4), np.int64)
+)
+"""In the place of a spectrum that is not there."""
+
+
 def average(
     frequency_hz: FloatArray, phasors_um_pk: ComplexArray, usable: npt.NDArray[np.bool_]
 ) -> CrossSpectrum:

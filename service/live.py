@@ -99,6 +99,12 @@ class LiveView:
 
         self.store_error: str | None = None
         self.n_unstored = 0
+        self.unstored_reason: str | None = None
+
+    def note_unstored(self, n_findings: int, reason: str) -> None:
+        """Count findings that are not in the database and never will be."""
+        self.n_unstored += n_findings
+        self.unstored_reason = reason
 
     def set_link(self, unit: str, state: LinkState, reason: str | None = None) -> bool:
         """Note the state of a link; return whether it changed."""

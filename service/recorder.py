@@ -2,9 +2,9 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -14,10 +14,12 @@ import structlog
 from acquisition.clock import Clock
 from core.alarms.event import AlarmNews
 from core.assessment import Assessment
+from core.cross_spectrum import NO_SPECTRUM
 from core.films.film_judge import FilmNews
 from service.heartbeats import UNHEARD, Pulse
 from service.live import LiveView
-from service.store.port import Store, StoreError, UnitGap
+from service.parked_rows import ParkedRows
+from service.store.port import RefusedRowError, Store, StoreError, UnitGap
 from service.store.positions_port import StreamPosition
 
 log = structlog.get_logger()
@@ -27,7 +29,13 @@ RETRY_S = 1.0
 MAX_NEWS = 100_000
 """News of alarms that wait for a store that does not answer; about 100 MB."""
 
+GIVEN_UP = "given_up"
+
 T = TypeVar("T")
+
+
+class NotStoredError(Exception):
+    """News of an alarm was given up, or refused by the database; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +48,31 @@ class Findings:
     films: Sequence[FilmNews] = ()
     position: StreamPosition | None = None
 
+    @property
+    def parts(self) -> Iterator["Findings"]:
+        """Each row by itself, in an order in which they may be stored one after the other."""
+        yield from (Findings(alarms=[news]) for news in self.alarms)
+        yield from (Findings([assessment]) for assessment in self.assessments)
+        yield from (Findings(gaps=[gap]) for gap in self.gaps)
+        yield from (Findings(films=[news]) for news in self.films)
+        if self.position is not None:
+            yield Findings(position=self.position)
+
+    @property
+    def row(self) -> object:
+        """The one row of a part."""
+        return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
+
 
 class Recorder:
     """Writes findings to the store in a thread, so that a slow disk delays no samples.
 
+    A row that the database refuses is parked in a file, and the rest is stored without it.
+
     Parameters
     ----------
+    parked
+        The file.
     capacity
         Most findings that wait for a store that does not answer; beyond it the oldest are given up
         and counted in :attr:`LiveView.n_unstored`. News of alarms wait apart from them, up to
@@ -61,17 +88,19 @@ class Recorder:
         store: Store,
         live: LiveView,
         clock: Clock,
+        parked: ParkedRows,
         capacity: int = 5000,
         told: Callable[[], None] = lambda: None,
         timed: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
-        self._store, self._live, self._clock = store, live, clock
+        self._store, self._live, self._clock, self._parked = store, live, clock, parked
         self._capacity, self._told, self._timed = capacity, told, timed
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
         self._waits_since_s = 0.0
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
+        self._outcomes: dict[int, asyncio.Future[str | None]] = {}
         # its own: the others may all be busy answering
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recorder")
 
@@ -95,18 +124,28 @@ class Recorder:
             self._waiting.append(replace(findings, alarms=()))
         if len(self._waiting) > self._capacity:
             self._waiting.popleft()
-            self._live.n_unstored += 1
+            self._live.note_unstored(1, GIVEN_UP)
         self._alarms += findings.alarms
         while len(self._alarms) > MAX_NEWS:
-            self._alarms.popleft()
-            self._live.n_unstored += 1
+            self._resolve(self._alarms.popleft(), "too much waits for the store")
+            self._live.note_unstored(1, GIVEN_UP)
         self._news.set()
 
     async def stored(self) -> None:
-        """Wait until all news of alarms that there is now is on the disk, however long it takes."""
-        mine = self._alarms[-1] if self._alarms else None
-        async with self._progress:
-            await self._progress.wait_for(lambda: all(news is not mine for news in self._alarms))
+        """Wait until the newest news of alarms is on the disk, however long it takes.
+
+        Raises
+        ------
+        NotStoredError
+            If it was given up, or the database refused it.
+        """
+        if not self._alarms:
+            return
+        key, loop = id(self._alarms[-1]), asyncio.get_running_loop()
+        outcome = self._outcomes.setdefault(key, loop.create_future())
+        refusal = await asyncio.shield(outcome)  # others may wait for it as well
+        if refusal is not None:
+            raise NotStoredError(refusal)
 
     async def reached(self, position: StreamPosition) -> None:
         """Wait until a position that was put is on the disk, however long it takes."""
@@ -153,13 +192,9 @@ class Recorder:
 
     async def _write(self) -> bool:
         batch, alarms = list(self._waiting), list(self._alarms)
-        assessments = [a for findings in batch for a in findings.assessments]
-        gaps = [gap for findings in batch for gap in findings.gaps]
-        films = [told for findings in batch for told in findings.films]
-        positions = [findings.position for findings in batch if findings.position]
-        append = partial(self._append, assessments, gaps, alarms, films, positions)
+        append = partial(self._append, [Findings(alarms=alarms), *batch])
         try:
-            await asyncio.get_running_loop().run_in_executor(self._thread, append)
+            refused = await asyncio.get_running_loop().run_in_executor(self._thread, append)
         except StoreError as error:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
@@ -170,23 +205,66 @@ class Recorder:
             log.info("results are being stored again")
         self._live.store_error = None
         self._waits_since_s = self._clock.monotonic_s()
+        self._note_parked(refused)
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
+        reasons = {id(row): reason for row, reason in refused}
+        for news in alarms:
+            self._resolve(news, reasons.get(id(news)))
         if alarms:
             self._told()
         await self._tell_progress()
         return True
 
-    def _append(
-        self,
-        assessments: Sequence[Assessment],
-        gaps: Sequence[UnitGap],
-        alarms: Sequence[AlarmNews],
-        films: Sequence[FilmNews],
-        positions: Sequence[StreamPosition],
-    ) -> None:
+    def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
+        """Store what can be stored; return the rows that cannot, which are parked, and why."""
+        refused: list[tuple[object, str]] = []
         with self._timed():
-            self._store.append(assessments, gaps, alarms, films, positions)
+            self._append_parts([part for findings in batch for part in findings.parts], refused)
+        if refused:
+            try:
+                self._parked.add(self._clock.now_ns(), refused)
+            except OSError as error:
+                raise StoreError(f"{self._parked.path}: {error}") from error
+        return refused
+
+    def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
+        """Store parts in one transaction; where that is refused, in halves."""
+        try:
+            self._store.append(
+                [row for part in parts for row in part.assessments],
+                [row for part in parts for row in part.gaps],
+                [row for part in parts for row in part.alarms],
+                [row for part in parts for row in part.films],
+                [part.position for part in parts if part.position],
+            )
+        except RefusedRowError as error:
+            middle = len(parts) // 2
+            if middle:
+                self._append_parts(parts[:middle], refused)
+                self._append_parts(parts[middle:], refused)
+                return
+            self._store.append([], [])  # or it is not the row that is refused
+            refused.append((parts[0].row, str(error)))
+            self._append_without_spectrum(parts[0].assessments)
+
+    def _append_without_spectrum(self, assessments: Sequence[Assessment]) -> None:
+        """Store the readings of a result whose spectrum alone may have been refused."""
+        if any(assessment.spectrum.frequency_hz.size for assessment in assessments):
+            with suppress(RefusedRowError):
+                self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in assessments], [])
+
+    def _note_parked(self, refused: Sequence[tuple[object, str]]) -> None:
+        if refused:
+            reason = f"{refused[-1][1]} (parked in {self._parked.path.name})"
+            self._live.note_unstored(len(refused), reason)
+            log.error("results cannot be stored", n_parked=len(refused), reason=reason)
+
+    def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
+        """Tell whoever waits for news of an alarm what has become of it."""
+        outcome = self._outcomes.pop(id(news), None)
+        if outcome is not None and not outcome.done():
+            outcome.set_result(refusal)
 
     async def _tell_progress(self) -> None:
         async with self._progress:

@@ -36,7 +36,9 @@ class ServiceHealth:
     store_behind_s
         For how long something has been waiting for the store without anything being written.
     n_unstored
-        Findings given up since the start because the store did not take them.
+        Findings since the start that the store did not take: given up, or refused and parked.
+    unstored_reason
+        Why the newest of them is not stored.
     waiting_share
         How far the queue from acquisition to analysis is filled, 0 to 1.
     analysis_delay_s
@@ -64,6 +66,7 @@ class ServiceHealth:
     store_error: str | None = None
     store_behind_s: float = 0.0
     n_unstored: int = 0
+    unstored_reason: str | None = None
     waiting_share: float = 0.0
     analysis_delay_s: float = 0.0
     captures_error: str | None = None
@@ -116,6 +119,7 @@ def health_of(
             store_error=live.store_error,
             store_behind_s=recorder.behind_s,
             n_unstored=live.n_unstored,
+            unstored_reason=live.unstored_reason,
             waiting_share=bus.depth / bus.capacity,
             analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
             captures_error=captures.trouble,

@@ -173,7 +173,8 @@ class ServiceAlarms:
         self._n_unstored = health.n_unstored
         if n_more <= 0:
             return WITHIN
-        return Condition(AlarmLevel.DANGER, value=float(health.n_unstored), reason="given_up")
+        reason = health.unstored_reason or "given_up"
+        return Condition(AlarmLevel.DANGER, value=float(health.n_unstored), reason=reason)
 
     def _damaged(self, health: ServiceHealth) -> Condition:
         n_more = health.n_recordings_damaged - self._n_damaged

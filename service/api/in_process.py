@@ -10,7 +10,7 @@ from service.api.elsewhere import NotCarriedOutError
 from service.films.actions import Action as BaselineAction
 from service.films.keeper import FilmKeeper
 from service.films.learning import FilmPlace
-from service.recorder import Recorder
+from service.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
@@ -41,6 +41,12 @@ class InProcess:
                 "Not on the disk yet",
                 f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
                 " a restart now would undo it. It is tried again until it is stored",
+            ) from error
+        except NotStoredError as error:
+            raise NotCarriedOutError(
+                "Not stored",
+                f"alarm {id_} is {alarm.state.value}, but this is not in its history, and a restart"
+                f" undoes it: {error}",
             ) from error
         return alarm
 

@@ -129,7 +129,8 @@ class StoreModel(ApiModel):
     """Why they do not."""
 
     n_unstored: int
-    """Results given up because the store did not answer for too long."""
+    """Results that are not in the database: given up as it did not answer for too long, or refused
+    by it and parked."""
 
 
 class CapturesModel(ApiModel):

@@ -40,7 +40,7 @@ def store_metrics(watched: Watched) -> Iterator[Metric]:
     )
     yield counter(
         "store_lost_findings",
-        "Findings given up because the store did not take them.",
+        "Findings that the store did not take: given up, or refused and parked.",
         (),
         [((), live.n_unstored)],
     )

@@ -12,7 +12,7 @@ from service.background import TroubleLog
 from service.films.actions import BaselineRefusedError
 from service.films.keeper import FilmKeeper
 from service.heartbeats import UNHEARD, Pulse
-from service.recorder import Recorder
+from service.recorder import NotStoredError, Recorder
 from service.replica.commands import (
     NewReference,
     OnAlarm,
@@ -107,6 +107,11 @@ class CarryingOut:
             return Answer(CommandState.UNKNOWN, "there is no such alarm")
         except (ActionRefusedError, BaselineRefusedError) as error:
             return Answer(CommandState.REFUSED, str(error))
+        except NotStoredError as error:
+            return Answer(
+                CommandState.INTERRUPTED,
+                f"it is done, but not in the alarm's history, and a restart undoes it: {error}",
+            )
         return DONE
 
     async def _do(self, task: Task) -> None:

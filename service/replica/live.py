@@ -3,13 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.assessment import Assessment
 from core.blocks import SampleBlock
-from core.cross_spectrum import CrossSpectrum
+from core.cross_spectrum import NO_SPECTRUM
 from core.quality import Reason, bad, missing
 from core.quantities import CATALOGUE
 from service.alarms.gone_alarms import SHARED
@@ -22,11 +20,6 @@ SILENT_AFTER_S = 5.0
 """Reports come every second: who misses several of them is not there, or not reached."""
 
 NOBODY = "no process that analyses this unit gives a sign of life"
-
-NOWHERE = CrossSpectrum(
-    np.zeros(0), np.zeros((0, 4, 4), complex), np.zeros((0, 4, 4)), np.zeros((4, 4), np.int64)
-)
-"""In the place of spectra, which stay where they were found."""
 
 
 @dataclass(frozen=True)
@@ -194,4 +187,4 @@ NOT_REPORTED = UnitStatus(LinkState.NOT_CONNECTED, NOBODY)
 
 
 def _assessment(unit: str, bearing: str, state: BearingState) -> Assessment:
-    return Assessment(unit, bearing, spectrum=NOWHERE, orbit=None, **vars(state))
+    return Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))

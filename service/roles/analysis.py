@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from core.monitor_port import Monitor
 from service.alarms.engine import AlarmEngine
@@ -21,6 +22,7 @@ from service.heartbeats import Loop
 from service.load.strain import LoadLimits
 from service.load.watch import LoadWatch
 from service.origin import Origin
+from service.parked_rows import FILE, ParkedRows
 from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.retaining import Retaining
@@ -148,7 +150,8 @@ async def analysis_on(
             monitor.go_on(await asyncio.to_thread(store.reach, unit))
     deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
     commits = ground.timings.commits
-    recorder = Recorder(store, live, clock, told=deliveries.wake, timed=commits.timed)
+    parked = ParkedRows(Path(plant.service.data_folder) / FILE)
+    recorder = Recorder(store, live, clock, parked, told=deliveries.wake, timed=commits.timed)
     captures = captures_of(plant, origin, clock)
     recordings = waveform_keeper(plant, store, clock)
     load = LoadWatch(bus, LoadLimits(), clock)

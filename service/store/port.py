@@ -35,6 +35,10 @@ class StoreError(Exception):
     """The store cannot be used: another program's, newer than this one, or damaged."""
 
 
+class RefusedRowError(StoreError):
+    """A row breaks a rule of the database, or its page is damaged: it can never be written."""
+
+
 @dataclass(frozen=True)
 class UnitGap:
     """A gap in the samples of one unit, to be recorded."""

@@ -35,7 +35,7 @@ const KINDS = {
   link_lost: "Link lost",
   samples_lost: "Samples lost",
   results_not_stored: "Results are not being stored",
-  results_lost: "Results given up",
+  results_lost: "Results lost",
   blocks_waiting: "Queue to the analysis fills",
   analysis_late: "Analysis falls behind",
   captures_not_kept: "Samples around alarms not kept",

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import psycopg
 
-from service.store.port import StoreError
+from service.store.port import RefusedRowError, StoreError
 
 BY_STATE = {
     "53100": "the disk of the database is full: make room there",
@@ -38,6 +38,14 @@ BY_WORDS = {
 }
 """What to do, by what the server or its library says before there is a session."""
 
+OF_THE_ROW = (
+    psycopg.IntegrityError,
+    psycopg.DataError,
+    psycopg.errors.DataCorrupted,
+    psycopg.errors.IndexCorrupted,
+)
+"""Errors that a row or its page is to blame for: others of its transaction can be written."""
+
 UNREACHABLE = "see whether PostgreSQL runs and can be reached; it is tried again"
 
 
@@ -64,6 +72,9 @@ def renamed(where: str) -> Iterator[None]:
     try:
         yield
     except psycopg.Error as error:
-        raise StoreError(sentence(where, error)) from error
+        kind = RefusedRowError if isinstance(error, OF_THE_ROW) else StoreError
+        raise kind(sentence(where, error)) from error
+    except UnicodeEncodeError as error:
+        raise RefusedRowError(f"{where}: {error}") from error
     except OSError as error:
         raise StoreError(f"{where}: {error}") from error

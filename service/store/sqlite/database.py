@@ -10,14 +10,14 @@ from service.origin import Origin
 from service.store.database import Connection, Unreadable
 from service.store.highwater.commits import CommitMarks
 from service.store.highwater.file import MarkFile, mark_path
-from service.store.port import StoreError
+from service.store.port import RefusedRowError, StoreError
 from service.store.seals.damage import DamageLog
 from service.store.sqlite.file_length import why_cut
 from service.store.sqlite.holding import FileHold, held
 from service.store.sqlite.migrating import migrate
 from service.store.sqlite.readers import Readers
 from service.store.sqlite.sealing import Seals
-from service.store.sqlite.trouble import told
+from service.store.sqlite.trouble import is_of_the_row, told
 from service.store.sqlite.writer import Writer, opened
 from service.store.usable import why_unusable
 
@@ -129,8 +129,9 @@ class SqliteDatabase:
     def _renamed_errors(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, sqlite3.Error) as error:
-            raise StoreError(told(self._path, error)) from error
+        except (OSError, sqlite3.Error, OverflowError, UnicodeEncodeError) as error:
+            kind = RefusedRowError if is_of_the_row(error) else StoreError
+            raise kind(told(self._path, error)) from error
         except UnicodeDecodeError as error:  # in words of SQLite's about what is damaged
             raise StoreError(
                 f"{self._path}: the file is damaged: names in it are no text"

@@ -10,6 +10,13 @@ IOERR = 10
 UNREADABLE = frozenset({IOERR, 11, 26})
 """And of pages that are no pages of a database (``SQLITE_CORRUPT``, ``SQLITE_NOTADB``)."""
 
+OF_THE_ROW = frozenset({11, 18, 19, 20})
+"""Primary codes of what a row or its page is to blame for (``SQLITE_CORRUPT``, ``SQLITE_TOOBIG``,
+``SQLITE_CONSTRAINT``, ``SQLITE_MISMATCH``)."""
+
+BY_TRIGGER = 1811
+"""Extended code of a refusal by a trigger, which no insertion of padwatch's meets."""
+
 PAGE_ROOM = 65_536
 """So near its limit a file cannot grow by a transaction any more."""
 
@@ -21,6 +28,14 @@ def leaves_in_doubt(error: BaseException) -> bool:
     """
     code = getattr(error, "sqlite_errorcode", None)
     return code is not None and code & 0xFF == IOERR
+
+
+def is_of_the_row(error: BaseException) -> bool:
+    """Whether one row is to blame, so that others of its transaction can be written without it."""
+    code = getattr(error, "sqlite_errorcode", None)
+    if code is None:  # of Python's own: a number beyond 64 bits, text that is none
+        return isinstance(error, OverflowError | UnicodeEncodeError)
+    return code & 0xFF in OF_THE_ROW and code != BY_TRIGGER
 
 
 def is_of_the_data(error: BaseException | None) -> bool:

@@ -38,6 +38,7 @@ from core.blocks import SampleBlock
 from core.quality import GOOD, Reason, bad
 from service.alarms.engine import AlarmEngine
 from service.live import LiveView
+from service.parked_rows import FILE, ParkedRows
 from service.recorder import Findings, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
@@ -94,7 +95,9 @@ class Life:
         self.store = SqliteStore(self.path)
         self.uncertain = self.tools.uncertain(self.store)
         live = LiveView(["U1"], self.host, 30.0)
-        self.recorder = Recorder(self.uncertain, live, self.host)
+        self.recorder = Recorder(
+            self.uncertain, live, self.host, ParkedRows(self.path.with_name(FILE))
+        )
         units = {"U1": UnitAlarms(self.tools.unit, self.rules)}
         self.engine = AlarmEngine(units, self.recorder.put, self.host)
         self.engine.restore(self.store.alarms())

@@ -19,6 +19,7 @@ from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms
 from service.alarms.service_rules import ServiceRules
 from service.live import LiveView
+from service.parked_rows import FILE, ParkedRows
 from service.recorder import Findings, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
@@ -76,6 +77,9 @@ def test_results_that_are_given_up_are_a_danger_for_ten_minutes(watched: Watched
     assert (alarm.level, alarm.condition.value) == (DANGER, 3.0)
     assert [watched.after(60.0, n_unstored=3) for _ in range(10)] == [[]] * 10
     assert watched.after(60.0, n_unstored=3) == [f"{LOST} returned"]
+    parked = "NOT NULL constraint failed: assessment.coverage (parked in parked.jsonl)"
+    watched.after(0.5, n_unstored=4, unstored_reason=parked)
+    assert watched.alarms.alarm(LOST).condition.reason == parked
 
 
 def test_a_queue_that_fills_is_an_alert_and_then_a_danger(watched: Watched) -> None:
@@ -156,7 +160,7 @@ def stored(
         store = SqliteStore(path)
         uncertain = tools.uncertain(store)
         live = LiveView([], host, 30.0)
-        recorder = Recorder(uncertain, live, host)
+        recorder = Recorder(uncertain, live, host, ParkedRows(path.with_name(FILE)))
 
         def look() -> ServiceHealth:
             return ServiceHealth(live.store_error, recorder.behind_s)

@@ -12,6 +12,7 @@ from core.alarms.operation import Acknowledge
 from service.alarms.engine import AlarmEngine
 from service.alarms.gone_alarms import identity_of
 from service.live import LiveView
+from service.parked_rows import ParkedRows
 from service.recorder import Recorder
 from service.roles.silent_units import SILENT_AFTER_S, SilentUnits
 from service.store.sqlite import SqliteStore
@@ -20,6 +21,7 @@ from service.store.unit_states_port import UnitReport
 SECOND = 1_000_000_000
 REPORT = UnitReport("U1", 1, 0, "connected", None, None, "signs", 1, b"state")
 GONE = identity_of("U2").id
+NOWHERE = ParkedRows(Path("nowhere"))
 
 
 class Process:
@@ -27,7 +29,7 @@ class Process:
 
     def __init__(self, store: SqliteStore, host: Any) -> None:
         self.store, self.host = store, host
-        self.recorder = Recorder(store, LiveView([], host, 30.0), host)
+        self.recorder = Recorder(store, LiveView([], host, 30.0), host, NOWHERE)
         self.alarms = AlarmEngine({}, self.recorder.put, host)
         self.silent = SilentUnits(["U1", "U2"], self.alarms, store, host)
 

@@ -34,6 +34,7 @@ from service.films.keeper import FilmKeeper
 from service.films.start import film_keeper
 from service.live import LinkState, LiveView
 from service.origin import Origin
+from service.parked_rows import FILE, ParkedRows
 from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.settings.loading import load_plant_file
@@ -167,7 +168,7 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
     analysis = analysis_of(plant.analysis)
     monitors = {unit.id: UnitMonitor(machine_of(unit), analysis) for unit in plant.unit}
     references = ReferencesInForce(monitors, store, clock)
-    recorder = Recorder(store, live, clock)
+    recorder = Recorder(store, live, clock, ParkedRows(folder / FILE))
     origin = Origin.LIVE
     alarms = await alarm_engine(plant, origin, store, recorder.put, clock)
     captures = captures_of(plant, Origin.REPLAY, clock)

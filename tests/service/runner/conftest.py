@@ -25,6 +25,7 @@ from service.capture.file import MakeWriter
 from service.capture.span import CaptureSettings
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
+from service.parked_rows import FILE, ParkedRows
 from service.recorder import Recorder
 from service.roles.watched_unit import WatchedUnit
 from service.runner import Runner
@@ -156,7 +157,9 @@ class Plant:
         self.clock = RecordingClock()
         self.store = SqliteStore(path)
         self.live = LiveView(["U1", "U2"], self.clock, 30.0)
-        self.recorder = Recorder(self.store, self.live, self.clock, capacity)
+        self.recorder = Recorder(
+            self.store, self.live, self.clock, ParkedRows(path.with_name(FILE)), capacity
+        )
         self.capture_folder = path.parent / "captures"
         units = {name: unit_named(name) for name in ("U1", "U2")}
         self.films = FilmKeeper(

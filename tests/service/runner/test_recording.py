@@ -1,21 +1,33 @@
 """What blocks have taught reaches the disk, also when the disk does not answer for a while."""
 
 import asyncio
+import json
+import math
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
-from rigs.alarm_runs import Make, play
+from rigs.alarm_runs import PROBE, Make, changes, play
+from rigs.assessments import assessment
+from rigs.store_fixtures import at, gap
 
 from core.account import Gap
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.event import AlarmNews
+from core.alarms.life_cycle import advance
+from core.assessment import Assessment
+from service import recorder as recording
 from service.api.app import create_app
 from service.api.context import Context
 from service.api.in_process import InProcess
 from service.delivery.deliveries import Deliveries
-from service.recorder import Findings
+from service.parked_rows import FILE
+from service.recorder import Findings, NotStoredError
 from service.references import ReferencesInForce
 from service.store.port import TrendQuery, UnitGap
 
@@ -154,3 +166,87 @@ async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothin
     await plant.recorder.flush()
 
     assert plant.store.gaps("U1", 0, 100) == [g.gap for g in gaps]
+
+
+def news_of(subject: str) -> AlarmNews:
+    """That a channel has failed."""
+    identity = AlarmIdentity("U1", subject, AlarmKind.CHANNEL_NOT_OK)
+    return AlarmNews(*advance(Alarm(identity), Condition(AlarmLevel.ALERT), at(0), AlarmRule()))
+
+
+def without_coverage(found: Assessment) -> Assessment:
+    return replace(found, window=replace(found.window, coverage=math.nan))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        (without_coverage, "NOT NULL constraint failed: assessment.coverage"),
+        (lambda found: replace(found, time_ns=2**63), "too large"),
+        (lambda found: replace(found, bearing="\ud800"), "surrogates"),
+    ],
+)
+async def test_a_row_that_cannot_be_stored_is_parked_and_everything_else_is_stored(
+    plant: Any, spoil: Callable[[Assessment], Assessment], why: str
+) -> None:
+    results = [assessment(at(n), order1_k_eff_xx_n_per_m=float(n)) for n in range(5)]
+    plant.recorder.put(Findings([*results[:2], spoil(results[2])], [gap()], [news_of("sx")]))
+    plant.recorder.put(Findings(results[3:], alarms=[news_of("\ud800"), news_of("sy")]))
+
+    await plant.recorder.flush()
+
+    assert stored(plant) == [0.0, 1.0, 3.0, 4.0]
+    assert plant.store.gaps("U1", 0, 2**62) == [gap().gap]
+    assert changes(plant, PROBE) == changes(plant, "U1:sy:channel_not_ok") == ["raised"]
+    assert (plant.recorder.n_waiting, plant.live.store_error) == (0, None)
+    alarm, result = map(json.loads, plant.path.with_name(FILE).read_text().splitlines())
+    assert (alarm["kind"], result["kind"]) == ("AlarmNews", "Assessment")
+    assert alarm["row"]["events"][0]["identity"]["subject"] == "\ud800"
+    assert why in result["reason"]
+    assert result["row"]["readings"]["order1_k_eff_xx_n_per_m"]["value"] == 2.0
+    assert plant.live.n_unstored == 2
+    assert FILE in plant.live.unstored_reason
+
+
+async def test_a_damaged_page_of_spectra_costs_the_spectra_alone(plant: Any) -> None:
+    plant.store.append([assessment(at(0), order1_k_eff_xx_n_per_m=0.0)], [])
+    with closing(sqlite3.connect(plant.path)) as connection:
+        pages = "SELECT rootpage FROM sqlite_master WHERE name = 'spectrum'"
+        [(page,)] = connection.execute(pages)
+        [(size,)] = connection.execute("PRAGMA page_size")
+    plant.store.close()
+    with plant.path.open("r+b") as file:
+        file.seek((page - 1) * size)
+        file.write(b"\xff" * size)
+    damaged = type(plant)(plant.path)
+    damaged.recorder.put(Findings([assessment(at(9000), order1_k_eff_xx_n_per_m=1.0)]))
+
+    await damaged.recorder.flush()
+
+    assert stored(damaged) == [0.0, 1.0]
+    assert damaged.recorder.n_waiting == 0
+    assert "malformed" in damaged.live.unstored_reason
+    damaged.store.close()
+
+
+async def test_who_waits_for_the_disk_is_told_what_will_never_be_there(
+    plant: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant.recorder.put(Findings(alarms=[news_of("\ud800")]))
+    refused = asyncio.create_task(plant.recorder.stored())
+    await asyncio.sleep(0)
+    await plant.recorder.flush()
+    with pytest.raises(NotStoredError, match="surrogates"):
+        await refused
+
+    monkeypatch.setattr(recording, "MAX_NEWS", 1)
+    plant.recorder.put(Findings(alarms=[news_of("sx")]))
+    given_up = asyncio.create_task(plant.recorder.stored())
+    await asyncio.sleep(0)
+    plant.recorder.put(Findings(alarms=[news_of("sy")]))
+    written = asyncio.create_task(plant.recorder.stored())
+    with pytest.raises(NotStoredError, match="too much"):
+        await given_up
+    await plant.recorder.flush()
+    await written
+    assert changes(plant, "U1:sy:channel_not_ok") == ["raised"]

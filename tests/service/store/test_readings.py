@@ -17,7 +17,7 @@ from core.quantities import CATALOGUE
 from service.asker import ASKER, Asker
 from service.store import sql_store, trends
 from service.store.codec import Layout
-from service.store.port import QueryTooLargeError, StoreError
+from service.store.port import QueryTooLargeError, RefusedRowError, StoreError
 from service.store.sqlite import SqliteStore, readers
 from service.store.value_range import ValueRange
 
@@ -47,6 +47,19 @@ def test_a_row_decodes_to_the_readings_it_was_made_of(given_: dict[str, Reading]
         assert np.isnan(number[0, column]) if value is None else number[0, column] == value
         assert level[0, column] == given_[name].quality.level
         assert layout.reasons[qualities[column] & 0b111111] == given_[name].quality.reason
+
+
+@pytest.mark.parametrize("spoilt", [{"time_ns": 2**63}, {"bearing": "\ud800"}])
+def test_a_row_that_no_database_takes_is_told_apart_from_a_database_that_takes_nothing(
+    store: SqliteStore, spoilt: dict[str, object]
+) -> None:
+    good = assessment(at(0), speed_rpm=1.0)
+
+    with pytest.raises(RefusedRowError):
+        store.append([good, replace(good, **spoilt)], [])  # type: ignore[arg-type]
+    assert list(store.trend(query()).time_ns) == []
+    store.append([good], [])
+    assert list(store.trend(query()).time_ns) == [at(0)]
 
 
 def test_what_was_appended_is_read_back_to_the_last_bit(store: SqliteStore) -> None:

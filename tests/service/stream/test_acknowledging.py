@@ -26,10 +26,10 @@ from harness.stream_rig import (
 from nats.aio.msg import Msg
 from nats.js.errors import NotFoundError
 
-from service.recorder import Recorder
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
+from service.store.sql_store import SqlStore
 from service.stream import consumer as consuming
 from service.stream.consumer import Consumer
 from service.stream.names import consumer_name, stream_name, subject
@@ -205,21 +205,21 @@ def dying(append: Append, died: list[bool], *, position_apart: bool) -> Append:
     n_results = 0
 
     def planted(
-        recorder: Recorder,
+        store: SqlStore,
         results: Sequence[Any],
         gaps: Sequence[Any],
-        alarms: Sequence[Any],
-        films: Sequence[Any],
-        positions: Sequence[Any],
+        alarms: Sequence[Any] = (),
+        films: Sequence[Any] = (),
+        positions: Sequence[Any] = (),
     ) -> None:
         nonlocal n_results
         n_results += bool(results)
         if position_apart:
-            recorder._store.append([], [], positions=positions)
+            append(store, [], [], positions=positions)
         if n_results >= 2:
             died.append(True)
             raise StoreError("it is dead")
-        append(recorder, results, gaps, alarms, films, () if position_apart else positions)
+        append(store, results, gaps, alarms, films, () if position_apart else positions)
 
     return planted
 
@@ -242,8 +242,8 @@ async def test_a_position_that_is_not_stored_with_its_results_is_caught(
     database = tmp_path / "plant" / "padwatch.sqlite3"
     with monkeypatch.context() as patched:
         died: list[bool] = []
-        planted = dying(Recorder._append, died, position_apart=position_apart)
-        patched.setattr(Recorder, "_append", planted)
+        planted = dying(SqlStore.append, died, position_apart=position_apart)
+        patched.setattr(SqlStore, "append", planted)
         async with analysing(plant):
             await until(lambda: _is(bool(died)))
     async with analysing(plant):
