@@ -2,9 +2,9 @@
 
 from typing import Annotated
 
-from pydantic import AfterValidator, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, Field, StringConstraints
 
-from service.api.models import ApiModel
+from service.api.models import RequestModel
 
 
 def _printable(text: str) -> str:
@@ -33,12 +33,6 @@ Comment = Annotated[
     AfterValidator(_printable),
     Field(examples=["seen, shift engineer told"]),
 ]
-
-
-class RequestModel(ApiModel):
-    """What all requests share: nothing unknown, nothing converted."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 
 
 class ActorModel(RequestModel):

@@ -3,10 +3,10 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
 from service.api.alarm_requests import Actor, Words
-from service.api.models import ApiModel, EstimatorName, Time
+from service.api.models import ApiModel, EstimatorName, RequestModel, Time
 from service.api.times import written_as_date
 
 BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
@@ -233,10 +233,8 @@ class BaselineModel(ApiModel):
     """In y, likewise."""
 
 
-class BaselineActionModel(ApiModel):
-    """Who does something to baselines, and why. There is no login yet: the name is believed."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+class BaselineActionModel(RequestModel):
+    """Who does something to baselines, and why."""
 
     actor: Actor | None = None
     """Who, 1 to 80 printable characters; the name of a login or a key goes before it."""

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from service.api.alarm_requests import Actor, Comment, RequestModel
-from service.api.models import ApiModel, Time
+from service.api.alarm_requests import Actor, Comment
+from service.api.models import ApiModel, RequestModel, Time
 
 StateName = Literal[
     "unknown", "standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down"

@@ -1,20 +1,27 @@
 """Every error as a problem document (RFC 9457), whoever raised it."""
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
+from service.api.access.declared import allowed_methods
 from service.api.elsewhere import NotCarriedOutError, NotHereError
-from service.api.methods import allowed_methods
 from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"
+
+MAX_BYTES = 2048
+"""A problem document is no longer, so that a large wrong request cannot cost a large answer."""
+
+MAX_MISTAKES = 8
+"""Wrong parameters that are named."""
 
 SCHEMAS = "#/components/schemas/"
 
@@ -51,7 +58,7 @@ class Problem(BaseModel):
         description="This problem.", examples=["there is no unit 'U9' in this plant"]
     )
     instance: str = Field(description="Path of the request.", examples=["/api/v1/units/U9"])
-    errors: list[Mistake] = Field(description="Each wrong parameter.", default_factory=list)
+    errors: list[Mistake] = Field(description="The first wrong parameters.", default_factory=list)
 
 
 class ProblemError(Exception):
@@ -93,8 +100,8 @@ async def refuse_unknown_parameters(request: Request) -> None:
     ProblemError
         Naming the first such parameter and those that there are.
     """
-    operation = request.app.openapi()["paths"][request.scope["route"].path][request.method.lower()]
-    known = [p["name"] for p in operation.get("parameters", ()) if p["in"] == "query"]
+    operation = f"{request.method} {request.scope['route'].path}"
+    known = request.app.declared[operation].query_parameters
     for name in request.query_params:
         if name not in known:
             detail = f"there is no parameter {name!r} here; known: {', '.join(known) or 'none'}"
@@ -116,62 +123,65 @@ def install_problem_handlers(app: FastAPI) -> None:
     """Render all errors of an application as problem documents."""
 
     @app.exception_handler(ProblemError)
-    async def _problem(request: Request, error: ProblemError) -> JSONResponse:
+    async def _problem(request: Request, error: ProblemError) -> Response:
         return problem_answer(request, error)
 
     @app.exception_handler(HTTPException)
-    async def _http(request: Request, error: HTTPException) -> JSONResponse:
+    async def _http(request: Request, error: HTTPException) -> Response:
         if error.status_code == 405 and (methods := _methods(request)):
             return _not_allowed(request, methods)
         said = str(error.detail)
         return _render(request, error.status_code, said, said, headers=error.headers)
 
     @app.exception_handler(RequestValidationError)
-    async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
+    async def _validation(request: Request, error: RequestValidationError) -> Response:
         if (methods := _methods(request)) and request.method not in methods:
             return _not_allowed(request, methods)
+        found = error.errors()
         mistakes = [
             Mistake(parameter=".".join(str(p) for p in e["loc"][1:]), detail=str(e["msg"]))
-            for e in error.errors()
+            for e in found[:MAX_MISTAKES]
         ]
         detail = "; ".join(f"{mistake.parameter}: {mistake.detail}" for mistake in mistakes)
+        if len(found) > MAX_MISTAKES:
+            detail += f"; and {len(found) - MAX_MISTAKES} more"
         return _render(request, 422, "Wrong parameter", detail, mistakes)
 
     @app.exception_handler(QueryTooLargeError)
-    async def _too_large(request: Request, error: QueryTooLargeError) -> JSONResponse:
+    async def _too_large(request: Request, error: QueryTooLargeError) -> Response:
         mistakes = [Mistake(parameter=name, detail=str(error)) for name in ("start", "end")]
         return _render(request, 422, "Range too large", str(error), mistakes)
 
     @app.exception_handler(StoreError)
-    async def _store(request: Request, error: StoreError) -> JSONResponse:
+    async def _store(request: Request, error: StoreError) -> Response:
         log.error("a query failed in the store", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
 
     @app.exception_handler(NotHereError)
-    async def _not_here(request: Request, error: NotHereError) -> JSONResponse:
+    async def _not_here(request: Request, error: NotHereError) -> Response:
         return _render(request, 409, "Not available here", str(error))
 
     @app.exception_handler(NotCarriedOutError)
-    async def _not_carried_out(request: Request, error: NotCarriedOutError) -> JSONResponse:
+    async def _not_carried_out(request: Request, error: NotCarriedOutError) -> Response:
         return _render(request, 503, error.title, str(error))
 
     @app.exception_handler(Exception)
-    async def _bug(request: Request, _: Exception) -> JSONResponse:
+    async def _bug(request: Request, _: Exception) -> Response:
         """Say no more of a bug than that; it goes on to the log."""
         return _render(request, 500, "Fault in padwatch", "a fault of the program; see its log")
 
 
-def problem_answer(request: Request, error: ProblemError) -> JSONResponse:
+def problem_answer(request: Request, error: ProblemError) -> Response:
     """The problem document of an error."""
     words = (error.status, error.title, error.detail)
     return _render(request, *words, error.errors, error.headers)
 
 
 def _methods(request: Request) -> list[str]:
-    return allowed_methods(request.app.openapi()["paths"], request.scope["path"])
+    return allowed_methods(request.app.declared.values(), request.scope["path"])
 
 
-def _not_allowed(request: Request, methods: Sequence[str]) -> JSONResponse:
+def _not_allowed(request: Request, methods: Sequence[str]) -> Response:
     detail = f"this is not done with {request.method}, but with {' or '.join(methods)}"
     allow = {"Allow": ", ".join(methods)}
     return _render(request, 405, "Method not allowed", detail, headers=allow)
@@ -184,7 +194,7 @@ def _render(
     detail: str,
     errors: Sequence[Mistake] = (),
     headers: Mapping[str, str] | None = None,
-) -> JSONResponse:
+) -> Response:
     problem = Problem(
         title=title,
         status=status,
@@ -192,4 +202,33 @@ def _render(
         instance=request.url.path,
         errors=list(errors),
     )
-    return JSONResponse(problem.model_dump(), status, headers, media_type=MEDIA_TYPE)
+    return Response(_bounded(problem), status, headers, media_type=MEDIA_TYPE)
+
+
+def _bounded(problem: Problem) -> bytes:
+    """JSON of a problem with its texts cut until it has at most `MAX_BYTES`."""
+    n_characters = MAX_BYTES // 2
+    while len(document := _json(problem)) > MAX_BYTES:
+        problem = Problem(
+            title=_cut(problem.title, n_characters // 4),
+            status=problem.status,
+            detail=_cut(problem.detail, n_characters),
+            instance=_cut(problem.instance, n_characters // 4),
+            errors=[
+                Mistake(
+                    parameter=_cut(mistake.parameter, n_characters // 16),
+                    detail=_cut(mistake.detail, n_characters // 8),
+                )
+                for mistake in problem.errors[:MAX_MISTAKES]
+            ],
+        )
+        n_characters //= 2
+    return document
+
+
+def _json(problem: Problem) -> bytes:
+    return json.dumps(problem.model_dump(), ensure_ascii=False).encode("utf-8", "replace")
+
+
+def _cut(text: str, n_characters: int) -> str:
+    return text if len(text) <= n_characters else f"{text[:n_characters]}…"

@@ -8,6 +8,8 @@ TOKEN = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
 
 def is_deeper_than(limit: int, text: bytes) -> bool:
     """Whether lists and objects are nested deeper; the text need not be correct."""
+    if text.count(b"[") + text.count(b"{") <= limit:
+        return False  # as of all sound requests: cheaper than to look at each string
     depth = 0
     for match in TOKEN.finditer(text):
         first = text[match.start()]

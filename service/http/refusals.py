@@ -9,6 +9,9 @@ from starlette.types import Scope, Send
 
 MEDIA_TYPE = b"application/problem+json"
 
+MAX_INSTANCE = 256
+"""Characters of a path that are repeated; JSON escapes one as up to six bytes."""
+
 Headers = Sequence[tuple[bytes, bytes]]
 
 
@@ -28,7 +31,7 @@ class Refusal:
             "title": self.title,
             "status": self.status,
             "detail": self.detail,
-            "instance": instance,
+            "instance": instance[:MAX_INSTANCE],
             "errors": [],
         }
         return json.dumps(problem).encode()

@@ -84,7 +84,7 @@ def serving_of(
     app = create_app(context)
     asked = app if context.load is None else Shedding(app, context.load)
     server = server_of(asked, ground.plant, ground.clock)
-    return Serving(ground, server, listener, desk, announce, afterwards=app.openapi)
+    return Serving(ground, server, listener, desk, announce, afterwards=app.rendered)
 
 
 def context_of(

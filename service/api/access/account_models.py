@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import FailFast, Field
 
-from service.api.access.session_models import AskedModel, LoginName, Password, RoleName
-from service.api.models import ApiModel, Time
+from service.api.access.session_models import LoginName, Password, RoleName
+from service.api.models import ApiModel, RequestModel, Time
 from service.security.keys import MAX_DAYS
 
 UnitName = Annotated[str, Field(max_length=32, examples=["U1"])]
@@ -27,7 +27,7 @@ class AccountModel(ApiModel):
     """When its password was set."""
 
 
-class NewAccountModel(AskedModel):
+class NewAccountModel(RequestModel):
     """Somebody is to get an account."""
 
     name: LoginName
@@ -40,14 +40,14 @@ class NewAccountModel(AskedModel):
     """Its first password: 12 to 256 characters, at least 6 different ones."""
 
 
-class SetRoleModel(AskedModel):
+class SetRoleModel(RequestModel):
     """An account is to become something else to the plant."""
 
     role: Annotated[RoleName, Field(examples=["engineer"])]
     """What the account is from its next request on."""
 
 
-class SetPasswordModel(AskedModel):
+class SetPasswordModel(RequestModel):
     """An account is to get another password."""
 
     password: Password
@@ -85,7 +85,7 @@ class KeyModel(ApiModel):
     """When it was taken back; null if it was not."""
 
 
-class NewKeyModel(AskedModel):
+class NewKeyModel(RequestModel):
     """A machine is to get a key."""
 
     name: LoginName
@@ -94,7 +94,7 @@ class NewKeyModel(AskedModel):
     role: Annotated[RoleName, Field(examples=["viewer"])]
     """What the machine is to the plant."""
 
-    units: Annotated[list[UnitName], Field(max_length=200, default_factory=list)]
+    units: Annotated[list[UnitName], FailFast(), Field(max_length=200, default_factory=list)]
     """The only units that it is to open; empty for all."""
 
     days: Annotated[int, Field(ge=1, le=MAX_DAYS, examples=[365])] = 365

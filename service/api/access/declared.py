@@ -1,11 +1,13 @@
 """What each route needs, said beside it; with a route that does not say it nothing starts."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from typing import Any
 
 from fastapi import Depends, FastAPI
+from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.routing import BaseRoute, Route
 
@@ -68,6 +70,13 @@ class Declared:
         """Whether it answers everybody."""
         return self.needs.permission is None
 
+    @cached_property
+    def query_parameters(self) -> Sequence[str]:
+        """Names of the parameters that its query may have."""
+        if not isinstance(self.route, APIRoute):
+            return ()
+        return tuple(dict.fromkeys(_query_names(self.route.dependant)))
+
     def matches(self, path: str) -> bool:
         """Whether a request's path could be for it."""
         return isinstance(self.route, Route) and self.route.path_regex.match(path) is not None
@@ -90,6 +99,17 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
     return found
 
 
+def allowed_methods(operations: Iterable[Declared], path: str) -> list[str]:
+    """The methods of a path; none for one that no operation has.
+
+    Of two templates that fit, as `/x/{version}` and `/x/freeze`, the one with fewer parameters is
+    meant.
+    """
+    fitting = [operation for operation in operations if operation.matches(path)]
+    n_parameters = min((operation.path.count("{") for operation in fitting), default=0)
+    return sorted({each.method for each in fitting if each.path.count("{") == n_parameters})
+
+
 def _all(app: FastAPI) -> Iterator[Declared]:
     for context in iter_route_contexts(app.routes):
         route = context.original_route
@@ -109,3 +129,11 @@ def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRou
 
 def _said(dependencies: Sequence[Any]) -> list[Needs]:
     return [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
+
+
+def _query_names(dependant: Dependant) -> Iterator[str]:
+    """Names of query parameters of an operation and of what it depends on."""
+    for field in dependant.query_params:
+        yield field.alias
+    for inner in dependant.dependencies:
+        yield from _query_names(inner)

@@ -2,21 +2,15 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from service.api.models import ApiModel
+from service.api.models import ApiModel, RequestModel
 from service.security.names import MAX_NAME
 from service.security.passwords import MAX_LENGTH
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 
 PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audit", "change_access"]
-
-
-class AskedModel(ApiModel):
-    """What all requests share: nothing unknown, nothing converted."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 
 
 LoginName = Annotated[str, Field(max_length=4 * MAX_NAME, examples=["anna"])]
@@ -44,7 +38,7 @@ class SessionModel(ApiModel):
     """What that may do; nothing where one must log in first."""
 
 
-class LoginModel(AskedModel):
+class LoginModel(RequestModel):
     """Somebody wants to log in."""
 
     name: LoginName
@@ -54,7 +48,7 @@ class LoginModel(AskedModel):
     """Its password."""
 
 
-class NewPasswordModel(AskedModel):
+class NewPasswordModel(RequestModel):
     """Somebody changes his own password."""
 
     password: Password
@@ -64,7 +58,7 @@ class NewPasswordModel(AskedModel):
     """The one from now on: 12 to 256 characters, at least 6 different ones."""
 
 
-class SetUpModel(AskedModel):
+class SetUpModel(RequestModel):
     """Somebody makes the first account."""
 
     token: Annotated[str, Field(max_length=256, examples=["the token that the service printed"])]

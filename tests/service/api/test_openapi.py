@@ -5,9 +5,13 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+import httpx2
 import pytest
 from jsonschema_rs import Draft202012Validator
 from pydantic import BaseModel
+
+from service.api.access.application import GuardedApi
+from service.api.app import create_app
 
 Operations = list[tuple[str, dict[str, Any]]]
 
@@ -30,6 +34,25 @@ async def test_the_description_is_served_and_every_reference_of_it_leads_somewhe
     assert references
     for reference in references:
         assert _resolved(reference, read_only.document)
+
+
+async def test_the_description_is_rendered_once_and_for_no_other_request(
+    read_only: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document, made = read_only.document, []
+    monkeypatch.setattr(GuardedApi, "openapi", lambda _: made.append(1) or document)
+    transport = httpx2.ASGITransport(create_app(read_only.context))
+    async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
+        for method, path, status in (
+            ("GET", "/api/v1/units", 200),
+            ("GET", "/api/v1/units?verbose=1", 422),
+            ("DELETE", "/api/v1/units", 405),
+        ):
+            assert (await client.request(method, path)).status_code == status
+        assert made == []
+        for _ in range(2):
+            assert (await client.get("/api/v1/openapi.json")).json() == document
+    assert made == [1]
 
 
 def test_every_operation_is_explained_and_has_an_example(

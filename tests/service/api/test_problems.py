@@ -109,6 +109,21 @@ async def test_a_parameter_that_nobody_knows_is_refused_everywhere(read_only: An
         assert problem["detail"] == "there is no parameter 'verbose' here; known: none"
 
 
+async def test_a_problem_document_has_at_most_2_kb_whatever_was_asked(read_only: Any) -> None:
+    unknown = {f"member_{number}": number for number in range(8000)}
+    for asked, status in (
+        (read_only.client.post("/api/v1/session", json=unknown), 422),
+        (read_only.client.post("/api/v1/session", json={"name": "\x01" * 9999}), 422),
+        (read_only.get("/api/v1/units/" + "%01" * 2600), 404),
+        (read_only.get(TRENDS, **GOOD, **{"ж" * 1300: 1}), 422),
+        (read_only.get(TRENDS, **{**GOOD, "state": ["overload"] * 500}), 422),
+    ):
+        answer = await asked
+        assert answer.status_code == status
+        assert len(answer.content) <= 2048
+        assert answer.json()["detail"]
+
+
 async def test_a_range_that_could_take_all_memory_is_refused(
     read_only: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

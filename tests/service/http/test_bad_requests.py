@@ -21,6 +21,7 @@ CHUNKED = POST + b"Transfer-Encoding: chunked\r\n"
         (b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", 421),
         (b"GET / HTTP/1.1\r\nHost: localhost.evil.example:80\r\n\r\n", 421),
         (b"GET / HTTP/1.1\r\nHost: localhost@evil.example\r\n\r\n", 421),
+        (b"GET /" + b"%01" * 2600 + b" HTTP/1.1\r\nHost: evil.example\r\n\r\n", 421),
         (b"GET /" + b"a" * 9000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n", 414),
         (GET + b"X: " + b"a" * 17_000 + b"\r\n\r\n", 431),
         (GET + b"X: a\r\n" * 4000 + b"\r\n", 431),
@@ -42,6 +43,7 @@ async def test_a_bad_request_is_refused(running, request_: bytes, status: int, c
     assert await client.status() == status
     problem = json.loads(client.body)
     assert problem["status"] == status
+    assert len(client.body) <= 2048
     assert b"content-type: application/problem+json" in client.head
     assert b"x-content-type-options: nosniff" in client.head
     assert running.app.n_asked == 0
