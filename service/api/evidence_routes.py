@@ -6,11 +6,12 @@ from typing import Annotated, Any
 from urllib.parse import quote
 
 import structlog
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
 
 from core.alarms.alarm import AlarmKind
 from service.api.access.declared import needs
+from service.api.access.gate import identity_of
 from service.api.alarm_routes import AlarmId
 from service.api.alarm_views import LEVEL_NAMES
 from service.api.context import Context
@@ -113,12 +114,15 @@ def evidence_router(context: Context) -> APIRouter:
         response_class=StreamingResponse,
         responses={**PROBLEMS, 200: _zip_content()},
     )
-    async def bundle(alarm: AlarmId, occurrence: Number) -> StreamingResponse:
-        """Document, tables, report, configuration, and the samples once they are complete."""
+    async def bundle(request: Request, alarm: AlarmId, occurrence: Number) -> StreamingResponse:
+        """Document, tables, report, and the samples once they are complete.
+
+        The plant's configuration is in it, too, but not for a key of some units.
+        """
         desk = _desk(context)
         found = await _complete(context, desk, alarm, occurrence)
         try:
-            pieces = await desk.bundle(found)
+            pieces = await desk.bundle(found, has_configuration=not identity_of(request).units)
         except TooManyDownloadsError as error:
             raise ProblemError(503, "Busy", f"{error}; try again later") from error
         except (DamagedEvidenceError, TableError, OSError) as error:

@@ -21,16 +21,21 @@ evidence.json           all of it; its keys are described in docs/how-to/evidenc
 spectra.parquet         cross-spectra of all bearings of the unit
 orbits.parquet          the newest turns of the shaft
 trend.parquet           readings of the film before the alarm
-configuration.json      settings of the plant, without secrets
+configuration.json      settings of the plant, without secrets; not for a key of some units
 capture.json            which recording holds the samples around the alarm
 samples/                that recording: padwatch recording info|verify|export reads it
 """
 
 
 def bundle_files(
-    archive: EvidenceArchive, found: Occurrence, page: str
+    archive: EvidenceArchive, found: Occurrence, page: str, has_configuration: bool
 ) -> Mapping[str, Path | bytes]:
     """The files of a bundle by their names in it.
+
+    Parameters
+    ----------
+    has_configuration
+        Whether the settings of the whole plant are among them.
 
     Raises
     ------
@@ -41,9 +46,10 @@ def bundle_files(
         raise LookupError("there is no bundle")
     files: dict[str, Path | bytes] = {"README.txt": README.encode(), "report.html": page.encode()}
     files |= {path.name: path for path in sorted(found.place.folder.iterdir())}
-    configuration = archive.configuration(archive.document(found.place).configuration)
-    if configuration is not None:
-        files["configuration.json"] = configuration
+    if has_configuration:
+        configuration = archive.configuration(archive.document(found.place).configuration)
+        if configuration is not None:
+            files["configuration.json"] = configuration
     capture = linked(found.place.folder)
     samples = None if capture is None else capture_folder(found.place, capture)
     if samples is not None:

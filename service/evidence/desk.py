@@ -88,8 +88,13 @@ class EvidenceDesk:
         capturing = self.keeper.capturing
         return await self._worked(lambda: self._report(found, capturing))
 
-    async def bundle(self, found: Occurrence) -> AsyncIterator[bytes]:
+    async def bundle(self, found: Occurrence, has_configuration: bool) -> AsyncIterator[bytes]:
         """A bundle as a ZIP file, piece by piece.
+
+        Parameters
+        ----------
+        has_configuration
+            Whether the settings of the whole plant are in it.
 
         Raises
         ------
@@ -101,7 +106,9 @@ class EvidenceDesk:
         if self._n_downloads >= MAX_DOWNLOADS:
             raise TooManyDownloadsError(f"{MAX_DOWNLOADS} bundles are on their way")
         page = await self.report(found)
-        files = await self._worked(lambda: bundle_files(self.archive, found, page))
+        files = await self._worked(
+            lambda: bundle_files(self.archive, found, page, has_configuration)
+        )
         return await self.download(zipped(files))
 
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:

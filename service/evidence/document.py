@@ -96,8 +96,8 @@ class Evidence(EvidencePart):
     version: Literal[1]
     """Of the format."""
 
-    made_by: Annotated[str, Field(examples=["padwatch 0.1.0, padwatch on plant-1"])]
-    """Program, person and host."""
+    made_by: Annotated[str, Field(examples=["padwatch 0.1.0"])]
+    """Program and its version."""
 
     origin: Literal["live", "replay"]
     """Whether a machine was watched, or a recording played."""

@@ -14,7 +14,7 @@ class Maker:
     Parameters
     ----------
     made_by
-        Program, person and host.
+        Program and its version; the host and its user are nothing for a reader of evidence.
     """
 
     plant: PlantFile

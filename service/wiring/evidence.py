@@ -6,7 +6,6 @@ from pathlib import Path
 from acquisition.clock import Clock
 from service.alarms.engine import AlarmEngine
 from service.capture.captures import Captures
-from service.cli.made_by import made_by
 from service.evidence.archive import EvidenceArchive
 from service.evidence.configuration import Configuration, built_from, configuration_of
 from service.evidence.desk import EvidenceDesk
@@ -52,7 +51,7 @@ def evidence_of(
     """The keeper of all evidence; `watch` lets it see alarms."""
     limits, folders = limits_of(plant), evidence_folders(plant)
     configuration = _configuration(plant)
-    maker = Maker(plant, configuration, made_by(), origin)
+    maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
     writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
     camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
     room = EvidenceRoom(folders.evidence, limits, clock)

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from html.parser import HTMLParser
+from importlib.metadata import version
 from typing import Any
 
 import pyarrow.parquet as pq
@@ -17,6 +18,8 @@ from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
 from core.films.film_finding import alarm_condition
+from service.security.people import create_key
+from service.security.roles import Role
 
 ALARM = "U1:UJB:stiffness_x"
 PATH = f"/api/v1/alarms/{ALARM}/evidence"
@@ -79,6 +82,7 @@ async def test_the_evidence_of_a_changed_film(service: Any, machine: Any) -> Non
     await require_a_document_of_what_the_film_was_compared_with(service)
     await require_a_report_of_everything_without_a_script(service)
     await require_a_bundle_of_everything(service)
+    await require_that_a_key_of_one_unit_gets_nothing_of_the_others(service)
     await require_that_what_people_write_stays_writing(service, news, machine.time_ns)
 
 
@@ -158,6 +162,19 @@ async def require_a_bundle_of_everything(service: Any) -> None:
     assert document["alarm"]["id"] == ALARM
     assert trend.num_rows > 30
     assert trend["level_x"].to_pylist()[-1] > 0
+
+
+async def require_that_a_key_of_one_unit_gets_nothing_of_the_others(service: Any) -> None:
+    now_ns = service.clock.now_ns()
+    _, key = create_key(service.store.access, "historian", Role.VIEWER, ["U1"], 1, now_ns)
+    headers = {"Authorization": f"Bearer {key}"}
+    answer = await service.client.get(f"{PATH}/1/bundle.zip", headers=headers)
+
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        contents = {name: archive.read(name) for name in archive.namelist()}
+    assert not [name for name, content in contents.items() if b'"U2"' in content]
+    made_by = json.loads(contents["evidence.json"])["made_by"]
+    assert made_by == f"padwatch {version('padwatch')}"  # not who runs it, and where
 
 
 async def test_what_is_not_there_is_a_problem(learned: Any) -> None:
