@@ -12,6 +12,7 @@ from core.film_results import film_results
 from core.line_results import OrderLine
 from core.machine import Bearing, Unit
 from core.overall_results import overall_results, phase_results
+from core.polarity import signs_checked
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import (
@@ -97,18 +98,23 @@ class BearingResults:
         position, budgets_p = position_results(
             self._unit, self._bearing, self._segments, self._last_growth
         )
-        readings = {
-            "speed_rpm": self._segments[-1].speed.rpm,
-            "power_mw": self._slow(self._unit.power_channel),
-            "oil_temperature_c": self._slow(self._bearing.oil_temperature),
-            **position,
-            **order1,
-            **phase_results(self._segments, self._rows, self._line_quality),
-            **overall_results(self._segments, self._rows, self._unit.bearings.index(self._bearing)),
-            **vortex,
-            **film,
-        }
-        self.budgets = {**budgets1, **budgets_v, **budgets_f, **budgets_p}
+        readings = signs_checked(
+            {
+                "speed_rpm": self._segments[-1].speed.rpm,
+                "power_mw": self._slow(self._unit.power_channel),
+                "oil_temperature_c": self._slow(self._bearing.oil_temperature),
+                **position,
+                **order1,
+                **phase_results(self._segments, self._rows, self._line_quality),
+                **overall_results(
+                    self._segments, self._rows, self._unit.bearings.index(self._bearing)
+                ),
+                **vortex,
+                **film,
+            }
+        )
+        budgets = {**budgets1, **budgets_v, **budgets_f, **budgets_p}
+        self.budgets = {name: b for name, b in budgets.items() if readings[name].value is not None}
         chosen = {
             axes: preferred_stiffness(readings, self._bearing.preference, axes)
             for axes in ("xx", "yy")

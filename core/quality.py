@@ -35,6 +35,7 @@ class Reason(StrEnum):
     DEAD = "dead"
     STUCK = "stuck"
     SWAPPED_AXES = "swapped_axes"
+    POLARITY = "polarity"
     SPEED_IMPLAUSIBLE = "speed_implausible"
     NON_STATIONARY = "non_stationary"
     REDUCED_PROBES = "reduced_probes"

@@ -11,6 +11,7 @@ from core.estimators import STIFFNESS_OF, Estimator, preferred_stiffness
 from core.film_results import NAMES as DYNAMIC_NAMES
 from core.machine import Bearing, Unit
 from core.overall_results import OVERALL_NAMES
+from core.polarity import signs_checked
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, uncertain, worst
@@ -98,17 +99,20 @@ class VectorResults:
         position, budgets_p = position_results(
             self._unit, self._bearing, [poll.gaps for poll in self._polls], self._last_growth
         )
-        readings = {
-            "speed_rpm": self._polls[-1].speed.rpm,
-            "power_mw": self._slow(self._unit.power_channel),
-            "oil_temperature_c": self._slow(self._bearing.oil_temperature),
-            **position,
-            **order1,
-            **self._line(ORDER1).phases(),
-            **vortex,
-            **dict.fromkeys((*DYNAMIC_NAMES, *OVERALL_NAMES), NO_WAVEFORM),
-        }
-        self.budgets = {**budgets1, **budgets_v, **budgets_p}
+        readings = signs_checked(
+            {
+                "speed_rpm": self._polls[-1].speed.rpm,
+                "power_mw": self._slow(self._unit.power_channel),
+                "oil_temperature_c": self._slow(self._bearing.oil_temperature),
+                **position,
+                **order1,
+                **self._line(ORDER1).phases(),
+                **vortex,
+                **dict.fromkeys((*DYNAMIC_NAMES, *OVERALL_NAMES), NO_WAVEFORM),
+            }
+        )
+        budgets = {**budgets1, **budgets_v, **budgets_p}
+        self.budgets = {name: b for name, b in budgets.items() if readings[name].value is not None}
         chosen = {axes: self._preferred(readings, axes) for axes in ("xx", "yy")}
         self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
         return readings | {f"stiffness_{a}_n_per_m": reading for a, (reading, _) in chosen.items()}

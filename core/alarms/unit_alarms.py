@@ -24,8 +24,9 @@ from core.alarms.watch_list import watch_list
 from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.condition.operating_state import OperatingState
-from core.line_results import AMPLITUDES
+from core.line_results import AMPLITUDES, DIRECTIONS
 from core.machine import Unit
+from core.polarity import is_reversed
 from core.quality import Quality, Reading, Reason, missing, worst
 from core.units import NS_PER_S
 
@@ -223,6 +224,9 @@ class UnitAlarms:
         bearing, readings, now_ns = assessment.bearing, assessment.readings, assessment.time_ns
         for channel, place in zip(self._channels_of[bearing], AMPLITUDES, strict=True):
             self._note_segment(channel, readings[f"order1_{place}_um_pk"])
+        for axes, places in DIRECTIONS.items():
+            for place in places:
+                self._note_sign(self._channels_of[bearing][place], is_reversed(readings, axes))
         state = state_of(assessment)
         self._state = (state, now_ns)
         for watch in self._watched.readings[bearing]:
@@ -252,8 +256,17 @@ class UnitAlarms:
         if reading.quality.reason in SENSOR_FAULTS:
             self._resting_with = None
             self._segment_faults[channel] = reading.quality.reason
-        elif reading.value is not None:
-            self._segment_faults.pop(channel, None)
+        elif reading.value is not None and self._segment_faults.get(channel) in SENSOR_FAULTS:
+            del self._segment_faults[channel]
+
+    def _note_sign(self, channel: str, wrong_sign: bool | None) -> None:
+        """Remember that a film's sign shows one of its transducers reversed, until it is right."""
+        fault = self._segment_faults.get(channel)
+        if wrong_sign and fault is None:
+            self._resting_with = None
+            self._segment_faults[channel] = Reason.POLARITY
+        elif wrong_sign is False and fault is Reason.POLARITY:
+            del self._segment_faults[channel]
 
     def _take_channels(self, block: SampleBlock) -> None:
         """Judge every channel; where all rest and nothing is new, that is a single comparison."""

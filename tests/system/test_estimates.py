@@ -1,6 +1,8 @@
 """All estimators side by side on the demo plant: against the truth, and against each other."""
 
 import math
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,8 @@ from acquisition.simulated.unit import SimulatedUnit
 from core.assessment import Assessment
 from core.estimators import STIFFNESS_OF, Estimator
 from core.monitor import UnitMonitor
-from core.quality import Level, Reason, bad
+from core.polarity import is_reversed
+from core.quality import Level, Reason, bad, missing
 from core.quantities import BY_NAME
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
@@ -27,12 +30,22 @@ def plant() -> PlantFile:
     return load_plant_file(DEMO)
 
 
-def watch(plant: PlantFile, unit: UnitSettings, minutes: float = MINUTES) -> list[Assessment]:
-    """The newest assessment of each bearing."""
+def watch(
+    plant: PlantFile,
+    unit: UnitSettings,
+    minutes: float = MINUTES,
+    reversed_channels: Collection[str] = (),
+) -> list[Assessment]:
+    """The newest assessment of each bearing; some channels are wired the other way round."""
     machine, calibration = machine_of(unit), calibration_of(unit)
     assert unit.simulation is not None
     feed = SimulatedUnit(machine, calibration, scenario_of(unit.simulation), 11, 0)
-    monitor = UnitMonitor(machine, analysis_of(plant.analysis))
+    channels = [
+        replace(c, direction=-c.direction) if c.id in reversed_channels else c
+        for c in machine.channels
+    ]
+    described = replace(machine, channels=tuple(channels))
+    monitor = UnitMonitor(described, analysis_of(plant.analysis))
     newest: list[Assessment] = []
     for _ in range(int(minutes * 60)):
         newest = monitor.ingest(calibrate(feed.advance(600), calibration)) or newest
@@ -81,6 +94,27 @@ def test_the_estimators_agree_within_their_uncertainty_and_the_preferred_one_is_
             assert all(reading.interval_95 for reading in found.values())
             preferred = assessment.readings[f"stiffness_{axes}_n_per_m"]
             assert preferred == found[Estimator.DYNAMIC]
+
+
+def test_a_reversed_transducer_is_a_reason_and_equation_5_stays(plant: PlantFile) -> None:
+    """Both shaft probes of the UJB, and one bearing transducer of the LJB."""
+    upper, lower, _ = plant.unit[0].bearing
+    reversed_channels = {upper.shaft_x, upper.shaft_y, lower.bearing_y}
+    found = watch(plant, plant.unit[0], 1.0, reversed_channels)
+    for assessment, wrong in zip(found, (("xx", "yy"), ("yy",), ()), strict=True):
+        for axes in ("xx", "yy"):
+            dynamic = assessment.readings[f"dynamic_k_{axes}_n_per_m"]
+            preferred = assessment.readings[f"stiffness_{axes}_n_per_m"]
+            assert preferred.value is not None
+            assert preferred.value > 0.0
+            assert (dynamic == missing(Reason.POLARITY)) == (axes in wrong)
+            assert is_reversed(assessment.readings, axes) is (axes in wrong)
+            chosen = str(assessment.estimators[axes])
+            assert chosen.startswith("ratio" if axes in wrong else "dynamic")
+        # it is not known whether shaft or bearing is reversed, and with them which of the two
+        crossed = assessment.readings["dynamic_c_xy_n_s_per_m"]
+        assert (crossed == missing(Reason.POLARITY)) == bool(wrong)
+        assert set(assessment.budgets) <= {n for n, r in assessment.readings.items() if r.value}
 
 
 def test_a_kaplan_unit_has_no_vortex_order(plant: PlantFile) -> None:

@@ -90,6 +90,7 @@ const REASONS = {
   film_and_bracket_or_transducer_changed: "film and bracket or transducer have changed",
   changed_cause_unknown: "changed, cause not known",
   given_up: "the store did not take them",
+  polarity: "film reads negative: check type, direction and wiring of this transducer and its partner",
   zone_a: "zone A",
   zone_b: "zone B",
   zone_c: "zone C",

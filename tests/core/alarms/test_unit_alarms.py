@@ -99,6 +99,28 @@ def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_
     assert ("U1:sx:channel_not_ok", "returned") in told(last)
 
 
+def test_a_film_of_the_wrong_sign_is_an_alarm_of_its_two_channels_until_the_sign_is_right(
+    alarms: UnitAlarms, block
+) -> None:
+    def with_k(**readings: Reading) -> Any:
+        found = assessed()
+        found.readings |= {f"{name}_xx_n_per_m": r for name, r in readings.items()}
+        return found
+
+    reversed_ = with_k(dynamic_k=missing(Reason.POLARITY), order1_transfer_k=Reading(1e9))
+    right = with_k(dynamic_k=Reading(1e9), order1_transfer_k=missing(Reason.POLARITY))
+    alarms.take(block(0), [], 0)
+    first = alarms.take(block(1), [reversed_], 0)
+    weak = alarms.take(block(2), [assessed()], 0)
+    last = alarms.take(block(3), [right], 0)
+
+    channels = [f"U1:{id_}:channel_not_ok" for id_ in ("sx", "bx")]
+    assert [(id_, "raised") for id_ in channels] == [e for e in told(first) if "channel" in e[0]]
+    assert {news.events[0].reason for news in first[-2:]} == {"polarity"}
+    assert weak == []
+    assert [(id_, "returned") for id_ in channels] == [e for e in told(last) if "channel" in e[0]]
+
+
 def test_an_amplitude_is_judged_when_its_segment_ends_not_when_the_block_does(
     alarms: UnitAlarms, block
 ) -> None:
