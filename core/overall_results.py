@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.line_results import AMPLITUDES
-from core.quality import Quality, Reading, Reason, mean_reading, missing, worst
+from core.quality import Quality, Reading, Reason, current_mean, missing, worst
 from core.segments import ORDER1, Segment
 
 SHAFT_SPANS = {
@@ -41,10 +41,10 @@ def overall_results(
         Its place in the unit.
     """
     found = {
-        name: mean_reading([_span(segment, rows[place]) for segment in segments])
+        name: current_mean([_span(segment, rows[place]) for segment in segments])
         for name, place in SHAFT_SPANS.items()
     }
-    found[ORBIT] = mean_reading([_orbit(s, rows[:2], bearing) for s in segments])
+    found[ORBIT] = current_mean([_orbit(s, rows[:2], bearing) for s in segments])
     return found | {
         name: _root_mean_square([_speed(segment, rows[place]) for segment in segments])
         for name, place in BEARING_SPEEDS.items()
@@ -106,5 +106,5 @@ def _reading(segment: Segment, rows: Sequence[int], value: float) -> Reading:
 
 def _root_mean_square(readings: Sequence[Reading]) -> Reading:
     squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in readings]
-    mean = mean_reading(squares)
+    mean = current_mean(squares)
     return mean if mean.value is None else Reading(math.sqrt(max(mean.value, 0.0)), mean.quality)

@@ -7,7 +7,7 @@ import numpy as np
 
 from core.machine import Bearing, Measurand, Unit
 from core.probe_axes import Growth, ProbeAxis
-from core.quality import NOT_TOLD, Reading, Reason, mean_reading, missing
+from core.quality import NOT_TOLD, Reading, Reason, current_mean, missing
 from core.segments import Segment
 from core.shaft_centre import locate_shaft
 from core.uncertainty import Budget
@@ -63,7 +63,7 @@ def mean_slow(segments: Sequence[Segment], channel: str | None) -> Reading:
     """Mean of a slow channel over the segments."""
     if channel is None:
         return missing(Reason.NOT_MEASURED)
-    return mean_reading([segment.slow.get(channel, NOT_TOLD) for segment in segments])
+    return current_mean([segment.slow.get(channel, NOT_TOLD) for segment in segments])
 
 
 def probe_axis(
@@ -95,7 +95,7 @@ def _gap(
     if not rows or unit.channels[rows[0]].measurand is not Measurand.GAP_UM:
         return missing(Reason.NOT_MEASURED)
     gaps = [_segment_gap(segment, rows[0]) for segment in segments]
-    mean, values = mean_reading(gaps), [gap.value for gap in gaps if gap.value is not None]
+    mean, values = current_mean(gaps), [gap.value for gap in gaps if gap.value is not None]
     if mean.value is None or len(values) < 2:
         return mean
     return replace(mean, u_random=float(np.std(values, ddof=1)) / len(values) ** 0.5)

@@ -107,16 +107,33 @@ NOT_TOLD = missing(Reason.NOT_MEASURED)
 
 
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
-    """Mean of the usable readings; when the newest is not usable, nothing is."""
-    if readings[-1].value is None:
-        return readings[-1]
+    """Mean of the usable readings, or the newest unusable one if they are less than half.
+
+    Parameters
+    ----------
+    weights
+        Of the readings, such as their numbers of samples; equal if not given.
+    """
+    weights = [1.0] * len(readings) if weights is None else weights
     counted = [
         (reading.value, weight)
-        for reading, weight in zip(readings, weights or [1.0] * len(readings), strict=True)
+        for reading, weight in zip(readings, weights, strict=True)
         if reading.value is not None
     ]
+    if 2.0 * sum(weight for _, weight in counted) < sum(weights):
+        return next(reading for reading in reversed(readings) if reading.value is None)
     quality = worst(reading.quality for reading in readings if reading.value is not None)
     # about the newest value, so that a reading that stands still stays the same to the last bit
     newest = counted[-1][0]
     shift = sum(weight * (value - newest) for value, weight in counted)
     return Reading(newest + shift / sum(weight for _, weight in counted), quality)
+
+
+def current_mean(readings: Sequence[Reading]) -> Reading:
+    """Mean of the usable readings, or the newest reading if that one is unusable.
+
+    For readings of minutes that are shown as the present: what has just failed has no mean.
+    """
+    if readings[-1].value is None:
+        return readings[-1]
+    return mean_reading([reading for reading in readings if reading.value is not None])
