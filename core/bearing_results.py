@@ -130,7 +130,12 @@ class BearingResults:
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
         powers = [segment.slow.get(power, NOT_TOLD) for segment in self._segments] if power else []
-        return stationarity(_numbers(speeds), _numbers(powers), self._settings.sensors)
+        return stationarity(
+            _numbers(speeds),
+            _numbers(powers),
+            self._settings.sensors,
+            self._unit.rated_power_mw,
+        )
 
     def _order_line(self, line: int) -> OrderLine:
         read = self._line_quality if line == ORDER1 or self._unit.has_vortex else _switched_off

@@ -132,6 +132,8 @@ class Unit:
         Whether a part-load vortex can occur: in Francis turbines, not in Kaplan turbines.
     key_phase
         Waveform channel with one pulse a turn, where there is one.
+    rated_power_mw
+        What changes of load are compared with; None if it is not known.
     """
 
     id: str
@@ -144,3 +146,4 @@ class Unit:
     rotation_sense: int = 1
     has_vortex: bool = True
     key_phase: str | None = None
+    rated_power_mw: float | None = None

@@ -38,6 +38,7 @@ class Reason(StrEnum):
     POLARITY = "polarity"
     SPEED_IMPLAUSIBLE = "speed_implausible"
     NON_STATIONARY = "non_stationary"
+    POWER_UNKNOWN = "power_unknown"
     REDUCED_PROBES = "reduced_probes"
 
 

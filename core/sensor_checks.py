@@ -35,9 +35,8 @@ class SensorLimits:
     speed_tolerance
         Relative difference of speed channel and 1× line.
     max_speed_change, max_power_change
-        Relative spread over the averaging time, greatest minus least value.
-    min_power_change_mw
-        A smaller spread of power is none.
+        Spread over the averaging time, greatest minus least value, as a share of the mean speed and
+        of the rated power: the shaft moves in its bearings with the load, and the film with it.
     """
 
     min_counts_rms: float = 1.0
@@ -46,8 +45,7 @@ class SensorLimits:
     max_speed_fraction: float = 2.5
     speed_tolerance: float = 0.02
     max_speed_change: float = 0.02
-    max_power_change: float = 0.1
-    min_power_change_mw: float = 10.0
+    max_power_change: float = 0.05
 
 
 DEFAULT_LIMITS = SensorLimits()
@@ -169,19 +167,34 @@ def checked_speed(
     return Reading(measured.value, uncertain(Reason.SPEED_IMPLAUSIBLE))
 
 
-def stationarity(speed_rpm: FloatArray, power_mw: FloatArray, limits: SensorLimits) -> Quality:
+def stationarity(
+    speed_rpm: FloatArray,
+    power_mw: FloatArray,
+    limits: SensorLimits,
+    rated_power_mw: float | None = None,
+) -> Quality:
     """Whether speed and load stood still while the averaged segments were recorded.
 
     Parameters
     ----------
     speed_rpm, power_mw : (n_segments,)
-        Mean of each segment; not a number where it was not measured.
+        Mean of each segment, oldest first; not a number where it is not known. Power may be empty
+        for a unit that does not measure it: its speed alone is judged.
+    rated_power_mw
+        Where it is not known, changes of power are compared with the mean power.
+
+    Returns
+    -------
+    Uncertain where something moved, and where the newest power is not known: a load that nobody
+    knows is not steady.
     """
     speed, power = _spread(speed_rpm), _spread(power_mw)
     if speed.change > limits.max_speed_change * speed.mean:
         return uncertain(Reason.NON_STATIONARY)
-    if power.change > max(limits.max_power_change * power.mean, limits.min_power_change_mw):
+    if power.change > limits.max_power_change * (rated_power_mw or power.mean):
         return uncertain(Reason.NON_STATIONARY)
+    if power_mw.size and not math.isfinite(power_mw[-1]):
+        return uncertain(Reason.POWER_UNKNOWN)
     return GOOD
 
 

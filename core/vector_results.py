@@ -153,7 +153,12 @@ class VectorResults:
         power = self._unit.power_channel
         speeds = [poll.speed.rpm.value for poll in self._polls]
         powers = [poll.slow.get(power, NOT_TOLD).value for poll in self._polls] if power else []
-        return stationarity(_numbers(speeds), _numbers(powers), self._settings.sensors)
+        return stationarity(
+            _numbers(speeds),
+            _numbers(powers),
+            self._settings.sensors,
+            self._unit.rated_power_mw,
+        )
 
     def _quality(self, line: int, *places: int) -> Quality | Reading:
         """Quality of what is read off a line of these channels, or the reason why nothing is."""

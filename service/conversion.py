@@ -4,6 +4,7 @@ from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCal
 from core.dynamic_settings import DynamicSettings
 from core.machine import Bearing, Channel, Unit
 from core.probe_axes import GapAccuracy
+from core.sensor_checks import SensorLimits
 from core.settings import AnalysisSettings
 from core.uncertainty import BearingAccuracy
 from core.usable_lines import LineSelection
@@ -36,6 +37,7 @@ def machine_of(settings: UnitSettings) -> Unit:
         rotation_sense=1 if settings.rotation == "x_to_y" else -1,
         has_vortex=settings.turbine == "francis",
         key_phase=settings.key_phase,
+        rated_power_mw=settings.rated_power_mw,
     )
 
 
@@ -106,7 +108,8 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
-        **settings.model_dump(exclude={"dynamic"}),
+        **settings.model_dump(exclude={"dynamic", "max_power_change"}),
+        sensors=SensorLimits(max_power_change=settings.max_power_change),
         dynamic=DynamicSettings(
             band_hz=dynamic.band_hz,
             selection=LineSelection(guard_bins=dynamic.guard_bins),

@@ -155,6 +155,11 @@ class AnalysisModel(Settings):
     min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
     """Share of the rated speed below which the machine counts as standing."""
 
+    max_power_change: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
+    """Change of power within the averaging time, as a share of rated_power_mw, beyond which results
+    are uncertain (non_stationary); without rated_power_mw it is a share of the present power.
+    Example: 0.05, 35 MW of 700."""
+
     velocity_low_order: Annotated[float, Field(ge=0.05, le=20.0)] = 0.25
     """Broad-band velocity of bearings counts from this multiple of the rated speed."""
 

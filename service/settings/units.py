@@ -39,7 +39,8 @@ class UnitSettings(Settings):
 
     rated_power_mw: Annotated[float, Field(gt=0.0, le=2000.0)] | None = None
     """Rated active power in MW, at most 2000; with it and power_channel, operating states are told
-    apart and films compared under like conditions. Example: 700.0."""
+    apart, films compared under like conditions, and changes of load judged as a share of it.
+    Example: 700.0."""
 
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
     """Samples per second and channel; example: 600.0. Without effect where registers are polled:
@@ -65,7 +66,8 @@ class UnitSettings(Settings):
     and the shaft's angle that slow_roll needs; example: "kp"."""
 
     power_channel: Identifier | None = None
-    """Slow channel (MW) of the active power."""
+    """Slow channel (MW) of the active power. While it has no value, results are uncertain
+    (power_unknown); without it a unit counts as steady by its speed alone."""
 
     source: SourceSettings
     """Where the samples come from, by kind: "modbus_ring" (a streaming DAQ), "modbus_fifo"

@@ -1,6 +1,7 @@
 """What a record says about its transducers and its operation."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -107,11 +108,24 @@ FULL = np.full(24, 700.0)
 def test_ordinary_wander_is_stationary_and_a_load_change_or_a_run_down_is_not() -> None:
     swing = np.sin(np.arange(24.0))
     assert stationarity(92.3 * (1 + 0.003 * swing), FULL + 8 * swing, DEFAULT_LIMITS) == GOOD
-    assert stationarity(STILL, 2.0 * swing, DEFAULT_LIMITS) == GOOD
-    assert stationarity(np.full(24, math.nan), np.full(24, math.nan), DEFAULT_LIMITS) == GOOD
+    assert stationarity(STILL, 2.0 * swing, DEFAULT_LIMITS, 700.0) == GOOD
     assert stationarity(np.array([]), np.array([]), DEFAULT_LIMITS) == GOOD
     moved = uncertain(Reason.NON_STATIONARY)
     assert stationarity(STILL, np.linspace(320.0, 400.0, 24), DEFAULT_LIMITS) == moved
     assert stationarity(np.linspace(92.3, 80.0, 24), FULL, DEFAULT_LIMITS) == moved
     some = np.array([math.nan, 700.0, 500.0])
     assert stationarity(STILL, some, DEFAULT_LIMITS) == moved
+
+
+def test_a_load_change_is_a_share_of_the_rated_power_and_an_unknown_load_is_not_steady() -> None:
+    """Two thirds of a 15 MW unit's power are 10 MW."""
+    moved, unknown = uncertain(Reason.NON_STATIONARY), uncertain(Reason.POWER_UNKNOWN)
+    small = np.linspace(15.0, 5.0, 24)
+    assert stationarity(STILL, small, DEFAULT_LIMITS, 15.0) == moved
+    assert stationarity(STILL, small / 20.0, DEFAULT_LIMITS, 15.0) == GOOD
+    stricter = replace(DEFAULT_LIMITS, max_power_change=0.03)
+    assert stationarity(STILL, small / 20.0, stricter, 15.0) == moved
+    lost = np.where(np.arange(24) < 20, 700.0, math.nan)
+    assert stationarity(STILL, lost, DEFAULT_LIMITS, 700.0) == unknown
+    assert stationarity(STILL, np.full(24, math.nan), DEFAULT_LIMITS, 700.0) == unknown
+    assert stationarity(STILL, lost[::-1], DEFAULT_LIMITS, 700.0) == GOOD

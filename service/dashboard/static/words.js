@@ -23,6 +23,7 @@ const REASONS = {
   polarity: ["polarity reversed", "The film’s stiffness or damping reads negative: a shaft or bearing transducer of this direction counts the wrong way. Check its type, its direction and its wiring."],
   speed_implausible: ["speed implausible", "The measured speed does not agree with the vibration or with the rated speed."],
   non_stationary: ["operation changing", "Speed or load moved during the averaged window."],
+  power_unknown: ["power unknown", "The power is not known, so that the load may have changed during the averaged window."],
   reduced_probes: ["fewer probes", "A probe has failed; the shaft centre comes from the remaining ones, less certain."],
   service_not_reachable: ["service not reachable", "The padwatch service does not answer this browser."],
 };

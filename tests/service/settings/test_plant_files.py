@@ -75,6 +75,14 @@ def test_a_sensitivity_becomes_engineering_units_per_volt(
     assert channel.unit_per_v == pytest.approx(unit_per_v, rel=1e-12)
 
 
+def test_changes_of_load_are_judged_by_what_the_file_says(plant_text: str) -> None:
+    plant = load_text("[analysis]\nmax_power_change = 0.1\n" + plant_text)
+    rated = plant.unit[0].model_copy(update={"rated_power_mw": 15.0})
+
+    assert analysis_of(plant.analysis).sensors.max_power_change == 0.1
+    assert machine_of(rated).rated_power_mw == 15.0
+
+
 def test_the_shortest_segment_a_file_may_ask_for_gives_results(plant_text: str) -> None:
     analysis = "[analysis]\nsegment_samples = 3121\nmax_frequency_hz = 3.1\n[[unit]]"
     plant = load_text(plant_text.replace("[[unit]]", analysis, 1))
