@@ -8,7 +8,7 @@ import numpy as np
 from acquisition.raw import RawBlock
 from core.arrays import SampleArray
 from core.blocks import SampleBlock
-from core.quality import GOOD, Quality, Reading, Reason, bad, missing
+from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
 
 COUNTS_FULL_SCALE = 32768
 """Counts of a 16-bit converter that stand for its full-scale voltage."""
@@ -28,7 +28,8 @@ class ChannelCalibration:
     unit_per_v
         Engineering units per volt: the reciprocal of the transducer's sensitivity.
     ok_min_v, ok_max_v
-        The mean voltage of a healthy transducer lies between these (gap OK limits).
+        The mean voltage of a healthy transducer lies between these (gap OK limits), over turns of
+        the shaft.
     """
 
     full_scale_v: float
@@ -40,6 +41,12 @@ class ChannelCalibration:
     def unit_per_count(self) -> float:
         """Engineering units per count."""
         return self.full_scale_v / COUNTS_FULL_SCALE * self.unit_per_v
+
+    @property
+    def ok_limits(self) -> tuple[float, float]:
+        """Lowest and highest mean of a healthy transducer, engineering units."""
+        ends = (self.ok_min_v * self.unit_per_v, self.ok_max_v * self.unit_per_v)
+        return min(ends), max(ends)
 
 
 @dataclass(frozen=True)
@@ -117,11 +124,8 @@ def _quality_of_counts(
     channel: ChannelCalibration, ok: bool, lowest: float, highest: float, mean: float
 ) -> Quality:
     mean_v = mean * channel.full_scale_v / COUNTS_FULL_SCALE
-    if not ok or not channel.ok_min_v <= mean_v <= channel.ok_max_v:
-        return bad(Reason.SENSOR_FAILURE)
-    if lowest == -COUNTS_FULL_SCALE or highest == COUNTS_FULL_SCALE - 1:
-        return bad(Reason.CLIPPED)
-    return GOOD
+    is_clipped = lowest == -COUNTS_FULL_SCALE or highest == COUNTS_FULL_SCALE - 1
+    return _judged(channel, ok, mean_v, is_clipped)
 
 
 def _quality_of_units(
@@ -129,10 +133,22 @@ def _quality_of_units(
 ) -> Quality:
     if not np.isfinite(lowest) or not np.isfinite(highest):
         return bad(Reason.NOT_FINITE)
-    if not ok or not channel.ok_min_v <= mean / channel.unit_per_v <= channel.ok_max_v:
-        return bad(Reason.SENSOR_FAILURE)
     full_scale = abs(channel.full_scale_v * channel.unit_per_v)
-    return GOOD if max(-lowest, highest) < full_scale else bad(Reason.CLIPPED)
+    is_clipped = max(-lowest, highest) >= full_scale
+    return _judged(channel, ok, mean / channel.unit_per_v, is_clipped)
+
+
+def _judged(channel: ChannelCalibration, ok: bool, mean_v: float, is_clipped: bool) -> Quality:
+    """Verdict of one block, which is shorter than a turn: its mean follows the vibration.
+
+    A mean outside the OK limits is therefore no more than a doubt, which the segment decides.
+    """
+    is_outside = not channel.ok_min_v <= mean_v <= channel.ok_max_v
+    if not ok or (is_outside and is_clipped):
+        return bad(Reason.SENSOR_FAILURE)
+    if is_clipped:
+        return bad(Reason.CLIPPED)
+    return uncertain(Reason.SENSOR_FAILURE) if is_outside else GOOD
 
 
 def slow_reading(value: float, channel: SlowCalibration) -> Reading:

@@ -1,7 +1,7 @@
 """`Assessment`: what is known of one bearing at one refresh."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from core.arrays import SampleArray
@@ -87,6 +87,9 @@ class Assessment:
     runout
         Whether the slow-roll vector was taken off 1× of the newest segment, by "shaft_x" and
         "shaft_y".
+    clipped_share
+        Share of the newest segment's samples at an end of the converter's range, by "shaft_x" to
+        "bearing_y"; empty without waveforms.
     evidence
         Waveforms, or what a rack has made of them: then there is no coherence, and equation (5)
         cannot tell noise from motion.
@@ -106,5 +109,6 @@ class Assessment:
     spectrum: CrossSpectrum
     orbit: OrbitTrace | None
     runout: Mapping[str, RunoutVerdict]
+    clipped_share: Mapping[str, float] = field(default_factory=dict)
     evidence: Evidence = Evidence.WAVEFORMS
     condition: BearingCondition | None = None

@@ -17,6 +17,7 @@ from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import (
     NOT_TOLD,
+    Level,
     Quality,
     Reading,
     Reason,
@@ -199,17 +200,22 @@ class BearingResults:
         """Quality of what is read off a line of these channels, or the reason why nothing is."""
         newest = self._segments[-1]
         rows = [self._rows[place] for place in places]
-        now = worst(
-            [newest.speed.rpm.quality, self._doubts, *(newest.channel_quality[row] for row in rows)]
-        )
-        if newest.speed.rpm.value is None or not newest.usable[rows].all():
-            return missing(now.reason)
+        own = [_now(newest, row) for row in rows]
+        now = worst([newest.speed.rpm.quality, self._doubts, *own])
         n_segments = int(self._orders.n_segments[places[0], places[-1]])
+        if newest.speed.rpm.value is None or now.level is Level.BAD or n_segments == 0:
+            return missing(now.reason)
         if n_segments < self._settings.min_segments:
-            return worst([now, uncertain(Reason.FEW_SEGMENTS)])
+            return worst([uncertain(Reason.FEW_SEGMENTS), now])
         if self.coverage < self._settings.min_coverage:
             return worst([now, uncertain(Reason.LOW_COVERAGE)])
         return now
+
+
+def _now(newest: Segment, row: int) -> Quality:
+    """Quality of a channel now; a few clipped samples leave the segments before."""
+    is_grazed = newest.is_grazed(row)
+    return uncertain(Reason.CLIPPED) if is_grazed else newest.channel_quality[row]
 
 
 def _numbers(readings: Sequence[Reading]) -> FloatArray:

@@ -1,5 +1,6 @@
 """The machine as the numerics see it: which channel measures what, on which bearing."""
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -35,6 +36,8 @@ class Channel:
         How the transducer changes the signal with frequency; none if it does not.
     unit_per_count
         The channel's unit per count of its converter; zero where it is not known.
+    ok_limits
+        Lowest and highest mean of a healthy transducer, in the channel's unit.
     probe
         Serial number or mark of the probe that is there; empty where it is not known.
     slow_roll
@@ -46,6 +49,7 @@ class Channel:
     direction: int = 1
     response: Response | None = None
     unit_per_count: float = 0.0
+    ok_limits: tuple[float, float] = (-math.inf, math.inf)
     probe: str = ""
     slow_roll: SlowRollVector | None = None
 

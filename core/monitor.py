@@ -8,6 +8,7 @@ import numpy as np
 from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.bearing_results import BearingResults
 from core.blocks import SampleBlock
+from core.line_results import AMPLITUDES
 from core.machine import Bearing, Unit
 from core.monitor_state import MonitorState
 from core.monitored_unit import MonitoredUnit
@@ -155,7 +156,14 @@ class UnitMonitor(MonitoredUnit):
                 "shaft_x": newest.runout[bearing.shaft_x],
                 "shaft_y": newest.runout[bearing.shaft_y],
             },
+            clipped_share=self._clipped_share(bearing, newest),
         )
+
+    def _clipped_share(self, bearing: Bearing, newest: Segment) -> dict[str, float]:
+        by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
+        rows = [by_id[id_] for id_ in bearing.channels]
+        shares = newest.clipped_share[rows].tolist()
+        return dict(zip(AMPLITUDES, shares, strict=True))
 
     def _orbit(self, bearing: Bearing, newest: Segment) -> OrbitTrace | None:
         ids = [channel.id for channel in self.unit.channels]

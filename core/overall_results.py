@@ -40,13 +40,20 @@ def overall_results(
     bearing
         Its place in the unit.
     """
+    grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
     found = {
-        name: current_mean([_span(segment, rows[place]) for segment in segments])
+        name: current_mean(
+            [_span(segment, rows[place]) for segment in segments], is_grazed=grazed[place]
+        )
         for name, place in SHAFT_SPANS.items()
     }
-    found[ORBIT] = current_mean([_orbit(s, rows[:2], bearing) for s in segments])
+    found[ORBIT] = current_mean(
+        [_orbit(s, rows[:2], bearing) for s in segments], is_grazed=all(grazed[:2])
+    )
     return found | {
-        name: _root_mean_square([_speed(segment, rows[place]) for segment in segments])
+        name: _root_mean_square(
+            [_speed(segment, rows[place]) for segment in segments], is_grazed=grazed[place]
+        )
         for name, place in BEARING_SPEEDS.items()
     }
 
@@ -104,7 +111,7 @@ def _reading(segment: Segment, rows: Sequence[int], value: float) -> Reading:
     return Reading(float(value), worst(segment.channel_quality[row] for row in rows))
 
 
-def _root_mean_square(readings: Sequence[Reading]) -> Reading:
+def _root_mean_square(readings: Sequence[Reading], *, is_grazed: bool) -> Reading:
     squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in readings]
-    mean = current_mean(squares)
+    mean = current_mean(squares, is_grazed=is_grazed)
     return mean if mean.value is None else Reading(math.sqrt(max(mean.value, 0.0)), mean.quality)

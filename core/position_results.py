@@ -95,7 +95,8 @@ def _gap(
     if not rows or unit.channels[rows[0]].measurand is not Measurand.GAP_UM:
         return missing(Reason.NOT_MEASURED)
     gaps = [_segment_gap(segment, rows[0]) for segment in segments]
-    mean, values = current_mean(gaps), [gap.value for gap in gaps if gap.value is not None]
+    mean = current_mean(gaps, is_grazed=segments[-1].is_grazed(rows[0]))
+    values = [gap.value for gap in gaps if gap.value is not None]
     if mean.value is None or len(values) < 2:
         return mean
     return replace(mean, u_random=float(np.std(values, ddof=1)) / len(values) ** 0.5)

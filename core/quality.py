@@ -1,7 +1,7 @@
 """How far a value may be believed: good, uncertain or bad, and why (after OPC UA)."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 
 
@@ -130,11 +130,21 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
     return Reading(newest + shift / sum(weight for _, weight in counted), quality)
 
 
-def current_mean(readings: Sequence[Reading]) -> Reading:
+def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
     """Mean of the usable readings, or the newest reading if that one is unusable.
 
     For readings of minutes that are shown as the present: what has just failed has no mean.
+
+    Parameters
+    ----------
+    is_grazed
+        Whether the newest reading is missing for a few clipped samples alone: the others stand.
     """
-    if readings[-1].value is None:
-        return readings[-1]
-    return mean_reading([reading for reading in readings if reading.value is not None])
+    newest = readings[-1]
+    usable = [reading for reading in readings if reading.value is not None]
+    if newest.value is not None:
+        return mean_reading(usable)
+    if not (is_grazed and usable):
+        return newest
+    mean = mean_reading(usable)
+    return replace(mean, quality=worst((mean.quality, uncertain(Reason.CLIPPED))))

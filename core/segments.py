@@ -14,15 +14,24 @@ from core.key_phase import KeyPhase, read_key_phase
 from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.overall import Overall, OverallTransform
-from core.quality import Level, Quality, Reading, Reason, bad, worst
+from core.quality import Level, Quality, Reading, Reason, bad, uncertain, worst
 from core.runout import RunoutVerdict
 from core.segment_runout import shaft_angle_rad, without_runout
-from core.sensor_checks import quietest_rms, signal_quality
+from core.sensor_checks import (
+    MAX_CLIPPED_SHARE,
+    clipped_share,
+    level_quality,
+    quietest_rms,
+    signal_quality,
+)
 from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
 from core.transducers import displacement_factor
 from core.units import hz_from_rpm
 from core.whirl import vortex_frequency_hz
+
+OUTSIDE = uncertain(Reason.SENSOR_FAILURE)
+"""Of a channel with a block whose mean lies outside its OK limits."""
 
 ORDER1, VORTEX = range(2)
 """Where the two order lines stand in `Segment.order_phasors_um_pk`."""
@@ -49,6 +58,8 @@ class Segment:
         Whether it was, by shaft channel.
     overall
         Broad-band vibration.
+    clipped_share
+        (n_channels,) share of the samples at an end of the converter's range.
     shaft_angle_rad
         Angle that the shaft has turned at the first sample since its mark passed the pick-up; None
         where no key-phase says so.
@@ -67,12 +78,18 @@ class Segment:
     order_phasors_um_pk: ComplexArray
     runout: Mapping[str, RunoutVerdict]
     overall: Overall
+    clipped_share: FloatArray
     shaft_angle_rad: float | None = None
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
         """(n_channels,) whether each channel may be believed."""
         return _usable(self.channel_quality)
+
+    def is_grazed(self, row: int) -> bool:
+        """Whether a channel is left out for a few clipped samples alone."""
+        few = 0.0 < self.clipped_share[row] <= MAX_CLIPPED_SHARE
+        return bool(few) and self.channel_quality[row].reason is Reason.CLIPPED
 
 
 class SegmentTransform:
@@ -122,7 +139,8 @@ class SegmentTransform:
         mean = samples.mean(axis=1)
         key_phase = self._key_phase(samples, window.rate_hz, _usable(quality))
         speed = self._speed(window, bins, _usable(quality), key_phase)
-        quality = self._judged(quality, samples, mean, turning=speed.rpm.value is not None)
+        clipped = self._clipped(quality, samples)
+        quality = self._judged(quality, samples, mean, speed)
         order_hz = self._order_frequencies(speed, bins, _usable(quality))
         orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
         segment = Segment(
@@ -139,6 +157,7 @@ class SegmentTransform:
             order_phasors_um_pk=orders,
             runout=runout,
             overall=self._overall.of(samples, lines),
+            clipped_share=clipped,
             shaft_angle_rad=shaft_angle_rad(speed, key_phase),
         )
         self.segments.append(segment)
@@ -158,14 +177,31 @@ class SegmentTransform:
         quality: tuple[Quality, ...],
         samples: FloatArray,
         mean: FloatArray,
-        *,
-        turning: bool,
+        speed: Speed,
     ) -> tuple[Quality, ...]:
-        """Take out channels that do not move although the machine turns."""
-        moved = zip(self._unit.channels, quietest_rms(samples), mean, strict=True)
+        """Take out channels that do not move although the machine turns, or have lost contact."""
+        turning, limits = speed.rpm.value is not None, self._settings.sensors
+        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        turn_samples = round(self._unit.rate_hz / turn_hz)
+        moved = zip(self._unit.channels, quietest_rms(samples), mean, samples, strict=True)
         return tuple(
-            worst((q, signal_quality(rms, at, c.unit_per_count, turning, self._settings.sensors)))
-            for q, (c, rms, at) in zip(quality, moved, strict=True)
+            worst(
+                (
+                    q if q != OUTSIDE else level_quality(own, turn_samples, c.ok_limits),
+                    signal_quality(rms, at, c.unit_per_count, turning, limits),
+                )
+            )
+            for q, (c, rms, at, own) in zip(quality, moved, strict=True)
+        )
+
+    def _clipped(self, quality: tuple[Quality, ...], samples: FloatArray) -> FloatArray:
+        return np.array(
+            [
+                clipped_share(own, c.unit_per_count)
+                if q.reason is Reason.CLIPPED and c.unit_per_count
+                else 0.0
+                for q, c, own in zip(quality, self._unit.channels, samples, strict=True)
+            ]
         )
 
     def _key_phase(

@@ -1,7 +1,7 @@
 """What a record itself says about the transducers and the operation it comes from.
 
-Clipping and OK limits are judged on counts and volts, before calibration; what is judged here
-shows only in a whole segment or in all that are averaged.
+Blocks are judged on counts and volts, before calibration; what is judged here shows only in a whole
+segment or in all that are averaged.
 """
 
 import math
@@ -14,6 +14,14 @@ from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
 
 N_PIECES = 8
 """Pieces of a segment, so that a transducer that stopped in its middle is seen at once."""
+
+MAX_CLIPPED_SHARE = 0.01
+"""Of a segment's samples. Up to here single samples are wrong, as of a loose contact: the segment
+is left out for the channel, and the others stand. Beyond, the channel does not follow its
+signal."""
+
+LOWEST_COUNT, HIGHEST_COUNT = -32768, 32767
+"""Ends of a 16-bit converter's range."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,45 @@ def signal_quality(
     if not turning or rms > limits.min_counts_rms * count:
         return GOOD
     return bad(Reason.DEAD if abs(mean) <= limits.dead_counts * count else Reason.STUCK)
+
+
+def level_quality(
+    samples: FloatArray, turn_samples: int, ok_limits: tuple[float, float]
+) -> Quality:
+    """Whether the level of a transducer, without its vibration, lies within its OK limits.
+
+    A mean over part of a turn follows the shaft, a mean over a turn does not. A level that jumps
+    farther than the shaft vibrates is that of a contact that was lost for a moment.
+
+    Parameters
+    ----------
+    samples : (n_samples,)
+        Of a segment.
+    turn_samples
+        Samples in a turn of the shaft; all samples are one turn if they are fewer.
+    """
+    n_turns = samples.size // turn_samples
+    turns = samples[-n_turns * turn_samples :].reshape(max(n_turns, 1), -1)
+    means = turns.mean(axis=1)
+    reach = 0.5 * float(np.median(np.ptp(turns, axis=1)))
+    is_outside = means.min() < ok_limits[0] or means.max() > ok_limits[1]
+    jumps = float(np.abs(means - np.median(means)).max()) > reach
+    return bad(Reason.SENSOR_FAILURE) if is_outside or jumps else GOOD
+
+
+def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
+    """Share of the samples of a channel that are at an end of its converter's range.
+
+    Parameters
+    ----------
+    samples : (n_samples,)
+        In the channel's unit.
+    unit_per_count
+        Of either sign; not zero.
+    """
+    counts = samples / unit_per_count
+    at_end = (counts > HIGHEST_COUNT - 0.5) | (counts < LOWEST_COUNT + 0.5)
+    return float(np.mean(at_end))
 
 
 def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:

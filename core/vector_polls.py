@@ -115,8 +115,8 @@ class PollReader:
         if row is None:
             return 0.0, NOT_GIVEN
         value, quality = float(sample[row]), qualities[row]
-        if quality.level is Level.BAD:
-            return 0.0, quality
+        if quality.level is not Level.GOOD:
+            return 0.0, bad(quality.reason)  # a rack's gap is a mean already
         return (value, quality) if np.isfinite(value) else (0.0, bad(Reason.NOT_FINITE))
 
     def _amplitudes(
@@ -170,6 +170,7 @@ class PollReader:
             order_phasors_um_pk=np.zeros((n_channels, 2), dtype=np.complex128),
             runout={channel.id: RunoutVerdict.NO_VECTOR for channel in self._unit.channels},
             overall=Overall.of_nothing(n_channels, len(self._unit.bearings)),
+            clipped_share=np.zeros(n_channels),
         )
 
 

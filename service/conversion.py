@@ -42,12 +42,14 @@ def machine_of(settings: UnitSettings) -> Unit:
 
 
 def _channel(settings: ChannelSettings) -> Channel:
+    calibration = _calibration(settings)
     return Channel(
         id=settings.id,
         measurand=settings.measurand,
         direction=settings.sign,
         response=response_of(settings.response),
-        unit_per_count=_calibration(settings).unit_per_count,
+        unit_per_count=calibration.unit_per_count,
+        ok_limits=calibration.ok_limits,
         probe=settings.probe or "",
         slow_roll=settings.slow_roll.vector(settings.id) if settings.slow_roll else None,
     )

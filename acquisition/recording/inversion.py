@@ -15,7 +15,7 @@ from acquisition.errors import ConfigError
 from acquisition.raw import RawBlock
 from core.arrays import CountArray, RawArray, SampleArray
 from core.blocks import SampleBlock
-from core.quality import Reading, Reason
+from core.quality import Reading, Reason, bad
 
 INT16 = np.dtype(np.int16)
 
@@ -47,7 +47,7 @@ def raw_of(
         start_ns=block.start_ns,
         rate_hz=block.rate_hz,
         counts=_samples(block, calibration, dtype),
-        ok=tuple(q.reason is not Reason.SENSOR_FAILURE for q in block.channel_quality),
+        ok=tuple(q != bad(Reason.SENSOR_FAILURE) for q in block.channel_quality),
         slow=tuple(_slow_value(block.slow.get(c.id), c) for c in calibration.slow),
         rejected=block.rejected,
     )

@@ -3,17 +3,20 @@
 from core.alarms.alarm import WITHIN, AlarmLevel, Condition
 from core.device_clock import DeviceClock, StampFault
 from core.quality import Level, Quality, Reading, Reason, missing
+from core.sensor_checks import MAX_CLIPPED_SHARE
 
 COVERAGE = 1.96
 """Standard uncertainties on each side of a value that hold the truth with 95 %."""
 
 NO_CLOCK, NO_DRIFT = missing(Reason.NOT_MEASURED), missing(Reason.WAITING_FOR_DATA)
 
-SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK)
+SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 """What only a whole segment shows of a channel."""
 
 
-def channel_condition(quality: Quality, segment_fault: Reason | None) -> Condition:
+def channel_condition(
+    quality: Quality, segment_fault: Reason | None, clipped_percent: float | None = None
+) -> Condition:
     """Whether a waveform channel may be believed.
 
     Parameters
@@ -22,12 +25,16 @@ def channel_condition(quality: Quality, segment_fault: Reason | None) -> Conditi
         Of its newest samples.
     segment_fault
         What the newest segment has shown, if anything.
+    clipped_percent
+        Of the samples of that segment.
     """
-    if quality.level is Level.BAD:
-        return Condition(AlarmLevel.ALERT, reason=quality.reason)
-    if segment_fault is not None:
-        return Condition(AlarmLevel.ALERT, reason=segment_fault)
-    return WITHIN
+    fault = segment_fault if quality.level is Level.GOOD else quality.reason
+    if fault is None:
+        return WITHIN
+    if fault is Reason.CLIPPED and clipped_percent is not None:
+        limit = 100.0 * MAX_CLIPPED_SHARE
+        return Condition(AlarmLevel.ALERT, value=clipped_percent, limit=limit, reason=fault)
+    return Condition(AlarmLevel.ALERT, reason=fault)
 
 
 def slow_channel_condition(reading: Reading) -> Condition:

@@ -66,6 +66,7 @@ class UnitAlarms:
         self._channels_of = {bearing.id: bearing.channels for bearing in unit.bearings}
         self._references = {(r.bearing, r.state): r for r in references}
         self._segment_faults: dict[str, Reason] = {}
+        self._clipped_percent: dict[str, float] = {}
         self._state: tuple[OperatingState | None, int] = (None, 0)
         self._stop: tuple[int, int] | None = None
         self._resting_with: tuple[Quality, ...] | None = None
@@ -224,9 +225,10 @@ class UnitAlarms:
         bearing, readings, now_ns = assessment.bearing, assessment.readings, assessment.time_ns
         for channel, place in zip(self._channels_of[bearing], AMPLITUDES, strict=True):
             self._note_segment(channel, readings[f"order1_{place}_um_pk"])
+            self._clipped_percent[channel] = 100.0 * assessment.clipped_share.get(place, 0.0)
         for axes, places in DIRECTIONS.items():
-            for place in places:
-                self._note_sign(self._channels_of[bearing][place], is_reversed(readings, axes))
+            for row in places:
+                self._note_sign(self._channels_of[bearing][row], is_reversed(readings, axes))
         state = state_of(assessment)
         self._state = (state, now_ns)
         for watch in self._watched.readings[bearing]:
@@ -253,7 +255,7 @@ class UnitAlarms:
 
     def _note_segment(self, channel: str, reading: Reading) -> None:
         """Remember what only a segment shows of a channel, until another one shows otherwise."""
-        if reading.quality.reason in SENSOR_FAULTS:
+        if reading.value is None and reading.quality.reason in SENSOR_FAULTS:
             self._resting_with = None
             self._segment_faults[channel] = reading.quality.reason
         elif reading.value is not None and self._segment_faults.get(channel) in SENSOR_FAULTS:
@@ -284,7 +286,8 @@ class UnitAlarms:
         if not rows:
             return unknown(Reason.NOT_MEASURED)
         quality = worst(block.channel_quality[row] for row in rows)
-        return channel_condition(quality, self._segment_faults.get(channel))
+        clipped_percent = self._clipped_percent.get(channel) or None
+        return channel_condition(quality, self._segment_faults.get(channel), clipped_percent)
 
     def _take_clock(self, block: SampleBlock, host_ns: int) -> None:
         offset, drift, stamps = self._watched.offset, self._watched.drift, self._watched.stamps

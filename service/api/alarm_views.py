@@ -28,6 +28,7 @@ from service.origin import Origin
 from service.store.port import StoredEvent
 
 VALUE_UNITS = {
+    AlarmKind.CHANNEL_NOT_OK: "%",
     AlarmKind.SHAFT_X: "µm 0-pk",
     AlarmKind.SHAFT_Y: "µm 0-pk",
     AlarmKind.CHANGE_SHAFT_X: "µm 0-pk",

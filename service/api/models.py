@@ -150,6 +150,12 @@ class LatestModel(ApiModel):
     key-phase, or its pulses are missing, doubled, irregular or contradicted). Null if nothing is
     current."""
 
+    clipped_share: Annotated[
+        dict[str, float], Field(examples=[{"shaft_x": 0.0, "bearing_x": 0.0002}])
+    ]
+    """Share of the newest segment's samples that are at an end of the converter's range, by
+    "shaft_x" to "bearing_y"; empty without waveforms, or if nothing is current."""
+
     window: WindowModel | None
     """The newest result's samples."""
 

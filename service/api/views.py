@@ -110,6 +110,7 @@ def latest_model(live: LiveLook, unit: str, bearing: str) -> LatestModel:
         window=window_model(newest.window) if newest else None,
         estimators=_estimators(current),
         runout=_runout(current),
+        clipped_share=dict(newest.clipped_share) if newest and current.is_current else {},
         readings={name: reading_model(name, r) for name, r in current.readings.items()},
     )
 

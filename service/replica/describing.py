@@ -24,6 +24,7 @@ def bearing_state(assessment: Assessment) -> BearingState:
         budgets=assessment.budgets,
         estimators=assessment.estimators,
         runout=assessment.runout,
+        clipped_share=assessment.clipped_share,
         evidence=assessment.evidence,
         condition=assessment.condition,
     )

@@ -38,6 +38,7 @@ class BearingState:
     budgets: Mapping[str, Budget]
     estimators: Mapping[str, Estimator | None]
     runout: Mapping[str, RunoutVerdict]
+    clipped_share: Mapping[str, float]
     evidence: Evidence
     condition: BearingCondition | None
 

@@ -13,6 +13,8 @@ from core.sensor_checks import (
     axes_quality,
     backward_share,
     checked_speed,
+    clipped_share,
+    level_quality,
     quietest_rms,
     signal_quality,
     stationarity,
@@ -63,6 +65,33 @@ def test_a_resolution_may_be_unknown_or_negative(
     rms: float, mean: float, per_count: float, quality: Quality
 ) -> None:
     assert signal_quality(rms, mean, per_count, True, DEFAULT_LIMITS) == quality
+
+
+TURNS = np.arange(N_SAMPLES) / 390.0
+NEAR = 2180.0 + 100.0 * np.sin(2 * np.pi * TURNS)  # up to 2280 µm, where the limit is 2250
+
+
+@pytest.mark.parametrize(
+    ("samples", "expected"),
+    [
+        (NEAR, GOOD),
+        (NEAR + 80.0, bad(Reason.SENSOR_FAILURE)),
+        (np.where(np.abs(TURNS - 10.2) < 0.15, 0.0, NEAR), bad(Reason.SENSOR_FAILURE)),
+        (np.where(TURNS > 20.0, 2500.0, NEAR), bad(Reason.SENSOR_FAILURE)),
+        (NEAR[:200], GOOD),
+    ],
+    ids=["vibrates near a limit", "beyond it", "loses contact", "fails at the end", "half a turn"],
+)
+def test_ok_limits_are_of_the_level_and_not_of_the_vibration(
+    samples: npt.NDArray[np.floating], expected: Quality
+) -> None:
+    assert level_quality(samples, 390, (-2250.0, 2250.0)) == expected
+
+
+def test_the_share_of_clipped_samples_is_counted_at_both_ends() -> None:
+    counts = np.array([0.0, 32767.0, -32768.0, -32767.0, 32766.0])
+    assert clipped_share(0.15 * counts, 0.15) == 0.4
+    assert clipped_share(-0.15 * counts, -0.15) == 0.4
 
 
 def share(x: complex, y: complex) -> float:

@@ -37,6 +37,30 @@ def test_a_channel_that_stopped_moving_gives_no_number(
     assert readings["order1_k_eff_yy_n_per_m"].value == pytest.approx(1.18e9 / 3, rel=5e-3)
 
 
+@pytest.mark.parametrize(("n_clipped", "is_few"), [(1, True), (100, False)])
+def test_a_clipped_sample_costs_its_segment_and_not_the_results(
+    unit: Unit, blocks, signals, n_clipped: int, is_few: bool
+) -> None:
+    """One sample of 8192 at the end of an accelerometer's range is 500 µm at 1×."""
+    converter = tuple(replace(c, unit_per_count=0.1) for c in unit.channels)
+    monitor = UnitMonitor(replace(unit, channels=converter), AnalysisSettings())
+    rows = signals(90.0)
+    rows[2, -5000 : -5000 + n_clipped] = 3276.7
+    clipped = bad(Reason.CLIPPED)
+    found = []
+    for block in blocks(rows):
+        at_end = bool((block.samples[2] > 3276.6).any())
+        qualities = (*block.channel_quality[:2], clipped, block.channel_quality[3])
+        found += monitor.ingest(replace(block, channel_quality=qualities) if at_end else block)
+    newest, expected = found[-1], uncertain(Reason.CLIPPED) if is_few else clipped
+    assert newest.clipped_share["bearing_x"] == pytest.approx(n_clipped / 8192)
+    for name in ("order1_bearing_x_um_pk", "overall_bearing_x_mm_s_rms", "stiffness_xx_n_per_m"):
+        assert newest.readings[name].quality == expected
+        before = found[-2].readings[name].value
+        assert newest.readings[name].value == (pytest.approx(before, rel=1e-3) if is_few else None)
+    assert newest.readings["order1_bearing_y_um_pk"].quality.reason is Reason.OK
+
+
 def test_nothing_need_move_while_the_machine_stands(in_counts: Unit, results: Results) -> None:
     readings = results(np.full((4, 9000), 2000.0), in_counts, speed_rpm=0.0)[-1].readings
     assert readings["gap_x_um"].value == 2000.0

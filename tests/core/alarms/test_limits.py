@@ -63,7 +63,8 @@ def test_a_reading_without_a_number_is_unknown_and_standstill_alone_hides(reason
 
 def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> None:
     assert channel_condition(GOOD, None).level is None
-    assert channel_condition(uncertain(Reason.SPEED_UNKNOWN), None).level is None
+    outside = channel_condition(uncertain(Reason.SENSOR_FAILURE), None)
+    assert (outside.level, outside.reason) == (ALERT, Reason.SENSOR_FAILURE)
     assert channel_condition(bad(Reason.CLIPPED), None).reason == "clipped"
     assert channel_condition(GOOD, Reason.STUCK).reason == "stuck"
     assert channel_condition(bad(Reason.SENSOR_FAILURE), Reason.STUCK).reason == "sensor_failure"

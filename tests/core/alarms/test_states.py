@@ -64,6 +64,7 @@ class Machine:
             time_ns=self.n * SECOND,
             readings=readings,
             condition=condition,
+            clipped_share={},
         )
         news = self.alarms.take(self.block(self.n, oil_c), [assessment], 0)
         return [f"{e.identity.kind} {e.change}" for told in news for e in told.events]

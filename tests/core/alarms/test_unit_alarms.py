@@ -13,7 +13,7 @@ from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.device_clock import StampFault
 from core.machine import Unit
-from core.quality import GOOD, Reading, Reason, bad, missing
+from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 
 SECOND = 1_000_000_000
 IDS = ("sx", "sy", "bx", "by", "spare")
@@ -37,7 +37,12 @@ def assessed(**readings: Reading) -> Any:
         f"order1_{name}_um_pk": reading for name, reading in readings.items()
     }
     return SimpleNamespace(
-        unit="U1", bearing="UJB", time_ns=5 * SECOND, readings=all_, condition=None
+        unit="U1",
+        bearing="UJB",
+        time_ns=5 * SECOND,
+        readings=all_,
+        condition=None,
+        clipped_share={"shaft_x": 0.04},
     )
 
 
@@ -97,6 +102,16 @@ def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_
     assert ("U1:sx:channel_not_ok", "raised") in told(first)
     assert ("U1:sx:channel_not_ok", "returned") not in told(nothing)
     assert ("U1:sx:channel_not_ok", "returned") in told(last)
+
+
+def test_a_channel_that_clips_too_often_says_how_often(alarms: UnitAlarms, block) -> None:
+    alarms.take(block(0), [], 0)
+    few = alarms.take(block(1), [assessed(shaft_x=Reading(30.0, uncertain(Reason.CLIPPED)))], 0)
+    [news] = alarms.take(block(2), [assessed(shaft_x=missing(Reason.CLIPPED))], 0)
+
+    assert few == []
+    assert told([news]) == [("U1:sx:channel_not_ok", "raised")]
+    assert (news.events[0].reason, news.events[0].value, news.events[0].limit) == ("clipped", 4, 1)
 
 
 def test_a_film_of_the_wrong_sign_is_an_alarm_of_its_two_channels_until_the_sign_is_right(
