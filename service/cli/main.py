@@ -1,6 +1,7 @@
 """Entry point of the `padwatch` command."""
 
 import gc
+import os
 import tempfile
 import traceback
 from typing import NoReturn
@@ -11,9 +12,13 @@ from service.cli.ending import leave
 
 EXIT_BUG = 70
 
+PRIVATE = 0o077
+"""Files are for their user alone: the database holds password hashes, recordings the plant."""
+
 
 def main() -> NoReturn:
     """Run the command line; a bug ends it with one line and a report for its makers."""
+    os.umask(PRIVATE)
     leave(_exit_code())
 
 

@@ -2,7 +2,7 @@
 
 import os
 import signal
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +30,13 @@ def all_are(state: str) -> Callable[[Any], bool]:
 
 
 @pytest.fixture
-async def demo(start: Start, tmp_path: Path) -> Program:
+async def demo(start: Start, tmp_path: Path) -> AsyncIterator[Program]:
     """The demonstration without a past, ready to answer."""
+    before = os.umask(0o022)  # as on most computers
     program = await start("demo", "--plain", "--port", "0", "--data-folder", str(tmp_path / "data"))
     await program.wait_for_url()
-    return program
+    yield program
+    os.umask(before)
 
 
 @pytest.mark.long
@@ -63,12 +65,14 @@ async def test_the_demo_ends_with_ctrl_c_in_order_and_takes_its_daq_along(
     demo: Program, tmp_path: Path, children: Children, gone: Gone
 ) -> None:
     [daq] = children(demo.pid)
+    kept = {path.name: path.stat().st_mode & 0o077 for path in (tmp_path / "data").rglob("*")}
 
     assert await demo.end(signal.SIGINT) == 0
     await gone(daq)
 
     assert "Traceback" not in demo.errors
-    assert (tmp_path / "data" / "padwatch.sqlite3").exists()
+    assert kept.keys() >= {"padwatch.sqlite3", "padwatch.sqlite3-wal", "configurations"}
+    assert not any(kept.values()), "somebody else may look into it"
 
 
 async def test_a_service_that_is_killed_leaves_no_daq_behind(
