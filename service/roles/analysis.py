@@ -143,7 +143,7 @@ async def analysis_on(
     """
     plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
     live = ground.live
-    soundness = Soundness(store, clock)
+    soundness = Soundness(store, clock, live)
     await soundness.look()  # before anything is written
     if origin is Origin.LIVE:  # a replay begins anew, and misses nothing
         for unit, monitor in monitors.items():

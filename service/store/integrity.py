@@ -26,6 +26,8 @@ class Marked:
         Of its rows.
     look_on
         Looks at some more of them; whether that was once around.
+    require_file
+        Raises `StoreError` if the database's file was removed or replaced since it was opened.
     """
 
     def __init__(
@@ -35,7 +37,9 @@ class Marked:
         chain: AuditChain,
         damage: DamageLog,
         look_on: Callable[[], bool],
+        require_file: Callable[[], None],
     ) -> None:
+        self.require_file = require_file
         self._marks, self._writing, self._chain = marks, writing, chain
         self._damage, self.look_on = damage, look_on
 

@@ -30,6 +30,10 @@ class Integrity(Protocol):
         """Where they are, as far as places are remembered."""
         ...
 
+    def require_file(self) -> None:
+        """Raise `StoreError` if the database's file was removed or replaced since it was opened."""
+        ...
+
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
         """Go on with the database as it is, and tell the audit trail; what was wrong with it."""
         ...
@@ -46,6 +50,9 @@ class Unmarked:
     mark_error: str | None = None
     n_damaged: int = 0
     damaged: Sequence[Place] = ()
+
+    def require_file(self) -> None:
+        """There is no file that padwatch could look at."""
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:  # noqa: ARG002
         """Nothing is to be adopted."""

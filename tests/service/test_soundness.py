@@ -13,10 +13,11 @@ from core.alarms.alarm import AlarmKind, AlarmLevel
 from core.assessment import Assessment
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms
+from service.live import LiveView
 from service.metrics.kept import soundness_metrics
-from service.soundness import Soundness
+from service.soundness import LOOK_EVERY_S, Soundness
 from service.store.audit_port import AuditQuery
-from service.store.port import TrendQuery
+from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
 
 Build = Callable[..., Assessment]
@@ -39,7 +40,7 @@ def told_to_prometheus(soundness: Soundness) -> dict[str, float]:
 
 async def test_of_what_is_sound_nothing_is_said(path: Path, stepped_clock: Any) -> None:
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock)
+        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         await soundness.look()
 
         assert soundness.trouble is None
@@ -60,7 +61,7 @@ async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_ru
         store.append([assessment(T0 + 9, speed_rpm=9.0)], [])
     shutil.copyfile(old, path)
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock)
+        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         for _ in range(3):
             await soundness.look()
 
@@ -70,11 +71,54 @@ async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_ru
         assert told_to_prometheus(soundness)["padwatch_store_rolled_back"] == 1.0
 
 
+@pytest.mark.parametrize("word", ["removed", "replaced"])
+async def test_a_file_that_is_gone_is_told_and_nothing_is_written_until_it_is_back(
+    path: Path, stepped_clock: Any, assessment: Build, tmp_path: Path, word: str
+) -> None:
+    assert LOOK_EVERY_S < 5.0
+    live = LiveView([], stepped_clock, 30.0)
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(T0 + 8, speed_rpm=8.0)], [])
+        soundness = Soundness(store, stepped_clock, live)
+        path.rename(tmp_path / "aside")
+        if word == "replaced":
+            path.touch()
+        await soundness.look()
+
+        assert f"the database file was {word} while padwatch runs" in (soundness.trouble or "")
+        assert live.store_error == soundness.trouble
+        for refused in (
+            lambda: store.append([assessment(T0 + 9, speed_rpm=9.0)], []),
+            lambda: store.trend(EVERYTHING),
+        ):
+            with pytest.raises(StoreError, match=word):
+                refused()
+        (tmp_path / "aside").replace(path)
+        await soundness.look()
+
+        assert (soundness.trouble, live.store_error) == (None, None)
+        store.append([assessment(T0 + 9, speed_rpm=9.0)], [])
+        assert list(store.trend(EVERYTHING).time_ns) == [T0 + n for n in (0, 1, 2, 8, 9)]
+
+
+def test_a_log_is_not_taken_for_that_of_the_file_that_has_replaced_its_own(
+    path: Path, assessment: Build, tmp_path: Path
+) -> None:
+    shutil.copyfile(path, tmp_path / "old")
+    with closing(SqliteStore(path)) as store:
+        store.append([assessment(T0 + n, speed_rpm=9.0) for n in range(3, 50)], [])
+        (tmp_path / "old").replace(path)
+    with closing(SqliteStore(path)) as store:
+        assert "rolled_back" in [finding.kind for finding in store.integrity.found]
+        assert list(store.trend(EVERYTHING).time_ns) == [T0 + n for n in range(3)]
+    assert len(list(path.parent.glob("*.replaced-*-wal"))) == 1
+
+
 async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_clock: Any) -> None:
     with closing(sqlite3.connect(path)) as other, other:
         other.execute("UPDATE assessment SET coverage = 0.5")
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock)
+        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         for _ in range(3):
             assert list(store.trend(EVERYTHING).time_ns) == []
             await soundness.look()

@@ -15,6 +15,7 @@ from service.store.seals.damage import DamageLog
 from service.store.sqlite.file_length import why_cut
 from service.store.sqlite.holding import FileHold, held
 from service.store.sqlite.migrating import migrate
+from service.store.sqlite.opened_file import OpenedFile
 from service.store.sqlite.readers import Readers
 from service.store.sqlite.sealing import Seals
 from service.store.sqlite.trouble import is_of_the_row, told
@@ -46,6 +47,8 @@ class SqliteDatabase:
         Rows that were found not to be what was written.
     marks
         Whether it is the database that was here last.
+    file
+        Whether its file is still the one that was opened.
 
     Raises
     ------
@@ -59,7 +62,8 @@ class SqliteDatabase:
         self._path = path
         self.damage = DamageLog()
         self.seals = Seals(self.damage)
-        self._readers = Readers(path, prepare=self.seals.guard)
+        self.file = OpenedFile(path)
+        self._readers = Readers(path, prepare=self.seals.guard, require=self.file.require)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._renamed_errors():
             if (unusable := why_unusable(path)) is not None:
@@ -72,17 +76,20 @@ class SqliteDatabase:
             except BaseException:
                 connection.close()
                 raise
+            self.file.remember()
 
     def close(self) -> None:
         """Release the file; closing twice is fine."""
         self._readers.close()  # first: the last to close brings the journal into the file
         with self.writer.lock:
             self.writer.close()
+        self.file.keep_logs_apart()
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
         """Open a transaction of the one writer; durable, and marked as such, when left."""
         with self.writer.lock, self._renamed_errors():
+            self.file.require()
             with self.writer.transaction() as writer:
                 yield writer
                 self.marks.count(writer)

@@ -29,6 +29,8 @@ class Readers:
         Clock that only goes forward.
     prepare
         Makes a new connection fit for reading.
+    require
+        Raises where the file is no longer the one that was opened.
     """
 
     def __init__(
@@ -36,9 +38,9 @@ class Readers:
         path: Path,
         now_s: Callable[[], float] = CLOCK.monotonic_s,
         prepare: Callable[[sqlite3.Connection], None] = lambda _: None,
+        require: Callable[[], None] = lambda: None,
     ) -> None:
-        self._path, self._prepare, self._now_s = path, prepare, now_s
-        self._file: tuple[int, int] | None = None
+        self._prepare, self._now_s, self._require = prepare, now_s, require
         self._uri = f"{path.absolute().as_uri()}?mode=ro"
         self._lock = Lock()
         self._idle: list[sqlite3.Connection] = []
@@ -74,10 +76,8 @@ class Readers:
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
 
     def _taken(self) -> sqlite3.Connection:
+        self._require()
         with self._lock:
-            if self._is_another_file():
-                while self._idle:
-                    self._idle.pop().close()
             if self._idle:
                 return self._idle.pop()
         return self._opened()
@@ -92,15 +92,6 @@ class Readers:
             reader.close()
             raise
         return reader
-
-    def _is_another_file(self) -> bool:
-        """Whether the file of that name was moved away or replaced; SQLite would not notice."""
-        try:
-            status = self._path.stat()
-        except OSError:
-            return True
-        before, self._file = self._file, (status.st_dev, status.st_ino)
-        return before != self._file
 
     def _put_back(self, reader: sqlite3.Connection) -> None:
         with self._lock:

@@ -54,7 +54,12 @@ class SqliteStore(SqlStore):
             self.retention = SqlRetention(self._writing, self._reader, database.give_back)
             scrubber = Scrubber(database, database.seals, database.damage)
             self.integrity = Marked(
-                database.marks, self._writing, self._chain, database.damage, scrubber.look_on
+                database.marks,
+                self._writing,
+                self._chain,
+                database.damage,
+                scrubber.look_on,
+                database.file.require,
             )
         except OSError as error:
             database.close()

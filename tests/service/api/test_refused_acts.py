@@ -124,3 +124,21 @@ async def test_an_acknowledgement_that_cannot_be_stored_is_refused_and_may_be_re
         assert (alarm["state"], alarm["is_acknowledged"]) == ("unacknowledged", False)
     assert (await post(service, ACKNOWLEDGE, body)).status_code == 200
     assert service.store.alarms()[0].is_acknowledged
+
+
+async def test_nothing_is_acknowledged_while_the_database_file_is_gone(
+    service: Any, probes: Probes
+) -> None:
+    body = {**ANNA, "occurrence": 1}
+    probes.send(3, Reason.SENSOR_FAILURE)
+    await probes.stored()
+    path = service.store._path
+    aside = path.rename(path.with_name("aside"))
+
+    problem = await service.refused(ACKNOWLEDGE, 503, body)
+
+    assert problem["title"] == "Nothing was done"
+    assert "the database file was removed while padwatch runs" in problem["detail"]
+    aside.rename(path)
+    assert (await post(service, ACKNOWLEDGE, body)).status_code == 200
+    assert service.store.alarms()[0].is_acknowledged

@@ -12,6 +12,7 @@ from rigs.store_fixtures import Execute, at
 
 from service.background import LOOK_S
 from service.heartbeats import PATIENCE_S, Heartbeats
+from service.live import LiveView
 from service.scrubbing import Scrubbing
 from service.security.roles import Role
 from service.security.sessions import Session
@@ -123,7 +124,7 @@ async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
 ) -> None:
     execute(f"DELETE FROM assessment WHERE time_ns = {at(3)}")  # noqa: S608
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock)
+        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         loop = Scrubbing(store.integrity, stepped_clock)
         while not await loop.look():
             pass
