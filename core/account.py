@@ -17,7 +17,8 @@ class Gap:
     start_ns
         Time of the first sample that is missing; None where it follows from the number.
     is_estimated
-        Whether the device began to count anew, so that ``n_samples`` is worked out from the times.
+        Whether ``n_samples`` is worked out from the times, since the device began to count anew or
+        counts nothing.
     """
 
     epoch: int

@@ -8,6 +8,9 @@ from core.device_clock import DeviceClock, StampFault
 from core.quality import Quality, Reading
 from core.units import ns_from_s
 
+UNCOUNTED_LOSS = "uncounted_loss"
+"""Reason of the loss of samples that nobody has counted: their number follows from the time."""
+
 
 @dataclass(frozen=True)
 class Rejection:
@@ -23,6 +26,11 @@ class Rejection:
 
     reason: str
     n_samples: int
+
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the number of samples follows from the time, not from a counter."""
+        return self.reason == UNCOUNTED_LOSS
 
 
 @dataclass(frozen=True)

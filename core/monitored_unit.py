@@ -133,6 +133,9 @@ class MonitoredUnit(ABC):
             self._gaps += [lost] if lost else []
         if n_missing:
             first_index = block.first_index - n_missing
-            self._gaps.append(Gap(block.epoch, first_index, n_missing, block.start_ns))
+            estimated = any(rejection.is_estimated for rejection in block.rejected)
+            self._gaps.append(
+                Gap(block.epoch, first_index, n_missing, block.start_ns, is_estimated=estimated)
+            )
         if block.stop_index == self._ring.stop_index:
             self._reach = Reach(block.epoch, block.stop_index, block.stop_ns)

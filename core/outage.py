@@ -101,7 +101,7 @@ def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
     """The stretches up to the block that no gap of this count covers."""
     at = reach.stop_index
     for gap in sorted(reach.gaps, key=lambda gap: gap.first_index):
-        if gap.is_estimated or gap.epoch != reach.epoch or _is_older(gap, reach):
+        if gap.epoch != reach.epoch or _is_older(gap, reach):
             continue
         if at < gap.first_index < block.first_index:
             yield _piece(block, at, gap.first_index)

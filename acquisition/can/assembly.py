@@ -2,10 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 from acquisition.can.counted import CountedInstants, Placed
 from acquisition.can.gate import Frame
 from acquisition.can.instants import Instant, Refusal, RefusalCounts
+from acquisition.can.pause import PauseCheck
 from acquisition.can.plan import Part, Plan
 from acquisition.can.raw_blocks import RawBlockBuilder
 from acquisition.can.uncounted import UncountedInstants
@@ -25,6 +27,9 @@ class Assembler:
     begun_ns
         When this life of the adapter began, UTC; 0 where a log is read, which is the same each
         time.
+    device_waits
+        Whether the device sends when it is listened to, as one that replays a recording: then it
+        is no pause if it does not.
 
     Attributes
     ----------
@@ -40,8 +45,12 @@ class Assembler:
         rate_hz: float,
         hold_s: float,
         begun_ns: int = 0,
+        *,
+        device_waits: bool = False,
     ) -> None:
         self._plan = plan
+        self._device_waits = device_waits
+        self._pause = PauseCheck(rate_hz, plan.samples_per_frame)
         self._hold = max(1, round(hold_s * rate_hz))
         self.refused: RefusalCounts = Counter()
         self._counted = CountedInstants(plan, rate_hz, self.refused, begun_ns)
@@ -49,6 +58,7 @@ class Assembler:
         self._builder = RawBlockBuilder(plan, n_channels, n_slow, rate_hz)
         self._early: dict[str | int, float] = {}
         self._ready: list[Instant] = []
+        self._n_complete = 0
         self._epoch = self._counted.epoch
 
     @property
@@ -59,6 +69,16 @@ class Assembler:
         if not self._plan.counted and self._uncounted.are_too_many:
             return "more frames come than rate_hz says; do two devices send the same ids?"
         return ""
+
+    @property
+    def n_complete(self) -> int:
+        """Instants that have been complete so far, whether their place is known or not."""
+        return self._n_complete + self._uncounted.n_complete
+
+    def listen(self) -> None:
+        """Note that the bus was opened: only a counter tells what passed since it was before."""
+        if not self._plan.counted and self._uncounted.begin_again():
+            self._builder.begin_epoch()
 
     def take(
         self, frames: Iterable[Frame], arrived_ns: int, steady_ns: int | None = None
@@ -82,7 +102,16 @@ class Assembler:
                 self.refused[Refusal.UNDECODABLE] += 1
         if not self._plan.counted:
             self._ready = self._uncounted.confirmed(passed_ns)
+        elif steady_ns is not None and not self._device_waits and self._is_late(steady_ns):
+            return blocks
         return blocks + self._built(arrived_ns)
+
+    def _is_late(self, steady_ns: int) -> bool:
+        """Whether samples have to wait until it is known why they are late."""
+        if self._ready and self._pause.has_paused(self._ready[-1].stop_index, steady_ns):
+            self._epoch = self._counted.begin_epoch()
+            self._ready = [replace(instant, epoch=self._epoch) for instant in self._ready]
+        return self._pause.is_unsure
 
     def _take(
         self, key: int, data: bytes | None, arrived_ns: int, passed_ns: int
@@ -114,6 +143,7 @@ class Assembler:
             self._note(frame)
             instant = self._counted.complete(frame)
             if instant is not None:
+                self._n_complete += 1
                 self._ready.append(instant)
         return blocks
 
@@ -128,6 +158,7 @@ class Assembler:
         if epoch == self._epoch:
             return []
         blocks = self._built(arrived_ns)
+        self._pause.begin()
         self._epoch = epoch
         self._builder.begin_epoch()
         return blocks

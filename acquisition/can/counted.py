@@ -83,6 +83,11 @@ class CountedInstants:
         newest = self._axis.newest
         return None if newest is None else max(self._stop, newest)
 
+    def begin_epoch(self) -> int:
+        """Begin another count that goes on at the same index; return its number."""
+        self._epochs.begin()
+        return self.epoch
+
     def refuse_frame(self, part: Part) -> None:
         """Note that a frame of a message came but could not be used."""
         if part.wave is not None:

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from core.blocks import UNCOUNTED_LOSS as UNCOUNTED
+
 
 class Refusal(StrEnum):
     """Why a frame, or the samples it belongs to, are not used; the names become counters."""
@@ -13,7 +15,7 @@ class Refusal(StrEnum):
     WRONG_LENGTH = "wrong_length"
     NO_HEADER = "no_header"
     NO_TIME = "no_time_stamp"
-    UNCOUNTED_LOSS = "uncounted_loss"
+    UNCOUNTED_LOSS = UNCOUNTED
     DUPLICATE = "duplicate_frame"
     CONTRADICTORY = "contradictory_frame"
     OUT_OF_ORDER = "out_of_order_frame"

@@ -44,11 +44,12 @@ class RawBlockBuilder:
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Build blocks of instants in index order."""
+        """Build blocks of instants of one epoch, in index order, which had come by then."""
         blocks = []
+        if instants:  # the last one has waited least
+            self._stamps.add(instants[-1].epoch, instants[-1].stop_index, arrived_ns)
         for run in _runs(instants):
             first, stop = run[0].index, run[-1].stop_index
-            self._stamps.add(run[0].epoch, stop, arrived_ns)
             self._rejected.update(run[0].rejected)
             samples = self._samples(run)
             cuts = [first, *self.tracks.cuts(first, stop), stop]

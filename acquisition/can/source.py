@@ -15,17 +15,21 @@ from acquisition.can.interface_clock import InterfaceClock
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
+from acquisition.can.uncounted import MAX_UNSURE_NS
 from acquisition.clock import Clock
 from acquisition.delivery import Delivery
 from acquisition.errors import LinkError
 from acquisition.raw import RawBlock
 from core.blocks import SampleBlock
-from core.units import ns_from_s
+from core.units import NS_PER_S, ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 """Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
+
+_MAX_DOUBT_S = 2 * MAX_UNSURE_NS / NS_PER_S
+"""What samples get to be placed by the clock, which looks at them for half of that at a time."""
 
 _MIN_STALE_INSTANTS = 3
 """So many sample instants make the least silence that means something."""
@@ -68,6 +72,7 @@ class CanSource:
             rate_hz=calibration.rate_hz,
             hold_s=settings.hold_s,
             begun_ns=clock.now_ns(),
+            device_waits=settings.when_full == "wait",
         )
 
     @property
@@ -87,6 +92,7 @@ class CanSource:
             If the interface can never work here.
         """
         reader = self._reader()
+        self._assembler.listen()
         try:
             await reader.start()
             async with aclosing(self._blocks(reader)) as blocks:
@@ -110,11 +116,12 @@ class CanSource:
         )
 
     async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
-        silent_s = 0.0
+        silent_s = doubtful_s = 0.0
         while True:
             looked_s = self._clock.monotonic_s()
             batch = await reader.next_batch(min(_LOOK_S, self._stale_after_s - silent_s))
             raw_blocks: list[RawBlock] = []
+            n_complete = self._assembler.n_complete
             if batch:
                 if batch.stamp_fault:
                     self._delivery.note_fault(batch.stamp_fault)
@@ -125,20 +132,24 @@ class CanSource:
                     raw_blocks = []
                 for block in self._delivery.take_together(raw_blocks, arrived):
                     yield block
-            if raw_blocks:
-                silent_s = 0.0
-            else:
-                # a process that stood still has not listened for all that time
-                silent_s += min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
-                self._require_fresh(silent_s)
+            # a process that stood still has not listened for all that time
+            passed_s = min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
+            has_come = self._assembler.n_complete > n_complete and not self._assembler.trouble
+            silent_s = 0.0 if raw_blocks or has_come else silent_s + passed_s
+            doubtful_s = 0.0 if raw_blocks else doubtful_s + passed_s
+            self._require_fresh(silent_s, doubtful_s)
             await asyncio.sleep(0)
 
-    def _require_fresh(self, silent_s: float) -> None:
-        if silent_s >= self._stale_after_s:
+    def _require_fresh(self, silent_s: float, doubtful_s: float) -> None:
+        """Refuse to wait longer for a sample, or for one of which the clock tells its place."""
+        is_doubtful = doubtful_s >= self._stale_after_s + _MAX_DOUBT_S
+        if silent_s >= self._stale_after_s or is_doubtful:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
             trouble = self._assembler.trouble
+            if is_doubtful and not trouble:
+                trouble = "they come ever later than rate_hz says;"
             raise LinkError(
                 f"{self._settings.link}: no {'credible' if trouble else 'complete'} sample for"
-                f" {silent_s:.1f} s;{f' {trouble}' if trouble else ''}"
+                f" {doubtful_s:.1f} s;{f' {trouble}' if trouble else ''}"
                 f" frames refused so far: {refused or 'none'}"
             )

@@ -89,6 +89,8 @@ class BusLook:
 
     Parameters
     ----------
+    n_malformed
+        Lines or messages that are no CAN frame, as those of an slcan adapter that appends times.
     not_seen
         Messages of the DBC that did not come.
     """
@@ -97,6 +99,7 @@ class BusLook:
     messages: tuple[MessageLook, ...]
     n_remote: int
     n_error: int
+    n_malformed: int
     not_seen: tuple[str, ...]
 
 
@@ -120,7 +123,11 @@ class Survey:
     def __init__(self, messages: Mapping[str, DbcMessage]) -> None:
         self._messages = {message.key: message for message in messages.values()}
         self._heard: dict[tuple[int, bool], _Heard] = {}
-        self._n_remote = self._n_error = 0
+        self._n_remote = self._n_error = self._n_malformed = 0
+
+    def add_malformed(self, n_malformed: int) -> None:
+        """Take in that something came that is no frame."""
+        self._n_malformed += n_malformed
 
     def add(self, message: SurveyedMessage) -> None:
         """Take a frame in."""
@@ -150,6 +157,7 @@ class Survey:
             messages=tuple(looks),
             n_remote=self._n_remote,
             n_error=self._n_error,
+            n_malformed=self._n_malformed,
             not_seen=tuple(m.name for key, m in self._messages.items() if key not in seen),
         )
 

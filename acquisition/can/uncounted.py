@@ -5,11 +5,14 @@ from acquisition.can.plan import Part, Plan
 from acquisition.epochs import Epochs
 from core.units import NS_PER_S
 
-_MAX_UNSURE_NS = NS_PER_S
+MAX_UNSURE_NS = NS_PER_S
 """Samples that arrive late for longer than this were not late: others before them are lost."""
 
 MAX_INSTANTS_PER_S = 1250.0
 """Up to here a second of drift is less than half an instant, so that each missing one is told."""
+
+_OTHER_LOSS_NS = NS_PER_S // 4
+"""Samples that are later by so much than those before have lost others since."""
 
 _MAX_DRIFT = 300e-6
 """Twice what the crystals of device and host can differ, and some."""
@@ -27,15 +30,26 @@ class ArrivalCheck:
     Samples can be late, never early: the least delay seen is none, and a sample that comes with as
     little shows that none before it was lost. Less than half of what a single instant takes is as
     little.
+
+    Parameters
+    ----------
+    max_drift
+        Share by which a device may sample too slowly: so fast the least delay is forgotten.
+
+    Attributes
+    ----------
+    n_fast
+        Windows in a row with more samples than a device of this rate has.
     """
 
-    def __init__(self, rate_hz: float, instant_samples: int) -> None:
+    def __init__(self, rate_hz: float, instant_samples: int, max_drift: float = _MAX_DRIFT) -> None:
         self._period_ns = NS_PER_S / rate_hz
+        self._max_drift = max_drift
         self._instant_samples = instant_samples
         self._origin_ns: int | None = None
         self._window_ns = 0
         self._early_ns = 0.0
-        self._n_fast = 0
+        self.n_fast = 0
         self._least_ns = 0.0
         self._previous_ns = 0
 
@@ -45,8 +59,8 @@ class ArrivalCheck:
             self._origin_ns = self._previous_ns = self._window_ns = arrived_ns
             self._least_ns = -stop_index * self._period_ns
         delay_ns = arrived_ns - self._origin_ns - stop_index * self._period_ns
-        passed_ns = min(max(0, arrived_ns - self._previous_ns), _MAX_UNSURE_NS)
-        self._least_ns += _MAX_DRIFT * passed_ns
+        passed_ns = min(max(0, arrived_ns - self._previous_ns), MAX_UNSURE_NS)
+        self._least_ns += self._max_drift * passed_ns
         self._previous_ns = arrived_ns
         self._early_ns += max(0.0, self._least_ns - delay_ns)
         self._least_ns = min(self._least_ns, delay_ns)
@@ -56,7 +70,7 @@ class ArrivalCheck:
     @property
     def are_too_many(self) -> bool:
         """Whether more samples come, and not for once only, than a device of this rate has."""
-        return self._n_fast >= _FAST_WINDOWS
+        return self.n_fast >= _FAST_WINDOWS
 
     def is_prompt(self, delay_ns: float) -> bool:
         """Whether a delay is so small that nothing can have been lost."""
@@ -71,7 +85,7 @@ class ArrivalCheck:
         if abs(passed_ns) < _WINDOW_NS:
             return
         is_fast = self._early_ns > _FAST_SHARE * passed_ns > 0.0
-        self._n_fast = self._n_fast + 1 if is_fast else 0
+        self.n_fast = self.n_fast + 1 if is_fast else 0
         self._window_ns, self._early_ns = arrived_ns, 0.0
 
     @property
@@ -92,6 +106,11 @@ class UncountedInstants:
     begun_ns
         When this life of the adapter began, UTC: it counts for the device, so that another life
         is another count, whatever the device tells.
+
+    Attributes
+    ----------
+    n_complete
+        Sets that have been complete, confirmed or not.
     """
 
     def __init__(
@@ -102,6 +121,7 @@ class UncountedInstants:
         self._rate_hz = rate_hz
         self._epochs = Epochs(begun_ns, trusts_device=False)
         self._told: int | None = None
+        self.n_complete = 0
         self._begin()
 
     def _begin(self) -> None:
@@ -140,6 +160,18 @@ class UncountedInstants:
         self._begin()
         return True
 
+    def begin_again(self) -> bool:
+        """Begin another count if there was one, since nothing counts what was not listened to.
+
+        Whether more samples come than a single device has stays known.
+        """
+        had_begun, n_fast = self._next > 0, self._check.n_fast
+        if had_begun:
+            self._epochs.begin()
+        self._begin()
+        self._check.n_fast = n_fast
+        return had_begun
+
     def refuse_frame(self, part: Part) -> None:
         """Note that a frame of a message came but could not be used: its set is incomplete."""
         if part.wave is not None:
@@ -165,10 +197,11 @@ class UncountedInstants:
             self._unsure_since_ns = None
             held, self._held = self._held, []
             return held
-        if self._unsure_since_ns is None:
+        is_more = delay_ns > self._least_delay_ns + _OTHER_LOSS_NS
+        if self._unsure_since_ns is None or is_more:
             self._unsure_since_ns, self._least_delay_ns = arrived_ns, delay_ns
         self._least_delay_ns = min(self._least_delay_ns, delay_ns)
-        if arrived_ns - self._unsure_since_ns > _MAX_UNSURE_NS:
+        if arrived_ns - self._unsure_since_ns > MAX_UNSURE_NS:
             self._lose_held()
         return []
 
@@ -186,6 +219,7 @@ class UncountedInstants:
             {reason: n for reason, n in rejected.items() if n},
         )
         self._held.append(instant)
+        self.n_complete += 1
         self._frames = []
         self._n_incomplete = self._pending_loss = 0
         self._next += n_samples

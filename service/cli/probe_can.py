@@ -12,6 +12,7 @@ import typer
 from acquisition.can.bus import foreign_errors_renamed, open_bus
 from acquisition.can.dbc import load_dbc
 from acquisition.can.settings import CanLinkSettings
+from acquisition.can.slcan import SlcanBus
 from acquisition.can.survey import BusLook, MessageLook, Survey
 from acquisition.errors import AcquisitionError, FrameError
 from service.cli.plant_file import fail
@@ -76,9 +77,12 @@ def _listened(link: CanLinkSettings, survey: Survey, seconds: float) -> BusLook:
                 with foreign_errors_renamed(str(link)):
                     message = bus.recv(RECEIVE_S)
             except FrameError:
+                survey.add_malformed(1)
                 continue
             if message is not None:
                 survey.add(message)
+        if isinstance(bus, SlcanBus):
+            survey.add_malformed(bus.take_n_malformed())
         return survey.look(time.monotonic() - start_s)
     finally:
         with foreign_errors_renamed(str(link)):
@@ -91,6 +95,12 @@ def _lines(look: BusLook, has_dbc: bool) -> Iterator[str]:
         f"{n_frames} frames of {len(look.messages)} ids in {look.duration_s:.1f} s;"
         f" {look.n_remote} remote frames, {look.n_error} error frames"
     )
+    if look.n_malformed:
+        rate = look.n_malformed / look.duration_s
+        yield (
+            f"{look.n_malformed} malformed frames, {rate:.1f}/s: what came is no CAN frame;"
+            " check bit rate, and that an slcan adapter appends no time stamps"
+        )
     for message in look.messages:
         yield from _message_lines(message, has_dbc)
     if look.not_seen:

@@ -3,7 +3,7 @@
 import json
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ from acquisition.clock import SystemClock
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.store.waveform_port import WaveformFile
+from service.store.waveform_port import WaveformFile, WaveformKind
 from service.waveforms.check import Found, RecordingCheck, Verdict
 from service.waveforms.place import place_of
 from service.wiring.stores import has_store, open_store
@@ -27,31 +27,38 @@ def check(
     plant_file: PlantPath,
     json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Read all recordings of a plant, and compare them with the index. Changes nothing.
+    """Read all recordings that the service keeps, and compare them with the index.
 
-    The service may go on running. Exit code 1 if a recording is damaged or missing.
+    Changes nothing; the service may go on running. Exit code 1 if a recording is damaged or
+    missing. `padwatch recording verify` checks one that was made with `--out` elsewhere.
     """
     plant = read_plant_file(plant_file)
+    roots = custody_of(plant).roots
     try:
-        verdicts = _verdicts(plant)
+        verdicts = _verdicts(plant, roots)
     except (OSError, StoreError) as error:
         fail(f"padwatch recording check: {error}")
     counts = Counter(verdict.found for verdict in verdicts)
     others = [verdict for verdict in verdicts if verdict.found is not Found.SOUND]
     if json_output:
-        typer.echo(json.dumps(_document(counts, others), indent=1))
+        folders = [str(root) for root in roots.values()]
+        typer.echo(json.dumps(_document(counts, others) | {"folders": folders}, indent=1))
     else:
         for verdict in others:
             words = verdict.found.value.replace("_", " ")
             typer.echo(f"{verdict.kind.value} {verdict.name}: {words}: {verdict.reason}")
         typer.echo(", ".join(f"{counts[f]} {f.value.replace('_', ' ')}" for f in Found))
+        if not verdicts:
+            typer.echo(
+                f"no recordings in {' or '.join(map(str, roots.values()))};"
+                " padwatch recording verify FOLDER checks one that was made elsewhere (--out)"
+            )
     if any(verdict.found in WRONG for verdict in verdicts):
         raise typer.Exit(1)
 
 
-def _verdicts(plant: PlantFile) -> list[Verdict]:
-    roots, files = custody_of(plant).roots, _index(plant)
-    checking = RecordingCheck(roots, files, SystemClock().now_ns())
+def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[Verdict]:
+    checking = RecordingCheck(roots, _index(plant), SystemClock().now_ns())
     found = []
     hidden = not sys.stderr.isatty()
     with typer.progressbar(

@@ -9,7 +9,7 @@ from rigs.tiers import fast_and_long
 
 from core.account import Gap
 from core.assessment import Assessment
-from core.blocks import Rejection, SampleBlock
+from core.blocks import UNCOUNTED_LOSS, Rejection, SampleBlock
 from core.machine import Unit
 from core.monitor import UnitMonitor
 from core.quality import Level, Reason, bad, missing
@@ -208,15 +208,17 @@ def test_foreign_blocks_are_refused_naming_both(monitor: UnitMonitor, blocks, si
         monitor.ingest(replace(block, rate_hz=1000.0))
 
 
+@pytest.mark.parametrize(("reason", "is_estimated"), [("torn", False), (UNCOUNTED_LOSS, True)])
 def test_what_was_refused_is_missing_too_and_is_recorded_as_a_gap(
-    monitor: UnitMonitor, blocks, signals
+    monitor: UnitMonitor, blocks, signals, reason: str, is_estimated: bool
 ) -> None:
     first, *others = list(blocks(signals(14.0)))[:4]
-    late = replace(others[-1], rejected=(Rejection("torn", 7),))
+    late = replace(others[-1], rejected=(Rejection(reason, 7),))
     for block in (first, late):
         monitor.ingest(block)
 
     n_missing = late.first_index - first.stop_index
-    assert monitor.drain_gaps() == [Gap(late.epoch, first.stop_index, n_missing, late.start_ns)]
+    gap = Gap(late.epoch, first.stop_index, n_missing, late.start_ns, is_estimated=is_estimated)
+    assert monitor.drain_gaps() == [gap]
     assert monitor.account.n_gap == n_missing - 7
-    assert monitor.account.rejected == {"torn": 7}
+    assert monitor.account.rejected == {reason: 7}

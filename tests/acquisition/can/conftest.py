@@ -170,7 +170,9 @@ def fake_bus() -> FakeBus:
 
 @pytest.fixture
 def fake_bus_source(shape_of, fake_bus, source_of):
-    return source_of(shape_of(), VIRTUAL, opener=lambda *_: fake_bus, stale_after_s=60.0)
+    """Reads a device that sends when a test wants: that it does not is no pause."""
+    settings = {"stale_after_s": 60.0, "when_full": "wait"}
+    return source_of(shape_of(), VIRTUAL, opener=lambda *_: fake_bus, **settings)
 
 
 @pytest.fixture

@@ -107,8 +107,8 @@ async def test_silence_is_a_lost_link_after_the_stale_time(shape, fake_bus, sour
 async def test_a_host_that_stood_still_takes_its_own_silence_for_no_silence_of_the_bus(
     shape, fake_bus, source_of, device
 ):
-    clock = HeldClock()
-    source = source_of(shape, VIRTUAL, opener=lambda *_: fake_bus, clock=clock, stale_after_s=1.0)
+    clock, settings = HeldClock(), {"stale_after_s": 1.0, "when_full": "wait"}
+    source = source_of(shape, VIRTUAL, opener=lambda *_: fake_bus, clock=clock, **settings)
     async with source.connect() as stream:
         send_block(device, fake_bus)
         await anext(stream)

@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from acquisition.can.slcan import SlcanBus
 from acquisition.clock import SystemClock
 from acquisition.daq.can_dbc import daq_dbc
 from acquisition.daq.can_device import CanDevice
@@ -49,6 +50,18 @@ async def test_it_shows_rates_lengths_and_both_byte_orders_without_a_dbc(server)
     assert [word["smoother"] for word in wave["words"]] == ["little"] * 4
     assert wave["words"][1]["little"]["minimum"] == 0.0
     assert look["not_seen"] == []
+
+
+async def test_lines_that_are_no_frames_are_counted_as_malformed(server, monkeypatch):
+    def with_time(self, data):
+        return taken(self, data.replace(b"\r", b"1A2B\r"))
+
+    taken = SlcanBus._take
+    monkeypatch.setattr(SlcanBus, "_take", with_time)
+    look = json.loads((await probed(server, "--json")).output)
+    assert look["messages"] == []
+    assert look["n_malformed"] > 100
+    assert "malformed frames" in (await probed(server)).output
 
 
 async def test_with_a_dbc_signals_are_decoded_and_what_is_missing_is_named(server, tmp_path):

@@ -81,6 +81,12 @@ def test_each_recording_with_something_wrong_is_named_with_it(plant: Path) -> No
     assert sorted(path.name for path in root.iterdir()) == before
 
 
-def test_a_plant_that_has_never_run_has_nothing_to_check(plant_path: Path) -> None:
-    assert run(plant_path).exit_code == 0
+def test_a_plant_without_recordings_is_told_where_they_would_be_and_what_checks_others(
+    plant_path: Path,
+) -> None:
+    found = run(plant_path)
+
+    assert found.exit_code == 0
+    assert f"no recordings in {plant_path.parent / 'data' / 'captures'} or" in found.output
+    assert "padwatch recording verify FOLDER" in found.output
     assert not (plant_path.parent / "data").exists()
