@@ -5,6 +5,8 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from acquisition.modbus.profile import RingHeader
+from acquisition.modbus.slot import Slot
 from acquisition.registers.cells import N_BYTES, ByteOrder, Cell, NumberType
 from acquisition.registers.decoding import MapDecoder, byte_permutation
 from acquisition.registers.register_map import MapValue
@@ -63,6 +65,77 @@ class ValueLook:
     value: float | None
     state: str
     flags: dict[int, int]
+
+
+@dataclass(frozen=True)
+class RingChannelLook:
+    """Counts of one channel in the newest slot of a block ring, and the device's verdict on it."""
+
+    channel: int
+    ok: bool
+    minimum: int
+    mean: float
+    maximum: int
+
+
+@dataclass(frozen=True)
+class RingLook:
+    """A block ring as it was found.
+
+    Parameters
+    ----------
+    state
+        Of the newest slot: "whole", "torn" (it was being written), "damaged" (its checksum is
+        wrong) or "blank" (nothing was written there since the device started).
+    start_ns
+        Time of its first sample by the device, UTC nanoseconds since 1970.
+    slow
+        Slow values behind the header; None where there is none.
+    """
+
+    version: int
+    n_channels: int
+    rate_hz: float
+    samples_per_slot: int
+    n_slots: int
+    epoch: int
+    newest: int
+    state: str
+    first_index: int
+    start_ns: int
+    slow: tuple[float | None, ...]
+    channels: tuple[RingChannelLook, ...]
+
+
+def ring_look(header: RingHeader, slow: tuple[float, ...], slot: Slot) -> RingLook:
+    """Show a block ring by its header and its newest slot."""
+    ring = header.layout
+    state = (
+        "blank" if slot.blank else "torn" if slot.torn else "damaged" if slot.damage else "whole"
+    )
+    return RingLook(
+        version=ring.version,
+        n_channels=ring.n_channels,
+        rate_hz=ring.rate_mhz / 1000.0,
+        samples_per_slot=ring.samples_per_slot,
+        n_slots=ring.n_slots,
+        epoch=header.epoch,
+        newest=header.newest,
+        state=state,
+        first_index=slot.first_index,
+        start_ns=slot.start_ns,
+        slow=tuple(value if math.isfinite(value) else None for value in slow),
+        channels=tuple(
+            RingChannelLook(
+                channel=number,
+                ok=bool(slot.ok_bits >> number & 1),
+                minimum=int(counts.min()),
+                mean=float(counts.mean()),
+                maximum=int(counts.max()),
+            )
+            for number, counts in enumerate(slot.counts)
+        ),
+    )
 
 
 def looks(data: bytes, address: int) -> list[RegisterLook]:

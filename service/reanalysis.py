@@ -8,6 +8,7 @@ from core.assessment import Assessment
 from core.monitor import UnitMonitor
 from service.api.models import (
     ApiModel,
+    EstimatorName,
     QualityModel,
     ReadingModel,
     RunoutName,
@@ -16,7 +17,13 @@ from service.api.models import (
     WindowModel,
 )
 from service.api.times import rfc3339
-from service.api.views import quality_model, reading_model, runout_names, window_model
+from service.api.views import (
+    estimator_names,
+    quality_model,
+    reading_model,
+    runout_names,
+    window_model,
+)
 
 
 class AssessmentModel(ApiModel):
@@ -43,6 +50,9 @@ class AssessmentModel(ApiModel):
     window: WindowModel
     """The samples."""
 
+    estimators: dict[str, EstimatorName | None]
+    """Where `stiffness` came from, by axes "xx" and "yy"; null if there is none."""
+
     readings: dict[str, ReadingModel]
     """All quantities of the catalogue, by name."""
 
@@ -57,6 +67,7 @@ def assessment_model(assessment: Assessment) -> AssessmentModel:
         speed_source=assessment.speed_source.value,
         runout=runout_names(assessment),
         window=window_model(assessment.window),
+        estimators=estimator_names(assessment),
         readings={name: reading_model(name, r) for name, r in assessment.readings.items()},
     )
 

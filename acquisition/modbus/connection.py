@@ -13,7 +13,7 @@ from pymodbus.pdu import ModbusPDU
 
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import ReadOnlyFramer, Reply, RtuFramer, TcpFramer
-from acquisition.modbus.refusals import refusal_error
+from acquisition.modbus.refusals import BUSY, refusal_error
 from acquisition.modbus.transport import (
     ConnectionUse,
     LinkSettings,
@@ -25,6 +25,8 @@ from acquisition.stopping import let_stop_through
 _RECEIVE_LIMIT_BYTES = 1 << 20  # the framer judges every byte; pymodbus' own limit drops silently
 _CLOSED = "the device closed the connection"
 _MAX_SILENCE_TRIES = 5
+_BUSY_WAIT_S = 0.05
+"""Before a device that is busy is asked again: some replies, and less than a poll period."""
 
 
 @contextmanager
@@ -99,6 +101,8 @@ class Connection:
     async def ask(self, request: ModbusPDU, intent: str) -> bytes:
         """Send a request; return the reply from its function code on.
 
+        A device that answers that it is busy is asked again, for as long as a reply may take.
+
         Parameters
         ----------
         intent
@@ -113,6 +117,18 @@ class Connection:
         ConfigError
             If the device says that it can never answer.
         """
+        n_tries = 1 + int(self._settings.timeout_s / _BUSY_WAIT_S)
+        for _ in range(n_tries):
+            reply = await self._reply(request)
+            if reply.refusal != BUSY:
+                break
+            await asyncio.sleep(_BUSY_WAIT_S)
+        if reply.refusal is not None:
+            raise refusal_error(self._where, reply.refusal, intent)
+        return reply.pdu
+
+    async def _reply(self, request: ModbusPDU) -> Reply:
+        """Send a request once, on a connection of its own if it is to have one."""
         try:
             if not self._is_kept:
                 await self._open()
@@ -123,9 +139,7 @@ class Connection:
             raise
         if not self._is_kept:
             self.close()
-        if reply.refusal is not None:
-            raise refusal_error(self._where, reply.refusal, intent)
-        return reply.pdu
+        return reply
 
     async def _answer(self, request: ModbusPDU) -> Reply:
         match self._settings.transport:

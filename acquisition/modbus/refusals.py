@@ -2,11 +2,14 @@
 
 from acquisition.errors import AcquisitionError, ConfigError, LinkError
 
+BUSY = 6
+"""The device could not take the request, and asks for it again later (MODBUS V1.1b3, section 7)."""
+
 _CONFIG_EXCEPTIONS = {1: "illegal function", 2: "illegal address", 3: "illegal value"}
 _PASSING_EXCEPTIONS = {
     4: "device failure",
     5: "acknowledge",
-    6: "busy",
+    BUSY: "busy",
     8: "memory parity error",
     10: "gateway path unavailable",
     11: "gateway target does not answer",

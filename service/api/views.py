@@ -118,7 +118,12 @@ def latest_model(live: LiveLook, unit: str, bearing: str) -> LatestModel:
 def _estimators(current: CurrentBearing) -> dict[str, EstimatorName | None]:
     if current.assessment is None or not current.is_current:
         return {"xx": None, "yy": None}
-    chosen = current.assessment.estimators
+    return estimator_names(current.assessment)
+
+
+def estimator_names(assessment: Assessment) -> dict[str, EstimatorName | None]:
+    """Where the preferred stiffness came from, by axes."""
+    chosen = assessment.estimators
     return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
 
 

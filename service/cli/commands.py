@@ -18,7 +18,12 @@ from service.cli.serve import serve
 from service.cli.store import app as store_app
 from service.cli.validate import validate
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # as markup, a word in brackets would vanish from a help text or end it
+)
 app.command()(run)
 app.command()(demo)
 app.command()(acquire)

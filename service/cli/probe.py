@@ -13,17 +13,18 @@ from pydantic import ValidationError
 from acquisition.errors import AcquisitionError
 from acquisition.registers.cells import ByteOrder
 from core.machine import Measurand
+from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.probe_can import can
 from service.cli.units import UnitOption, one_unit
-from service.probing import RegisterLook, ValueLook, looks, value_looks
+from service.probing import RegisterLook, RingLook, ValueLook, looks, ring_look, value_looks
 from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_map import RegisterMapSettings
 from service.settings.modbus_sources import MappedDeviceSettings
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
-from service.wiring.probes import identify_once, read_map_once, read_once
+from service.wiring.probes import identify_once, read_map_once, read_once, read_ring_once
 
 app = typer.Typer(
     no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."
@@ -112,6 +113,23 @@ def map_(
         typer.echo(json.dumps(rows, indent=1))
     else:
         typer.echo("\n".join(_value_table(found, units)))
+
+
+@app.command()
+def ring(
+    device: DevicePlace,
+    base_address: Annotated[int, typer.Option(min=0, max=65535, help="Of the header.")] = 0,
+    function: Annotated[int, typer.Option(min=3, max=4, help="Function code 3 or 4.")] = 3,
+    unit_id: UnitIdOption = 1,
+    timeout_s: TimeoutOption = 1.0,
+    baudrate: BaudOption = 115_200,
+    parity: ParityOption = "even",
+    json_output: JsonOption = False,
+) -> None:
+    """Print a block ring's layout, its slow values, and the counts in its newest slot."""
+    place = _place(device, unit_id, timeout_s, baudrate, parity)
+    look = ring_look(*_done(read_ring_once(place, base_address, function)))
+    typer.echo(json.dumps(asdict(look), indent=1) if json_output else "\n".join(_ring_lines(look)))
 
 
 @app.command()
@@ -205,6 +223,25 @@ def _pair(look: RegisterLook, order: str) -> str:
     shown = "nan" if float32 is None else f"{float32:.7g}"
     mark = " *" if order in look.plausible else ""
     return f" {int32:>12} {uint32:>11} {shown:>14}{mark}"
+
+
+def _ring_lines(look: RingLook) -> Iterator[str]:
+    ring_s = look.n_slots * look.samples_per_slot / look.rate_hz
+    yield f"block ring, profile version {look.version}, epoch {look.epoch}"
+    yield (
+        f"{look.n_channels} channels at {look.rate_hz:g} Hz; {look.n_slots} slots of"
+        f" {look.samples_per_slot} samples: {ring_s:.1f} s"
+    )
+    slow = ["none" if value is None else f"{value:.6g}" for value in look.slow]
+    yield f"slow values: {', '.join(slow) or 'none'}"
+    yield (
+        f"newest slot {look.newest}: {look.state}, from sample {look.first_index},"
+        f" {rfc3339(look.start_ns)}"
+    )
+    yield f"{'channel':>7} {'ok':>3} {'minimum':>8} {'mean':>9} {'maximum':>8} (counts)"
+    for each in look.channels:
+        ok = "yes" if each.ok else "no"
+        yield (f"{each.channel:>7} {ok:>3} {each.minimum:>8} {each.mean:>9.1f} {each.maximum:>8}")
 
 
 def _value_table(found: list[ValueLook], units: dict[str, str]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from acquisition.recording.manifest import Manifest, checksum_of, read_manifest
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.summary import RecordingSummary, summary_of
 from service.capture.folders import ALARM, FILES
-from service.continuous.names import KIND
+from service.continuous.names import KIND, unit_of
 from service.evidence.bundle import Sink, zipped
 from service.store.waveform_port import WaveformKind
 from service.waveforms.folders import finished, n_bytes_of
@@ -72,7 +72,7 @@ class Shelf:
         folders = [
             folder
             for folder in self._folders()
-            if (unit is None or _is_of(folder, unit)) and kind in (None, kind_of(folder.name))
+            if unit in (None, unit_of(folder.name)) and kind in (None, kind_of(folder.name))
         ]
         by_age = sorted(folders, key=_age, reverse=True)
         return [self._kept(folder) for folder in by_age[:most]]
@@ -160,10 +160,6 @@ class Shelf:
 def kind_of(name: str) -> WaveformKind:
     """What a recording was made for, by its name."""
     return WaveformKind.CONTINUOUS if CONTINUOUS.search(name) else WaveformKind.CAPTURE
-
-
-def _is_of(folder: Path, unit: str) -> bool:
-    return folder.name.startswith(f"{unit}-")
 
 
 def _age(folder: Path) -> tuple[str, str]:

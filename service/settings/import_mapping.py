@@ -36,8 +36,9 @@ class TimeSettings(Settings):
     """"file": the format's own time (MDF4 time channel, TDMS waveform properties, stamps of a CAN
     log). "column": a column of the file. "start": from `start` on at the unit's rate, no gaps."""
 
-    zone: Annotated[str, StringConstraints(pattern=r"^(UTC|[+-](0\d|1[0-4]):[0-5]\d)$")]
-    """Time zone of times that have none of their own: "UTC", or as an offset such as "-03:00"."""
+    zone: Annotated[str, StringConstraints(pattern=r"^(UTC|[+-](0\d|1[0-4]):[0-5]\d)$")] = ""
+    """Time zone of times that have none of their own: "UTC", or as an offset such as "-03:00". Not
+    needed with `start`, which has one."""
 
     column: ColumnName | None = None
     """Column with the time of each sample; only for source "column"; example: "time"."""
@@ -160,6 +161,8 @@ class ImportMapping(Settings):
                 words = "is needed for" if time.source == "column" else "is only for"
                 raise MisfitError(f'{words} source "column"', "time", key)
         self._check_form()
+        if not time.zone and time.start is None:
+            raise MisfitError('is needed: "UTC", or an offset such as "-03:00"', "time", "zone")
 
     def _check_form(self) -> None:
         form, start = self.time.form or "", self.time.start

@@ -170,7 +170,7 @@ def _time_axis(time: TimeSettings) -> TimeAxis:
 
 
 def _utc_offset_s(zone: str) -> int:
-    if zone == "UTC":
+    if zone in ("UTC", ""):
         return 0
     hours, minutes = zone[1:].split(":")
     offset_s = int(hours) * 3600 + int(minutes) * 60

@@ -3,6 +3,9 @@
 from acquisition.modbus.identification import Identification
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.map_reader import MapReader
+from acquisition.modbus.profile import RingHeader
+from acquisition.modbus.ring_reader import RingReader
+from acquisition.modbus.slot import Slot
 from acquisition.modbus.transport import LinkSettings
 from acquisition.modbus.wrong_replies import wrong_replies_drop_the_link
 from acquisition.registers.cells import BIT_FUNCTIONS
@@ -55,6 +58,28 @@ async def read_map_once(
             reader = MapReader(link, decoder)
             await reader.require_signature()
             return decoder, await reader.content()
+    finally:
+        link.close()
+
+
+async def read_ring_once(
+    device: ModbusLinkSettings, base_address: int, function: int
+) -> tuple[RingHeader, tuple[float, ...], Slot]:
+    """Read a block ring's header, the slow values behind it, and its newest slot.
+
+    Raises
+    ------
+    LinkError, ConfigError
+        As `read_once`; ConfigError too if this is no block ring.
+    """
+    link = ModbusLink(link_settings_of(device))
+    try:
+        with wrong_replies_drop_the_link():
+            await link.open()
+            reader = RingReader(link, base_address, function)
+            header = await reader.header()
+            [slot] = await reader.slots(header.layout, [header.newest])
+            return header, await reader.slow_values(header.layout.n_slow), slot
     finally:
         link.close()
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rigs.command_line import padwatch
 
 from service.settings.import_mapping import ImportMapping
 from service.settings.schema import plant_file_schema
@@ -67,3 +68,15 @@ def test_every_command_is_on_the_page_of_commands() -> None:
         for parameter in command.get_params(context):
             record = parameter.get_help_record(context)
             assert record is None or f"`{record[0]}`".replace("|", "\\|") in page
+
+
+def test_every_command_has_help_in_which_no_word_is_lost() -> None:
+    from padwatch_reference.commands import commands
+
+    for name, command, _ in commands():
+        result = padwatch(*name.split()[1:], "--help")
+        assert result.exit_code == 0, name
+        shown = "".join(result.stdout.split())
+        for parameter in command.params:
+            words = getattr(parameter, "help", None) or ""
+            assert "".join(words.split()) in shown, f"{name} {parameter.name}"

@@ -119,7 +119,8 @@ def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:
         assert found["readings"][name]["value"] == reading.value
         assert found["readings"][name]["reason"] == reading.quality.reason.value
     named = {"unit", "bearing", "time", "quality", "speed_source", "runout", "window", "readings"}
-    assert set(found) == named
+    assert set(found) == {*named, "estimators"}
+    assert found["estimators"] == sample.estimators
 
 
 def test_a_changed_sensitivity_and_range_are_named_with_both_values(unit: UnitSettings) -> None:

@@ -277,7 +277,6 @@ async def test_a_frozen_device_stands_still_for_that_many_slots(server, device, 
 @pytest.mark.parametrize(
     ("fault", "error", "complaint"),
     [
-        ("busy", LinkError, r"exception 6 \(busy\)"),
         ("exception", LinkError, r"exception 4 \(device failure\)"),
         ("exception_2", ConfigError, r"exception 2 \(illegal address\)"),
         ("exception_11", LinkError, "exception 11"),

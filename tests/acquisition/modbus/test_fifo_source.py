@@ -241,7 +241,7 @@ async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
     ("fault", "error", "said"),
     [
         ("exception_3", ConfigError, "illegal value"),
-        ("busy", LinkError, "busy"),
+        ("exception_11", LinkError, "gateway target"),
     ],
 )
 async def test_a_refused_reading_is_never_repeated(queues, fault, error, said) -> None:

@@ -74,14 +74,21 @@ async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, be
     assert not bench_server.function_codes
 
 
-async def test_a_busy_device_may_be_asked_again_on_the_same_connection(linked, bench_server):
+async def test_a_busy_device_is_asked_again_on_the_same_connection(linked, bench_server):
     link = linked()
     await link.open()
-    bench_server.inject("busy", 2)
-    for _ in range(2):
-        with pytest.raises(LinkError, match=r"exception 6 \(busy\) to a read of 1 at 100"):
-            await link.read(100, 1)
+    bench_server.inject("busy", 3)
     assert await link.read(100, 1) == b"\0\1"
+    assert bench_server.function_codes[3] == 4
+
+
+async def test_a_device_that_stays_busy_is_not_waited_for_for_ever(linked, bench_server):
+    link = linked(timeout_s=0.1)
+    await link.open()
+    bench_server.inject("busy", 1000)
+    with pytest.raises(LinkError, match=r"exception 6 \(busy\) to a read of 1 at 100"):
+        await link.read(100, 1)
+    assert 2 <= bench_server.function_codes[3] <= 4
 
 
 def requests_of_pymodbus() -> list[type[ModbusPDU]]:

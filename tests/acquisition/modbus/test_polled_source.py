@@ -101,7 +101,7 @@ async def test_another_device_at_the_same_address_is_refused(
     ("fault", "error", "said"),
     [
         ("exception_2", ConfigError, "illegal address"),
-        ("busy", LinkError, "busy"),
+        ("exception_11", LinkError, "gateway target"),
         ("cut", LinkError, "closed"),
     ],
 )

@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 
 from acquisition.calibration import SlowCalibration, UnitCalibration
 from acquisition.daq.map_device import MapDevice
+from acquisition.daq.ring_device import RingDevice
+from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.raw import RawBlock
 from service.cli.probe import app
@@ -119,6 +121,31 @@ async def test_a_flagged_value_is_shown_with_its_word(probe, server, gateway) ->
     [line] = [x for x in result.stdout.splitlines() if x.startswith("ujb_oil_temperature")]
     assert "flagged" in line
     assert "40106=0x0003" in line
+
+
+async def test_a_block_ring_is_decoded_by_its_own_header(probe, counting_feed) -> None:
+    device = RingDevice(counting_feed(n_channels=3, slow=(92.25, float("nan"))))
+    device.produce(4)
+    async with ModbusRingServer(device) as server:
+        table, rows = await probe("ring", at(server)), await probe("ring", at(server), "--json")
+        other = await probe("ring", at(server), "--base-address", "1")
+
+    assert table.exit_code == 0, table.output
+    assert "3 channels at 600 Hz" in table.stdout
+    assert "slow values: 92.25, none" in table.stdout
+    found = json.loads(rows.stdout)
+    assert (found["version"], found["state"], found["slow"]) == (2, "whole", [92.25, None])
+    first = found["first_index"]
+    assert first == 4 * found["samples_per_slot"]
+    assert found["channels"][0] == {
+        "channel": 0,
+        "ok": True,
+        "minimum": first,
+        "mean": first + (found["samples_per_slot"] - 1) / 2,
+        "maximum": first + found["samples_per_slot"] - 1,
+    }
+    assert other.exit_code == 1
+    assert "magic is" in other.stderr
 
 
 async def test_nothing_but_reads_is_sent(probe, server) -> None:

@@ -17,6 +17,7 @@ FIRST = "U1-20260101T000000.000Z-continuous"
 CAPTURE = "U1-20260101T000500.000Z-order1_shaft_x"
 SECOND = "U1-20260101T001000.000Z-continuous-2"
 OTHER = "U2-20260101T000200.000Z-continuous"
+LONGER = "U1-2-20260101T000100.000Z-continuous"
 
 
 def make(folder: Path) -> None:
@@ -33,7 +34,7 @@ def make(folder: Path) -> None:
 def shelf(tmp_path: Path) -> Shelf:
     captures, recordings = tmp_path / "captures", tmp_path / "recordings"
     make(captures / CAPTURE)
-    for name in (FIRST, SECOND, OTHER):
+    for name in (FIRST, SECOND, OTHER, LONGER):
         make(recordings / name)
     (recordings / "U1-20260101T002000.000Z-continuous.parts").mkdir()
     return Shelf((captures, recordings))
@@ -42,10 +43,11 @@ def shelf(tmp_path: Path) -> Shelf:
 @pytest.mark.parametrize(
     ("asked", "names"),
     [
-        ((10,), [SECOND, CAPTURE, OTHER, FIRST]),
+        ((10,), [SECOND, CAPTURE, OTHER, LONGER, FIRST]),
         ((2, "U1"), [SECOND, CAPTURE]),
         ((10, None, WaveformKind.CAPTURE), [CAPTURE]),
         ((10, "U1", WaveformKind.CONTINUOUS), [SECOND, FIRST]),
+        ((10, "U1-2"), [LONGER]),
     ],
 )
 def test_whole_recordings_are_listed_newest_first_by_unit_and_kind(

@@ -44,13 +44,20 @@ def test_a_right_mapping_is_read(tmp_path: Path, text: str) -> None:
     assert mapping.time.zone == "-03:00"
 
 
+def test_a_start_needs_no_time_zone_beside_its_own(tmp_path: Path) -> None:
+    old, start = MDF[MDF.index("source") : MDF.index("[[")], "2026-01-01T10:00:00-03:00"
+    text = MDF.replace(old, f'source = "start"\nstart = {start}\n')
+    (tmp_path / "map.toml").write_text(text)
+    assert load_toml(tmp_path / "map.toml", ImportMapping).time.start.isoformat() == start
+
+
 FORMAT, UNIT = 'format = "csv"', 'unit = "um"'
 
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('zone = "-03:00"\n', "", ":3: time.zone: Field required"),
+        ('zone = "-03:00"\n', "", ":3: time.zone: is needed: "),
         ('"-03:00"', '"CET"', ":7: time.zone = 'CET': String should match pattern"),
         ('"-03:00"', '"-15:00"', "time.zone = '-15:00': String should match"),
         (FORMAT, 'format = "wav"', ":1: format = 'wav': Input should be 'mdf4'"),
