@@ -10,8 +10,12 @@ from cantools.database.can import Database, Message, Signal
 from cantools.database.errors import Error as DatabaseError
 
 from acquisition.errors import ConfigError, FrameError
+from acquisition.small_file import read_small_file
 
 MAX_FILE_BYTES = 8_000_000
+MAX_SAID = 500
+"""Characters of a mistake that are shown."""
+
 _FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 _EXTENDED_FLAG = 1 << 31
 _MAX_MULTIPLEXER_VALUES = 100_000
@@ -125,7 +129,8 @@ def parse_dbc(text: str, path: Path) -> dict[str, DbcMessage]:
     try:
         database = load_string(text, database_format="dbc")
     except (DatabaseError, ValueError, KeyError) as exc:
-        raise ConfigError(f"{path}: not a DBC file that can be used: {exc}") from exc
+        said = str(exc)[:MAX_SAID]  # cantools repeats a line, which may be the whole file
+        raise ConfigError(f"{path}: not a DBC file that can be used: {said}") from exc
     if not isinstance(database, Database) or not database.messages:
         raise ConfigError(f"{path}: no message in it; a DBC has lines that begin with BO_")
     messages = [_message(message) for message in database.messages]
@@ -135,12 +140,9 @@ def parse_dbc(text: str, path: Path) -> dict[str, DbcMessage]:
 
 def _text(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_FILE_BYTES + 1)
+        content = read_small_file(path, MAX_FILE_BYTES)
     except OSError as exc:
         raise ConfigError(f"{path}: {exc.strerror}; dbc must name a DBC file") from exc
-    if len(content) > MAX_FILE_BYTES:
-        raise ConfigError(f"{path}: larger than {MAX_FILE_BYTES} bytes, not a DBC file")
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError:

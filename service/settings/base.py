@@ -1,9 +1,13 @@
 """What all settings models share."""
 
+import re
 from collections.abc import Iterable
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, StringConstraints
+from pydantic import BaseModel, ConfigDict, StringConstraints, field_validator
+
+CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
+"""All but the tab, by which columns of a file to import may be separated."""
 
 
 class MisfitError(ValueError):
@@ -34,6 +38,14 @@ class Settings(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    @field_validator("*")
+    @classmethod
+    def _has_no_control_characters(cls, value: Any) -> Any:
+        """Refuse them in names, which are printed, and in paths, which cannot have a NUL."""
+        if isinstance(value, str) and CONTROL.search(value):
+            raise SecretMisfitError("must not have control characters")
+        return value
 
 
 def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:

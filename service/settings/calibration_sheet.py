@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from acquisition.small_file import read_small_file
 from core.transducer_response import ResponseTable
 
 COLUMNS = ("frequency_hz", "magnitude", "phase_deg")
@@ -45,10 +46,7 @@ def read_calibration_sheet(path: Path) -> ResponseTable:
 
 def _read(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_SHEET_BYTES + 1)
-        if len(content) > MAX_SHEET_BYTES:
-            raise SheetError(f"{path}: larger than {MAX_SHEET_BYTES} bytes, no calibration sheet")
+        content = read_small_file(path, MAX_SHEET_BYTES)
         return content.decode("utf-8-sig").rstrip()
     except OSError as error:
         raise SheetError(f"{path}: {error.strerror}") from error

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from acquisition.small_file import read_small_file
 from service.settings.mistakes import is_echo, located, sentence
 from service.settings.plant import PlantFile
 from service.settings.positions import line_of
@@ -40,6 +41,8 @@ def load_plant_file(path: Path) -> PlantFile:
         return PlantFile.model_validate_json(
             json.dumps(data, default=str), strict=True, context={FOLDER: path.parent}
         )
+    except RecursionError as error:  # of dotted keys, which TOML reads without going deep
+        raise PlantFileError(f"{path}: {TOO_DEEP}") from error
     except ValidationError as error:
         if error.errors()[0]["type"] == "json_invalid":
             raise PlantFileError(f"{path}: {TOO_DEEP}") from error
@@ -50,10 +53,7 @@ def load_plant_file(path: Path) -> PlantFile:
 
 def _read(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_FILE_BYTES + 1)
-        if len(content) > MAX_FILE_BYTES:
-            raise PlantFileError(f"{path}: larger than {MAX_FILE_BYTES} bytes, not a plant file")
+        content = read_small_file(path, MAX_FILE_BYTES)
         return content.decode()
     except OSError as error:
         raise PlantFileError(f"{path}: {error.strerror}") from error

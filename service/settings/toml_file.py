@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from acquisition.small_file import read_small_file
 from service.settings.base import MisfitError, Settings
 from service.settings.positions import Location, line_of
 
@@ -43,6 +44,8 @@ def load_toml(path: Path, model: type[Model], tags: Sequence[str] = ()) -> Model
     try:
         # JSON, because only there strict (no text for a number) lets a list be a tuple
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
+    except RecursionError as error:  # of dotted keys, which TOML reads without going deep
+        raise TomlFileError(f"{path}: nested too deeply") from error
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
         raise TomlFileError("\n".join(_line(path, text, e, tags) for e in mistakes)) from error
@@ -50,12 +53,9 @@ def load_toml(path: Path, model: type[Model], tags: Sequence[str] = ()) -> Model
 
 def _read(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+        content = read_small_file(path, MAX_BYTES)
     except OSError as error:
         raise TomlFileError(f"{path}: {error.strerror}") from error
-    if len(content) > MAX_BYTES:
-        raise TomlFileError(f"{path}: larger than {MAX_BYTES} bytes")
     try:
         return content.decode()
     except UnicodeDecodeError as error:

@@ -209,6 +209,14 @@ def test_a_file_that_is_missing_a_folder_or_huge_is_refused_without_reading_it_a
         compiled(path, X)
 
 
+def test_of_a_long_line_that_is_no_dbc_only_the_beginning_is_shown(tmp_path):
+    path = tmp_path / "long.dbc"
+    path.write_text("BO_ " + "x" * 1_000_000, encoding="utf-8")
+    with pytest.raises(ConfigError) as refusal:
+        compiled(path, X)
+    assert len(str(refusal.value)) < 1000
+
+
 def test_a_spoilt_dbc_is_either_read_or_refused(tmp_path):
     random = np.random.default_rng(20261121)
     path = tmp_path / "spoilt.dbc"

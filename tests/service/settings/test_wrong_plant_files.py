@@ -1,5 +1,6 @@
 """A wrong plant file is refused with line, key, value and what is allowed."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -174,15 +175,42 @@ def test_a_monstrous_value_is_refused_in_a_short_line(
 
 
 def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    pipe, huge = tmp_path / "pipe", tmp_path / "huge"
+    os.mkfifo(pipe)
+    huge.touch()
+    os.truncate(huge, 10**10)
     for path, said in (
         (tmp_path / "absent.toml", "No such file"),
         (tmp_path, "Is a directory"),
-        (Path("/dev/zero"), f"larger than {MAX_FILE_BYTES} bytes"),
+        (Path("/dev/zero"), "not a regular file"),
+        (pipe, "not a regular file"),
+        (huge, f"larger than {MAX_FILE_BYTES} bytes"),
     ):
         with pytest.raises(PlantFileError, match=said) as refusal:
             load_plant_file(path)
         assert str(refusal.value).startswith(f"{path}: ")
         assert "\n" not in str(refusal.value)
+
+
+def test_a_file_that_is_nested_too_deeply_is_refused(mistakes: Mistakes) -> None:
+    for text in ("a." * 20_000 + "a = 1", "a = " + "[" * 20_000 + "]" * 20_000):
+        assert mistakes(text) == [" nested too deeply for a plant file"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ('name = "', 'name = "\\u001b[2J', "plant.name"),
+        ('"var/demo"', '"var\\u0000demo"', "service.data_folder"),
+        ('"Unit 1,', '"Unit\\u00851,', f"{UNIT_1}name"),
+    ],
+)
+def test_control_characters_are_refused(
+    changed: Changed, mistakes: Mistakes, old: str, new: str, key: str
+) -> None:
+    text, line = changed(old, new)
+
+    assert mistakes(text) == [f"{line}: {key}: must not have control characters"]
 
 
 def test_an_empty_file_or_a_key_with_a_line_break_is_refused_in_its_lines(
