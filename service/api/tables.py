@@ -13,6 +13,7 @@ from fastapi import Depends, Query, Request
 from fastapi.responses import StreamingResponse
 
 from service.api.times import rfc3339
+from service.audit.csv_file import harmless
 
 FormatName = Literal["json", "csv", "parquet"]
 ColumnKind = Literal["time", "number", "count", "text", "flag"]
@@ -35,9 +36,6 @@ CSV_EXAMPLE = "time_utc,speed_rpm_mean [r/min]\r\n2026-11-21T09:03:12.400Z,90.91
 TYPE_OF = {name: media_type for media_type, name in MEDIA_TYPES.items()}
 
 ROWS_AT_ONCE = 500
-
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
-"""With which a spreadsheet takes a text for a formula."""
 
 ARROW_TYPES: dict[ColumnKind, Any] = {
     "time": pa.timestamp("ns", tz="UTC"),
@@ -153,11 +151,6 @@ def parquet_file(columns: Sequence[Column]) -> bytes:
     table = pa.table(arrays, schema=pa.schema(fields))
     pq.write_table(table, sink, compression="zstd")
     return sink.getvalue()
-
-
-def harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text.startswith(FORMULA_STARTS) else text
 
 
 def _cells(column: Column) -> Iterator[object]:

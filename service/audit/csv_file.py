@@ -28,9 +28,14 @@ def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
     return n_entries
 
 
-def _cell(value: object) -> object:
-    if not isinstance(value, str):
-        return "" if value is None else value
-    text = value.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
+def harmless(text: str) -> str:
+    """A text that no spreadsheet takes for a formula; what is no text is replaced."""
+    text = text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
     is_formula = text.lstrip(" \u00a0\ufeff").startswith(FORMULA) or text.startswith(FORMULA)
     return f"'{text}" if is_formula else text
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str):
+        return harmless(value)
+    return "" if value is None else value

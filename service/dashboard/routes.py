@@ -40,9 +40,9 @@ def index() -> Asset:
 def dashboard_router() -> APIRouter:
     """Build the routes ``/``, ``/static/EDITION/…`` and ``/static/EDITION/plotly.min.js``."""
     router = APIRouter(include_in_schema=False, dependencies=[OPEN])
-    router.add_api_route("/", _index, methods=["GET", "HEAD"])
-    router.add_api_route(f"{files()}plotly.min.js", _plotly, methods=["GET", "HEAD"])
-    router.add_api_route("/static/{path:path}", _file, methods=["GET", "HEAD"])
+    router.add_api_route("/", _index)
+    router.add_api_route(f"{files()}plotly.min.js", _plotly)
+    router.add_api_route("/static/{path:path}", _file)
     return router
 
 

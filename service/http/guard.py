@@ -6,6 +6,7 @@ from starlette.types import ASGIApp
 
 from service.http.answers import BoundedAnswers
 from service.http.bodies import WholeBodies
+from service.http.head import HeadRequests
 from service.http.hosts import KnownHosts
 from service.http.security_headers import SecurityHeaders
 from service.settings.http_limits import HttpLimitSettings
@@ -17,4 +18,4 @@ def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[
     Bodies come before the count of requests, so that slow senders use up nobody's place.
     """
     bodies = WholeBodies(answers, limits)
-    return SecurityHeaders(KnownHosts(bodies, hosts))
+    return HeadRequests(SecurityHeaders(KnownHosts(bodies, hosts)))

@@ -4,11 +4,15 @@ A page of another site can let its own name point to 127.0.0.1 (DNS rebinding) a
 answers as its own; the Host header still carries its name.
 """
 
+import re
 from collections.abc import Iterable
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.http.refusals import NO_HOST, WRONG_HOST
+
+HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
+"""A name or an address, an IPv6 one in brackets, and perhaps a port."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -43,7 +47,6 @@ class KnownHosts:
 
 
 def _name(host: str) -> str:
-    """A Host header without its port."""
-    if host.startswith("["):
-        return host[1:].partition("]")[0].lower()
-    return host.partition(":")[0].rstrip(".").lower()
+    """A Host header without its port; empty if it is malformed."""
+    found = HOST.fullmatch(host)
+    return found[1].strip("[]").rstrip(".").lower() if found else ""

@@ -127,6 +127,8 @@ class GuardedProtocol(HttpToolsProtocol):
         """A whole head: the application is asked, or the request waits for its turn."""
         if len(self.pipeline) >= MAX_PIPELINED:
             self._stop(NOT_HTTP)
+        if not self.url.startswith(b"/"):
+            self._stop(NOT_HTTP)  # as for a proxy: it would name a host besides the header
         super().on_headers_complete()
         self._enter(Phase.BODY)
 

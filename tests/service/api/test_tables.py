@@ -24,7 +24,7 @@ async def unanswered(service: Any) -> str:
     service.alarms.tick()
     [alarm] = [a.identity.id for a in service.alarms.alarms if a.level is not None]
     path = f"/api/v1/alarms/{alarm}/comment"
-    answer = await service.client.post(path, json={"actor": "A. Name", "text": "=1+1"})
+    answer = await service.client.post(path, json={"actor": "A. Name", "text": "＝1+1"})
     assert answer.status_code == 200, answer.text
     return str(alarm)
 
@@ -39,7 +39,7 @@ async def test_the_history_of_alarms_is_the_same_as_csv(service: Any) -> None:
     assert [row["time_utc"] for row in rows] == [event["time"] for event in events]
     assert [row["change"] for row in rows] == [event["change"] for event in events]
     assert {row["alarm"] for row in rows} == {alarm}
-    assert rows[0]["reason"] == "'=1+1"  # no spreadsheet takes it for a formula
+    assert rows[0]["reason"] == "'＝1+1"  # no spreadsheet takes it for a formula
     page = await service.get("/api/v1/alarms/events", limit=1, format="csv")
     assert page.headers["padwatch-next-cursor"] == str(events[0]["id"])
 
@@ -52,7 +52,7 @@ async def test_the_audit_trail_is_the_same_as_csv(service: Any) -> None:
 
     assert (entry["actor"], entry["source"], entry["peer"]) == ("A. Name", "api", "127.0.0.1")
     assert (entry["action"], entry["object"]) == ("alarm.commented", alarm)
-    assert entry["reason"] == "=1+1"
+    assert entry["reason"] == "＝1+1"
     assert entry["before"]["state"] == entry["after"]["state"]
     assert (entry["previous_hash"], len(entry["hash"])) == ("0" * 64, 64)
     assert (row["number"], row["object"]) == ("1", alarm)

@@ -15,6 +15,7 @@ CHUNKED = POST + b"Transfer-Encoding: chunked\r\n"
         (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 400),
         (b"GET / HTTP/9.9\r\nHost: localhost\r\n\r\n", 400),
         (b"GET /\xff\xfe HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
+        (b"GET http://evil.example/ HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
         (b"CONNECT localhost:22 HTTP/1.1\r\nHost: localhost\r\n\r\n", 400),
         (b"GET / HTTP/1.1\r\n\r\n", 400),
         (GET + b"Host: localhost\r\n\r\n", 400),
@@ -48,6 +49,15 @@ async def test_a_bad_request_is_refused(running, request_: bytes, status: int, c
     assert b"x-content-type-options: nosniff" in client.head
     assert running.app.n_asked == 0
     assert not caplog.records
+
+
+async def test_head_is_answered_as_get_without_the_body(running) -> None:
+    client = await running.ask("/", "HEAD")
+    await client.send(GET + b"\r\n")
+
+    assert (await client.reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    assert await client.status() == 200  # of the next one: there was nothing between
+    assert client.body == b"0 bytes"
 
 
 async def test_a_long_header_in_small_pieces_is_refused(running) -> None:

@@ -33,6 +33,8 @@ async def test_a_plant_s_service_answers_to_its_names_and_to_no_other() -> None:
         assert await asked(host) == 200, host
     for host in ("plant.example", "evil.example", "x.localhost", "[]", ":80"):
         assert await asked(host) == 421, host
+    for host in ("127.0.0.1:8231@evil", "127.0.0.1:abc", "localhost:123456", "[::1]evil"):
+        assert await asked(host) == 421, host
 
 
 async def test_the_address_a_client_came_to_is_a_name_too() -> None:
