@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Path, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 
 from core.alarms.alarm import AlarmKind
 from core.alarms.operation import (
@@ -19,6 +19,7 @@ from core.alarms.operation import (
 from core.units import ns_from_s
 from service.api.access.actors import actor_or
 from service.api.access.declared import Reach, needs
+from service.api.access.gate import identity_of
 from service.api.alarm_models import (
     AlarmEventsModel,
     AlarmListModel,
@@ -41,10 +42,16 @@ from service.api.rendering import rendered, worked
 from service.api.shared import SharedAnswer
 from service.api.tables import Format, table_content, table_response
 from service.api.times import ns_from_datetime, require_order
+from service.load.allowance import Allowance
 from service.security.roles import Permission
 from service.store.port import AlarmQuery
 
 MAX_EVENTS = 1000
+
+N_COMMENTS = 30
+S_PER_COMMENT = 10.0
+"""Comments of one person or key at once, and the pause for each further one: they are kept for
+ever."""
 
 AlarmId = Annotated[
     str,
@@ -68,6 +75,10 @@ ACTION_PROBLEMS = described_problems(
         422: "A wrong parameter",
         503: "Not done, or not on the disk yet",
     }
+)
+
+COMMENT_PROBLEMS = ACTION_PROBLEMS | described_problems(
+    {429: "Too many comments; Retry-After says how long to wait"}
 )
 
 
@@ -124,6 +135,7 @@ def operation_router(context: Context) -> APIRouter:
         tags=["alarms"],
         dependencies=[needs(Permission.ACT_ON_ALARMS)],
     )
+    allowances: dict[str, Allowance] = {}
 
     @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
@@ -171,9 +183,15 @@ def operation_router(context: Context) -> APIRouter:
         """Release the latch of an alarm that was acknowledged and whose condition has gone."""
         return await _done(context, alarm, Reset(actor_or(asked.actor)))
 
-    @router.post("/comment", summary="Comment", responses=ACTION_PROBLEMS)
-    async def comment(alarm: AlarmId, asked: CommentModel) -> AlarmModel:
+    @router.post("/comment", summary="Comment", responses=COMMENT_PROBLEMS)
+    async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Say something about an alarm; it stands in its history, and the alarm as it was."""
+        now_s = context.clock.monotonic_s()
+        new = Allowance(N_COMMENTS, S_PER_COMMENT, now_s)
+        if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
+            detail = f"after {N_COMMENTS} comments in a row one is taken every {S_PER_COMMENT:g} s"
+            wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}
+            raise ProblemError(429, "Wait", detail, headers=wait)
         return await _done(context, alarm, Comment(actor_or(asked.actor), asked.text))
 
     return router

@@ -6,6 +6,7 @@ import structlog
 
 from acquisition.clock import Clock
 from service.audit.entry import Deed
+from service.load.allowance import Allowance
 from service.store.audit_port import AuditStore
 from service.store.port import StoreError
 
@@ -29,13 +30,12 @@ class Refusals:
 
     def __init__(self, audit: AuditStore, clock: Clock) -> None:
         self._audit, self._clock = audit, clock
-        self._n_free = float(N_AT_ONCE)
-        self._seen_s = clock.monotonic_s()
+        self._allowance = Allowance(N_AT_ONCE, SECONDS_EACH, clock.monotonic_s())
         self.n_more = 0
 
     async def note(self, deed: Deed, status: int) -> None:
         """Write a refusal, with how many went before it unwritten, or count it."""
-        if not self._may_write():
+        if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return
         n_before, self.n_more = self.n_more, 0
@@ -46,12 +46,3 @@ class Refusals:
         except StoreError as error:
             self.n_more += n_before + 1
             log.error("a refused request is not in the audit trail", reason=str(error))
-
-    def _may_write(self) -> bool:
-        now_s = self._clock.monotonic_s()
-        self._n_free += (now_s - self._seen_s) / SECONDS_EACH
-        self._n_free, self._seen_s = min(self._n_free, float(N_AT_ONCE)), now_s
-        if self._n_free < 1.0:
-            return False
-        self._n_free -= 1.0
-        return True

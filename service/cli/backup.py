@@ -1,6 +1,8 @@
 """`padwatch backup` and `padwatch restore`: verified copies of the database."""
 
 import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +12,8 @@ from acquisition.clock import SystemClock
 from service.backup.backing_up import back_up
 from service.backup.check import BackupError
 from service.backup.restoring import restore as put_back
+from service.backup.taken_back import AccessAfter, access_before, take_back
+from service.cli.access import access_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.plant import PlantFile
 from service.wiring.stores import database_path, store_name
@@ -51,16 +55,43 @@ def restore(
     ],
     json_output: Json = False,
 ) -> None:
-    """Put a copy in the database's place, while padwatch is stopped; the old one is kept beside."""
-    database = _file("restore", read_plant_file(plant_file))
+    """Put a copy in the database's place, while padwatch is stopped; the old one is kept beside.
+
+    Logins end, and keys that have been revoked since the copy was made are revoked again. Accounts
+    and their passwords are those of the copy.
+    """
+    plant = read_plant_file(plant_file)
+    database, now_ns = _file("restore", plant), SystemClock().now_ns()
+    access = access_before(database)
     try:
-        done = put_back(copy, database, SystemClock().now_ns())
+        done = put_back(copy, database, now_ns)
     except BackupError as error:
         fail(f"padwatch restore: {error}")
+    with access_of(plant, "padwatch restore") as restored:
+        after = take_back(restored, access, now_ns)
     before = None if done.before is None else str(done.before)
     found = {"database": str(done.database), "before": before, "schema": done.content.schema}
-    said = f"{done.database}: restored" + (f"; what was there is {before}" if before else "")
-    typer.echo(json.dumps(found) if json_output else said)
+    if json_output:
+        typer.echo(json.dumps(found | {"access": asdict(after)}))
+        return
+    typer.echo(f"{done.database}: restored" + (f"; what was there is {before}" if before else ""))
+    for line in _access_lines(after):
+        typer.echo(line)
+
+
+def _access_lines(after: AccessAfter) -> Iterator[str]:
+    """Who and what can come in now: what is not named here would be found out too late."""
+    yield f"all logins are ended; accounts, with passwords of then: {_listed(after.accounts)}"
+    if after.returned:
+        names = _listed(after.returned)
+        yield f"accounts that were not there before: {names} (padwatch users remove)"
+    yield f"keys that are valid: {_listed(after.keys)} (padwatch keys revoke)"
+    if after.revoked:
+        yield f"keys that were revoked since, and are again: {_listed(after.revoked)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) or "none"
 
 
 def _file(command: str, plant: PlantFile) -> Path:

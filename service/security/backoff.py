@@ -87,10 +87,16 @@ class Backoff:
             account_ns = 0 if is_known else self._accounts.wait(name, now_ns)
             if wait_ns := max(account_ns, self._peers.wait(place, now_ns)):
                 return wait_ns / NS_PER_S
-            self._peers.add(place, now_ns)
+            if place:  # all behind a proxy that does not say for whom it asks are one
+                self._peers.add(place, now_ns)
             if not is_known:
                 self._accounts.add(name, now_ns)
         return 0.0
+
+    def knows(self, name: str, peer: str) -> bool:
+        """Whether an account has logged in from a peer since the service started."""
+        with self._lock:
+            return (name, place_of(peer)) in self._known
 
     def succeeded(self, name: str, peer: str) -> None:
         """Remember where an account is at home; earlier failures of its peer stay.

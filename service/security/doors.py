@@ -92,7 +92,7 @@ class Doors:
         ticks_ns
             By a clock that never goes back.
         """
-        name = _tidy(name)
+        name = tidy_name(name)
         if wait_s := self._backoff.attempt(name, peer, ticks_ns):
             return NotLoggedIn(wait_s)
         account = self._store.accounts.get(name)
@@ -147,7 +147,7 @@ class Doors:
             self._store.accounts.rehash(account, self._hashing.hash(password))
 
 
-def _tidy(name: str) -> str:
+def tidy_name(name: str) -> str:
     """The name that an account would have; a wrong one stays wrong, but short."""
     try:
         return account_name(name)
@@ -156,4 +156,6 @@ def _tidy(name: str) -> str:
 
 
 def _person(account: Account) -> Identity:
-    return Identity(account.name, account.role, Means.SESSION)
+    return Identity(
+        account.name, account.role, Means.SESSION, must_change_password=account.must_change
+    )

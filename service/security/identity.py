@@ -28,12 +28,15 @@ class Identity:
         As it is now, not as it was at login.
     units
         The only units that are open to it; empty for all.
+    must_change_password
+        Whether nothing is open to it before it has changed a password that somebody else has set.
     """
 
     name: str
     role: Role
     means: Means
     units: tuple[str, ...] = ()
+    must_change_password: bool = False
 
     @property
     def actor(self) -> str:

@@ -80,7 +80,8 @@ class Hashing:
 
         An overlong password is hashed up to its limit and is wrong.
         """
-        tried = _bytes(password[: MAX_LENGTH + 1])
+        # of one form first: a character may be written as several
+        tried = _bytes(_normal(password)[: MAX_LENGTH + 1])
         with self._places:
             try:
                 self._hasher.verify(self._nobodys_hash if stored is None else stored, tried)

@@ -26,8 +26,15 @@ class People:
     def __init__(self, store: AccessStore, hashing: Hashing) -> None:
         self._store, self._hashing = store, hashing
 
-    def add(self, name: str, role: Role, password: str, now_ns: int) -> str:
+    def add(
+        self, name: str, role: Role, password: str, now_ns: int, must_change: bool = False
+    ) -> str:
         """Add an account; return its name as it is stored.
+
+        Parameters
+        ----------
+        must_change
+            Whether the password is to be changed at the first login.
 
         Raises
         ------
@@ -38,11 +45,18 @@ class People:
         """
         name = account_name(name)
         hashed = self._hashing.hash(new_password(password, name))
-        self._store.accounts.add(name, role, hashed, now_ns)
+        self._store.accounts.add(name, role, hashed, now_ns, must_change)
         return name
 
-    def set_password(self, name: str, password: str, now_ns: int) -> None:
+    def set_password(
+        self, name: str, password: str, now_ns: int, must_change: bool = False
+    ) -> None:
         """Change a password; all sessions of the account end.
+
+        Parameters
+        ----------
+        must_change
+            Whether it is to be changed at the next login.
 
         Raises
         ------
@@ -52,7 +66,7 @@ class People:
             If there is no such account.
         """
         hashed = self._hashing.hash(new_password(password, name))
-        self._store.accounts.set_password(name, hashed, now_ns)
+        self._store.accounts.set_password(name, hashed, now_ns, must_change)
 
     def offer_set_up(self, now_ns: int) -> str | None:
         """Draw the token with which the first account is made; None if there is an account.

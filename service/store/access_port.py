@@ -28,6 +28,8 @@ class Account:
         Counts the account's passwords; a login belongs to the password that it was made with.
     password_ns
         When the password was set.
+    must_change
+        Whether somebody else has set it, so that it opens nothing but the change of it.
     """
 
     name: str
@@ -36,12 +38,15 @@ class Account:
     password_number: int
     created_ns: int
     password_ns: int
+    must_change: bool = False
 
 
 class AccountStore(Protocol):
     """People."""
 
-    def add(self, name: str, role: Role, password_hash: str, now_ns: int) -> None:
+    def add(
+        self, name: str, role: Role, password_hash: str, now_ns: int, must_change: bool = False
+    ) -> None:
         """Add an account. Raises `AccessRefusedError` if there is one of that name."""
         ...
 
@@ -57,7 +62,9 @@ class AccountStore(Protocol):
         """Change a role. Raises `AccessRefusedError` if no admin would be left, or none such."""
         ...
 
-    def set_password(self, name: str, password_hash: str, now_ns: int) -> None:
+    def set_password(
+        self, name: str, password_hash: str, now_ns: int, must_change: bool = False
+    ) -> None:
         """Change a password and end all sessions. Raises `AccessRefusedError` if none such."""
         ...
 
@@ -93,6 +100,10 @@ class SessionStore(Protocol):
 
     def end(self, digest: bytes) -> None:
         """End a session; ending it twice is fine."""
+        ...
+
+    def end_all(self) -> None:
+        """End the sessions of all accounts."""
         ...
 
 

@@ -1,5 +1,11 @@
 """Tables of accounts, sessions, keys and the set-up token."""
 
+MUST_CHANGE = """
+    ALTER TABLE account ADD COLUMN must_change INTEGER NOT NULL DEFAULT 0
+        CHECK (must_change IN (0, 1));
+"""
+"""Whether a password was set by somebody else, and must be changed at the next login."""
+
 ACCESS_TABLES = """
     CREATE TABLE account (
         name TEXT PRIMARY KEY,

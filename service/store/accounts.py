@@ -13,7 +13,8 @@ MAX_SESSIONS = 16
 """Of one account; the oldest end when there are more."""
 
 SELECT_ACCOUNTS = """
-    SELECT name, role, password_hash, password_number, created_ns, password_ns FROM account
+    SELECT name, role, password_hash, password_number, created_ns, password_ns, must_change
+    FROM account
     WHERE CAST(:name AS TEXT) IS NULL OR name = :name ORDER BY name
 """
 IS_OTHER_ADMIN = "SELECT EXISTS (SELECT 1 FROM account WHERE role = 'admin' AND name <> ?)"
@@ -24,7 +25,7 @@ INSERT_SESSION = """
 """
 SELECT_SESSION = """
     SELECT digest, session.created_ns, seen_ns, name, role, password_hash, password_number,
-        account.created_ns, password_ns
+        account.created_ns, password_ns, must_change
     FROM session JOIN account ON account = name WHERE digest = ?
 """
 END_OLDEST = """
@@ -47,13 +48,15 @@ class SqlAccounts:
     def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
         self._write, self._read, self._audit = write, read, audit
 
-    def add(self, name: str, role: Role, password_hash: str, now_ns: int) -> None:
+    def add(
+        self, name: str, role: Role, password_hash: str, now_ns: int, must_change: bool = False
+    ) -> None:
         """Add an account; refused if there is another one of that name."""
         with self._write() as writer:
             found = writer.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
             if found and tuple(found[:3]) == (name, role.value, password_hash):
                 return  # by a call whose end nobody could tell: no two hashes are alike
-            if not insert_account(writer, name, role, password_hash, now_ns):
+            if not insert_account(writer, name, role, password_hash, now_ns, must_change):
                 raise AccessRefusedError(f"there is an account {name} already")
             self._audit.add(writer, [account_deed("added", name, now_ns, after=role)])
 
@@ -77,14 +80,16 @@ class SqlAccounts:
             writer.execute("UPDATE account SET role = ? WHERE name = ?", (role.value, name))
             self._audit.add(writer, [account_deed("role_set", name, now_ns, before, role)])
 
-    def set_password(self, name: str, password_hash: str, now_ns: int) -> None:
+    def set_password(
+        self, name: str, password_hash: str, now_ns: int, must_change: bool = False
+    ) -> None:
         """Change a password and end all sessions of the account."""
         with self._write() as writer:
             _role(writer, name)
             writer.execute(
                 "UPDATE account SET password_hash = ?, password_number = password_number + 1,"
-                " password_ns = ? WHERE name = ?",
-                (password_hash, now_ns, name),
+                " password_ns = ?, must_change = ? WHERE name = ?",
+                (password_hash, now_ns, int(must_change), name),
             )
             writer.execute("DELETE FROM session WHERE account = ?", (name,))
             self._audit.add(writer, [account_deed("password_set", name, now_ns)])
@@ -149,13 +154,23 @@ class SqlSessions:
         with self._write() as writer:
             writer.execute("DELETE FROM session WHERE digest = ?", (digest,))
 
+    def end_all(self) -> None:
+        """End the sessions of all accounts."""
+        with self._write() as writer:
+            writer.execute("DELETE FROM session")
+
 
 def insert_account(
-    writer: Connection, name: str, role: Role, password_hash: str, now_ns: int
+    writer: Connection,
+    name: str,
+    role: Role,
+    password_hash: str,
+    now_ns: int,
+    must_change: bool = False,
 ) -> bool:
     """Add an account unless there is one of that name; whether it was added."""
-    row = (name, role.value, password_hash, now_ns, now_ns)
-    insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?) ON CONFLICT (name) DO NOTHING"
+    row = (name, role.value, password_hash, now_ns, now_ns, int(must_change))
+    insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?, ?) ON CONFLICT (name) DO NOTHING"
     return writer.execute(insert, row).rowcount == 1
 
 
@@ -174,5 +189,6 @@ def _role(writer: Connection, name: str) -> Role:
 
 
 def _account(row: tuple[Any, ...]) -> Account:
-    name, role, password_hash, number, created_ns, password_ns = row
-    return Account(name, Role(role), password_hash, number, created_ns, password_ns)
+    name, role, password_hash, number, created_ns, password_ns, must_change = row
+    times = (created_ns, password_ns)
+    return Account(name, Role(role), password_hash, number, *times, bool(must_change))

@@ -69,11 +69,16 @@ def account_router(registry: AccessRegistry) -> APIRouter:
         return await _one(registry, name)
 
     @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
-    async def set_password(name: AccountName, asked: SetPasswordModel) -> AccountModel:
-        """Set another password; everybody who is logged in to the account is logged out."""
+    async def set_password(
+        request: Request, name: AccountName, asked: SetPasswordModel
+    ) -> AccountModel:
+        """Set somebody else's password, to be changed at the next login; all sessions end."""
+        if _is_own(request, name):
+            detail = "one's own password is changed with the present one: POST /session/password"
+            raise ProblemError(409, "Does not fit", detail)
         await _one(registry, name)
         with told_as_problems():
-            await registry.set_password(name, asked.password)
+            await registry.set_password(name, asked.password, must_change=True)
         return await _one(registry, name)
 
     @router.delete(
@@ -81,14 +86,19 @@ def account_router(registry: AccessRegistry) -> APIRouter:
     )
     async def remove(request: Request, name: AccountName) -> None:
         """Remove an account, and log out who is logged in to it; nobody removes his own."""
-        identity = identity_of(request)
-        if identity.means is Means.SESSION and identity.name == name:
+        if _is_own(request, name):
             raise ProblemError(409, "Does not fit", "nobody removes his own account")
         await _one(registry, name)
         with told_as_problems():
             await registry.remove(name)
 
     return router
+
+
+def _is_own(request: Request, name: str) -> bool:
+    """Whether somebody asks about the account that he is logged in to."""
+    identity = identity_of(request)
+    return identity.means is Means.SESSION and identity.name == name
 
 
 async def _one(registry: AccessRegistry, name: str) -> AccountModel:

@@ -1,6 +1,6 @@
 """What a request shows of who sends it: a session's cookie, a machine's key, or nothing."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
@@ -37,21 +37,23 @@ NOTHING, WRONG = Credentials(Kind.NOTHING), Credentials(Kind.WRONG)
 def credentials_of(headers: Headers) -> Credentials:
     """Read them out of the headers of a request."""
     found = list(headers)
-    authorizations = [value for name, value in found if name == b"authorization"]
-    if len(authorizations) > 1:
+    keys = list(_keys(value.decode("latin-1") for name, value in found if name == b"authorization"))
+    if len(keys) > 1:
         return WRONG
-    if authorizations:
-        return _authorized(authorizations[0].decode("latin-1"))
+    if keys:
+        return Credentials(Kind.KEY, keys[0])
     cookies = _cookies(value.decode("latin-1") for name, value in found if name == b"cookie")
     if len(cookies) > 1:
         return WRONG
     return Credentials(Kind.SESSION, cookies[0]) if cookies else NOTHING
 
 
-def _authorized(value: str) -> Credentials:
-    scheme, _, key = value.partition(" ")
-    # of another scheme is for somebody else, such as a proxy before this one
-    return Credentials(Kind.KEY, key.strip()) if scheme.lower() == BEARER else NOTHING
+def _keys(values: Iterable[str]) -> Iterator[str]:
+    """Keys in headers; another scheme is for a proxy that has a login of its own."""
+    for value in values:
+        scheme, _, key = value.partition(" ")
+        if scheme.lower() == BEARER:
+            yield key.strip()
 
 
 def _cookies(values: Iterable[str]) -> list[str]:

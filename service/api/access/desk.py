@@ -12,7 +12,7 @@ from service.api.access.locality import is_from_here
 from service.api.access.registry import AccessRegistry
 from service.api.access.work import AccessWork
 from service.security.backoff import Backoff
-from service.security.doors import Doors, LoggedIn, NotLoggedIn, Refusal
+from service.security.doors import Doors, LoggedIn, NotLoggedIn, Refusal, tidy_name
 from service.security.identity import LOCAL, Identity
 from service.security.passwords import Hashing
 from service.security.people import People
@@ -63,6 +63,7 @@ class AccessDesk:
         self._hashing = hashing or Hashing()
         self._people = People(store, self._hashing)
         self._work = AccessWork()
+        self._backoff = Backoff()
         self.registry = AccessRegistry(store, self._people, self._work, clock)
 
     async def caller(self, scope: Scope) -> Caller:
@@ -91,7 +92,8 @@ class AccessDesk:
         """
         now_ns, ticks_ns = self._clock.now_ns(), ns_from_s(self._clock.monotonic_s())
         return await self._work.hashed(
-            lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns)
+            lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns),
+            is_known=self._backoff.knows(tidy_name(name), peer),
         )
 
     async def log_out(self, token: str) -> None:
@@ -107,7 +109,9 @@ class AccessDesk:
             If one is not accepted, or too many are hashed just now.
         """
         now_ns = self._clock.now_ns()
-        return await self._work.hashed(lambda: self._people.set_up(token, name, password, now_ns))
+        return await self._work.hashed(
+            lambda: self._people.set_up(token, name, password, now_ns), is_known=False
+        )
 
     async def offer_set_up(self) -> str | None:
         """Draw the token with which the first account is made; None if nobody needs one."""
@@ -136,4 +140,4 @@ class AccessDesk:
 
     @cached_property
     def _doors(self) -> Doors:
-        return Doors(self._store, self._hashing, Backoff(), self._limits, self._work.note)
+        return Doors(self._store, self._hashing, self._backoff, self._limits, self._work.note)

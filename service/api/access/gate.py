@@ -8,12 +8,20 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.api.access.credentials import Kind
 from service.api.access.declared import Declared, Reach
 from service.api.access.desk import AccessDesk, Caller
-from service.api.access.refusals import not_allowed, not_logged_in, not_this_site, not_this_unit
+from service.api.access.refusals import (
+    must_change_password,
+    not_allowed,
+    not_logged_in,
+    not_this_site,
+    not_this_unit,
+)
 from service.api.access.same_origin import SAFE, is_foreign
 from service.api.problems import ProblemError, problem_answer
 from service.audit.acting import name_actor
 from service.security.identity import Identity
 from service.store.port import StoreError
+
+CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 CALLER = "caller"
 """Where a request keeps who sends it."""
@@ -95,6 +103,8 @@ async def require_declared(request: Request) -> None:
     identity = caller_of(request).identity
     if identity is None:
         raise not_logged_in()
+    if identity.must_change_password and operation != CHANGE_PASSWORD:
+        raise must_change_password()
     if not identity.role.may(needed.permission):
         raise not_allowed()
     unit = _unit_of(request.path_params)

@@ -31,6 +31,12 @@ def not_allowed() -> ProblemError:
     return ProblemError(403, "Not allowed", "your role does not allow this")
 
 
+def must_change_password() -> ProblemError:
+    """For somebody whose password was set by somebody else."""
+    detail = "your password was set by somebody else: change it first"
+    return ProblemError(403, "Change your password", detail)
+
+
 def not_this_unit() -> ProblemError:
     """For a key of some units, where it is about others."""
     detail = "this key is for some units only: ask for one of those"

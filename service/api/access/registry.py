@@ -23,7 +23,7 @@ class AccessRegistry:
         self._store, self._people, self._work, self._clock = store, people, work, clock
 
     async def add(self, name: str, role: Role, password: str) -> str:
-        """Add an account; return its name as it is stored.
+        """Add an account whose password is to be changed at its first login; return its name.
 
         Raises
         ------
@@ -31,10 +31,17 @@ class AccessRegistry:
             If one is not accepted, there is one of that name, or too many are hashed just now.
         """
         now_ns = self._clock.now_ns()
-        return await self._work.hashed(lambda: self._people.add(name, role, password, now_ns))
+        return await self._work.hashed(
+            lambda: self._people.add(name, role, password, now_ns, must_change=True)
+        )
 
-    async def set_password(self, name: str, password: str) -> None:
+    async def set_password(self, name: str, password: str, must_change: bool) -> None:
         """Change a password; all sessions of the account end.
+
+        Parameters
+        ----------
+        must_change
+            Whether it is to be changed at the next login: who sets it is somebody else.
 
         Raises
         ------
@@ -42,7 +49,9 @@ class AccessRegistry:
             If it is not accepted, there is no such account, or too many are hashed just now.
         """
         now_ns = self._clock.now_ns()
-        await self._work.hashed(lambda: self._people.set_password(name, password, now_ns))
+        await self._work.hashed(
+            lambda: self._people.set_password(name, password, now_ns, must_change)
+        )
 
     async def accounts(self) -> Sequence[Account]:
         """Every account, by name."""

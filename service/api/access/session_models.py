@@ -28,6 +28,9 @@ class SessionModel(ApiModel):
     set_up_needed: bool
     """Whether there is no account yet that one could log in to."""
 
+    password_change_needed: bool
+    """Whether nothing is open before the password is changed, which somebody else has set."""
+
     name: Annotated[str | None, Field(examples=["anna"])]
     """Name of the account or key; null for nobody in particular."""
 

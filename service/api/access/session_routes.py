@@ -1,5 +1,7 @@
 """Logging in and out, one's own password, and the very first account."""
 
+from contextlib import suppress
+
 from fastapi import APIRouter, Request, Response
 
 from service.api.access.credentials import COOKIE, Kind
@@ -21,6 +23,7 @@ from service.api.problems import ProblemError, described_problems
 from service.security.doors import LoggedIn, NotLoggedIn
 from service.security.identity import Identity, Means
 from service.security.roles import Permission
+from service.store.port import StoreError
 
 LOGIN_PROBLEMS = described_problems(
     {
@@ -66,7 +69,7 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
         """Begin a session, kept in a cookie; a session that the browser had before ends."""
         let_in = await _let_in(desk, request, asked.name, asked.password)
         await _end(desk, caller_of(request))
-        await tell(context.store.audit, context.clock, BEGUN, let_in.identity.name)
+        await _tell_begun(context, desk, let_in)
         return await _begun(desk, request, response, let_in)
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
@@ -92,9 +95,9 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
         identity = _person(identity_of(request))
         await _let_in(desk, request, identity.name, asked.password)
         with told_as_problems("new_password"):
-            await desk.registry.set_password(identity.name, asked.new_password)
+            await desk.registry.set_password(identity.name, asked.new_password, must_change=False)
         let_in = await _let_in(desk, request, identity.name, asked.new_password)
-        await tell(context.store.audit, context.clock, BEGUN, identity.name)
+        await _tell_begun(context, desk, let_in)
         return await _begun(desk, request, response, let_in)
 
     @router.post(
@@ -123,6 +126,16 @@ async def _let_in(desk: AccessDesk, request: Request, name: str, password: str) 
     if isinstance(found, NotLoggedIn):
         raise must_wait(found.wait_s) if found.wait_s else not_let_in()
     return found
+
+
+async def _tell_begun(context: Context, desk: AccessDesk, let_in: LoggedIn) -> None:
+    """Write a login down; one that cannot be written down is ended."""
+    try:
+        await tell(context.store.audit, context.clock, BEGUN, let_in.identity.name)
+    except StoreError:
+        with suppress(StoreError):
+            await desk.log_out(let_in.token)
+        raise
 
 
 async def _begun(

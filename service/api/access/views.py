@@ -18,6 +18,7 @@ async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
     return SessionModel(
         login_required=caller.must_log_in,
         set_up_needed=needs_set_up,
+        password_change_needed=identity is not None and identity.must_change_password,
         name=identity.name if identity is not None and identity.is_proven else None,
         role=identity.role.value if identity is not None else None,
         permissions=[p.value for p in Permission if identity is not None and identity.role.may(p)],

@@ -17,6 +17,9 @@ log = structlog.get_logger()
 MAX_WAITING = 16
 """Passwords that are hashed or wait for it; at a third of a second each nobody waits for long."""
 
+MAX_KNOWN_WAITING = 8
+"""And further places for people who have logged in before: strangers cannot take these."""
+
 LOOKUP_THREADS = 2
 
 MAX_NOTES = 64
@@ -36,6 +39,7 @@ class AccessWork:
         self._lookups = ThreadPoolExecutor(LOOKUP_THREADS, "access")
         self._hashes = ThreadPoolExecutor(MAX_AT_ONCE, "passwords")
         self._places = BoundedSemaphore(MAX_WAITING)
+        self._known_places = BoundedSemaphore(MAX_KNOWN_WAITING)
         self._notes = ThreadPoolExecutor(1, "notes")
         self._note_places = BoundedSemaphore(MAX_NOTES)
 
@@ -43,18 +47,26 @@ class AccessWork:
         """Do something short that waits for the disk."""
         return await asyncio.wrap_future(self._lookups.submit(copy_context().run, look))
 
-    async def hashed(self, work: Callable[[], T]) -> T:
+    async def hashed(self, work: Callable[[], T], is_known: bool = True) -> T:
         """Do something that hashes a password.
+
+        Parameters
+        ----------
+        is_known
+            Whether somebody asks who has logged in before.
 
         Raises
         ------
         TooManyLoginsError
             If too many wait for it already.
         """
-        if not self._places.acquire(blocking=False):
-            raise TooManyLoginsError
+        places = self._places
+        if not places.acquire(blocking=False):
+            places = self._known_places
+            if not is_known or not places.acquire(blocking=False):
+                raise TooManyLoginsError
         running: Future[T] = self._hashes.submit(copy_context().run, work)
-        running.add_done_callback(lambda _: self._places.release())
+        running.add_done_callback(lambda _: places.release())
         return await asyncio.wrap_future(running)
 
     def close(self) -> None:

@@ -3,19 +3,23 @@
 import { NO_PAGE, PAGES } from "./pages.js";
 import { forbiddenPage } from "./pages/forbidden.js";
 import { loginPage } from "./pages/login.js";
+import { passwordPage } from "./pages/password.js";
 import { setUpPage } from "./pages/set_up.js";
 import { routeOf } from "./route.js";
-import { isLocked, may, session } from "./session.js";
+import { isLocked, may, mustChangePassword, session } from "./session.js";
 
 const LOGIN_PAGE = { title: "log in", open: loginPage };
+const PASSWORD_PAGE = { title: "your password", open: passwordPage };
 const SET_UP_PAGE = { title: "set up", open: setUpPage };
 
 /**
  * The page to open, with the segments of its address.
  *
- * As long as nobody has logged in it is the door, whatever the address: that stays, and leads on.
+ * As long as nobody has logged in it is the door, and then the form for a password that somebody else has set, whatever
+ * the address: that stays, and leads on.
  */
 export function pageOf(hash) {
+  if (mustChangePassword()) return { page: PASSWORD_PAGE, segments: [] };
   if (isLocked()) return { page: session().set_up_needed ? SET_UP_PAGE : LOGIN_PAGE, segments: [] };
   const { page, segments } = routeOf(hash, PAGES) ?? { page: NO_PAGE, segments: [] };
   const { permission } = page;

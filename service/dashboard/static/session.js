@@ -15,11 +15,14 @@ let known = null;
 /** Whether a password change is unconfirmed; the next login ends that. */
 let isPasswordUncertain = false;
 
-/** `{ login_required, set_up_needed, name, role, permissions }`; null until the service has said. */
+/** `{ login_required, set_up_needed, password_change_needed, name, role, permissions }`; null until the service has said. */
 export const session = () => known;
 
-/** Whether nothing of the plant may be seen before somebody has logged in. */
-export const isLocked = () => known !== null && known.login_required && known.name === null;
+/** Whether the password was set by somebody else, and must be changed before anything else. */
+export const mustChangePassword = () => known !== null && known.password_change_needed;
+
+/** Whether nothing of the plant may be seen before somebody has logged in, or has changed the password. */
+export const isLocked = () => mustChangePassword() || (known !== null && known.login_required && known.name === null);
 
 /** Whether something is permitted; while nothing is known the service itself has the last word. */
 export const may = (permission) => known === null || known.permissions.includes(permission);

@@ -5,6 +5,7 @@ from typing import Any
 from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, PROBE, SHELVE, Probes, post
 
 from core.quality import Reason
+from service.api.alarm_routes import N_COMMENTS, S_PER_COMMENT
 
 
 async def test_a_plant_in_good_health_has_no_alarms(service: Any, probes: Probes) -> None:
@@ -64,6 +65,19 @@ async def test_an_acknowledgement_is_durable_when_it_is_answered(
     again = await post(service, ACKNOWLEDGE, body)
     assert again.status_code == 200
     assert len((await service.json(f"{ALARMS}/events"))["events"]) == 2
+
+
+async def test_comments_without_end_have_to_wait(service: Any, probes: Probes) -> None:
+    probes.send(3, Reason.SENSOR_FAILURE)
+    body = {**ANNA, "text": "seen"}
+    path = f"{ALARMS}/{PROBE}/comment"
+    statuses = [(await post(service, path, body)).status_code for _ in range(N_COMMENTS + 2)]
+    refused = await post(service, path, body)
+    service.clock.step(round(S_PER_COMMENT * 1e9))
+
+    assert statuses == [200] * N_COMMENTS + [429] * 2
+    assert refused.headers["retry-after"] == "10"
+    assert (await post(service, path, body)).status_code == 200
 
 
 async def test_an_acknowledgement_that_crosses_a_new_occurrence_is_refused(

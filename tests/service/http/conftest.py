@@ -29,11 +29,13 @@ class Application:
     """Answers with the length of the body; some paths are slow or large."""
 
     n_asked: int = 0
+    method: str = ""
     asker: Asker | None = None
     goes_on: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.n_asked += 1
+        self.method = scope["method"]
         self.asker = await asyncio.to_thread(ASKER.get)
         message = await receive()
         text = b"%d bytes" % len(message["body"])

@@ -53,9 +53,10 @@ async def test_a_bad_request_is_refused(running, request_: bytes, status: int, c
 
 async def test_head_is_answered_as_get_without_the_body(running) -> None:
     client = await running.ask("/", "HEAD")
-    await client.send(GET + b"\r\n")
 
     assert (await client.reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    assert running.app.method == "GET"
+    await client.send(GET + b"\r\n")
     assert await client.status() == 200  # of the next one: there was nothing between
     assert client.body == b"0 bytes"
 

@@ -37,6 +37,12 @@ def test_no_place_waits_longer_than_its_limit() -> None:
     assert max(waits) == OF_PEER.longest_s
 
 
+def test_peers_without_an_address_do_not_wait_for_each_other() -> None:
+    backoff = Backoff()
+    for number in range(100):
+        assert backoff.attempt(f"user{number}", "", 0) == 0.0
+
+
 @given(st.integers(0, 10_000))
 def test_waits_never_shrink_with_failures(n_failures: int) -> None:
     assert OF_PEER.wait_ns(n_failures) <= OF_PEER.wait_ns(n_failures + 1)

@@ -50,6 +50,8 @@ def test_a_password_is_hashed_with_its_own_salt_however_its_letters_are_written(
     composed, decomposed = "kalibrierschlüssel", "kalibrierschlu\u0308ssel"
     assert composed != decomposed
     assert hashing.verify(hashing.hash(composed), decomposed)
+    long = "u\u0308" * 150 + "kalibr"  # of 306 code points, which are 156 characters
+    assert hashing.verify(hashing.hash(new_password(long, "anna")), long)
 
 
 def test_nothing_opens_an_account_that_is_not_there_or_whose_hash_is_damaged(

@@ -196,7 +196,7 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
         ("UPDATE api_key SET expires_ns = expires_ns + 1", "kept as they were made"),
         ("UPDATE api_key SET role = 'admin'", "kept as they were made"),
         ("DELETE FROM api_key", "revoked, not forgotten"),
-        ("INSERT INTO account VALUES ('x', 'root', '', 1, 0, 0)", "CHECK"),
+        ("INSERT INTO account VALUES ('x', 'root', '', 1, 0, 0, 0)", "CHECK"),
     ):
         with (
             closing(sqlite3.connect(database)) as connection,

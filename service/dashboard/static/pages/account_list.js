@@ -6,6 +6,7 @@ import { element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { listing, listingCell, listingName, rowBelow } from "../parts/listing.js";
 import { question } from "../parts/question.js";
+import { session } from "../session.js";
 
 const HEADS = ["Name", "Role", "Added", "Password set", ""];
 const PASSWORD = { type: "password", autocomplete: "new-password", required: "", maxlength: "256" };
@@ -37,7 +38,7 @@ function accountRow({ name }, again) {
   const password = element("input", PASSWORD);
   const questions = [
     ["Role…", question(`What ${name} may do from the next click on`, "Set role", [labelled("Role", role)], () => tell([...path, "role"], { role: role.value }, "PUT"), again)],
-    ["Password…", question(`A new password for ${name}, who is then logged out everywhere`, "Set password", [labelled(PASSWORD_HELP, password)], () => tell([...path, "password"], { password: password.value }, "PUT"), again)],
+    ...(name === session()?.name ? [] : [["Password…", question(`A password for ${name}, who is then logged out everywhere and changes it at the next login`, "Set password", [labelled(PASSWORD_HELP, password)], () => tell([...path, "password"], { password: password.value }, "PUT"), again)]]), // one's own is changed with the present one
     ["Remove…", question(`Remove ${name}, who is then logged out everywhere?`, "Remove", [], () => tell(path, undefined, "DELETE"), again)],
   ];
   const below = rowBelow(HEADS, ...questions.map(([, form]) => form.node));

@@ -2,10 +2,12 @@
 
 import { element, setText } from "../dom.js";
 import { entry, entryForm } from "../parts/entry.js";
-import { changePassword, session } from "../session.js";
+import { changePassword, mustChangePassword, session } from "../session.js";
 
 const NOBODY = "Nobody is logged in here, so that there is no password to change.";
 const EXPLANATION = "12 characters or more; several words are easy to remember and hard to guess. Wherever else you are logged in, that ends.";
+
+const SET_BY_OTHERS = "Somebody else has set your password: change it before you go on. ";
 
 /** Whose password has been changed: the page may have been opened anew with the new session meanwhile. */
 let changed = null;
@@ -14,7 +16,7 @@ let changed = null;
 export function passwordPage(main) {
   const name = session()?.name ?? null;
   const title = element("h1", {}, "Your password");
-  const words = element("p", { class: "sentence" }, name === null ? NOBODY : EXPLANATION);
+  const words = element("p", { class: "sentence" }, name === null ? NOBODY : mustChangePassword() ? SET_BY_OTHERS + EXPLANATION : EXPLANATION);
   const box = element("section", { class: "panel door" }, title, words);
   main.append(box);
   if (name === null) return { draw() {}, close() {} };

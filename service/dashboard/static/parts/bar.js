@@ -3,7 +3,7 @@
 import { countWords } from "../alarm_words.js";
 import { setAttribute, setText } from "../dom.js";
 import { formatAge, formatTime, formatZone } from "../format.js";
-import { isLocked } from "../session.js";
+import { isLocked, mustChangePassword } from "../session.js";
 import { mark } from "./mark.js";
 import { navigation } from "./navigation.js";
 import { personView } from "./person.js";
@@ -45,7 +45,7 @@ function drawBanner(view) {
 }
 
 function serviceSentence(view) {
-  if (isLocked()) return "Nobody is logged in.";
+  if (isLocked()) return mustChangePassword() ? "The password must be changed." : "Nobody is logged in.";
   if (view.silenceS === null) return "Waiting for the service’s first answer.";
   return `Service answered ${formatAge(view.silenceS)} ago`;
 }

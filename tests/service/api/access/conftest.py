@@ -1,5 +1,6 @@
 """The API where everybody must log in, with passwords whose hashes cost little."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -38,7 +39,9 @@ class Access:
         return httpx2.AsyncClient(transport=transport, base_url="http://padwatch", headers=headers)
 
     async def account(self, name: str, role: Role) -> None:
-        await self.desk.registry.add(name, role, PASSWORD)
+        """Add an account whose password its owner has set."""
+        now_ns = self.service.clock.now_ns()
+        await asyncio.to_thread(self.desk._people.add, name, role, PASSWORD, now_ns)
 
     async def session(self, name: str) -> str:
         """Log in; the token of the session."""

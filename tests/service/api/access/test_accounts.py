@@ -12,6 +12,7 @@ ACCOUNTS, KEYS = "/api/v1/accounts", "/api/v1/keys"
 PASSWORD = "the river is high in may"  # noqa: S105
 OTHER = "the river is low in august"
 BERT = {"name": "Bert", "role": "viewer", "password": PASSWORD}
+BERT_IN = {"name": "bert"}
 
 
 @pytest.fixture
@@ -49,6 +50,27 @@ async def test_an_account_is_added_changed_and_removed(
     assert OTHER not in str(told)
 
 
+async def test_a_password_that_somebody_else_has_set_opens_nothing_but_its_change(
+    access: Any, admin: httpx2.AsyncClient
+) -> None:
+    await admin.post(ACCOUNTS, json=BERT)
+    for password in (PASSWORD, OTHER):
+        async with access.client(Origin="http://padwatch") as client:
+            first = await client.post("/api/v1/session", json={**BERT_IN, "password": password})
+            token = first.cookies["__Host-padwatch"]
+            shown = {"Cookie": f"__Host-padwatch={token}"}
+            closed = await client.get("/api/v1/units", headers=shown)
+            change = {"password": password, "new_password": "the river is gone in winter"}
+            done = await client.post("/api/v1/session/password", json=change, headers=shown)
+            shown = {"Cookie": f"__Host-padwatch={done.cookies['__Host-padwatch']}"}
+            opened = await client.get("/api/v1/units", headers=shown)
+        assert (first.status_code, first.json()["password_change_needed"]) == (201, True)
+        assert (closed.status_code, closed.json()["title"]) == (403, "Change your password")
+        assert (done.status_code, done.json()["password_change_needed"]) == (201, False)
+        assert opened.status_code == 200
+        await admin.put(f"{ACCOUNTS}/bert/password", json={"password": OTHER})
+
+
 async def test_what_does_not_fit_is_refused_and_said(admin: httpx2.AsyncClient) -> None:
     await admin.post(ACCOUNTS, json=BERT)
     refused = [
@@ -59,6 +81,7 @@ async def test_what_does_not_fit_is_refused_and_said(admin: httpx2.AsyncClient) 
         (await admin.put(f"{ACCOUNTS}/anna/role", json={"role": "viewer"}), 409, None),
         (await admin.put(f"{ACCOUNTS}/none/role", json={"role": "viewer"}), 404, None),
         (await admin.delete(f"{ACCOUNTS}/anna"), 409, None),
+        (await admin.put(f"{ACCOUNTS}/anna/password", json={"password": OTHER}), 409, None),
         (await admin.delete(f"{ACCOUNTS}/none"), 404, None),
         (await admin.post(KEYS, json={"name": "k", "role": "admin", "units": ["U1"]}), 409, None),
         (

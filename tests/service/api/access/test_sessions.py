@@ -7,6 +7,7 @@ import httpx2
 import pytest
 
 from service.security.roles import Role
+from service.store.port import StoreError
 
 SESSION, UNITS = "/api/v1/session", "/api/v1/units"
 PASSWORD = "the river is high in may"  # noqa: S105
@@ -44,6 +45,48 @@ async def test_on_this_computer_nobody_has_to_log_in_but_who_comes_through_a_pro
     for headers in (wrong_key, *({header: "127.0.0.1"} for header in passed_on)):
         answer = await read_only.client.get(UNITS, headers=headers)
         assert answer.status_code == 401, headers
+
+
+async def test_a_login_of_the_proxy_hides_neither_a_session_nor_a_key(
+    access: Any, anna: str
+) -> None:
+    basic = ("Authorization", "Basic cHJveHk6c2VjcmV0")
+    key = ("Authorization", f"Bearer {access.key(Role.ADMIN)}")
+    async with access.client() as client:
+        for shown, name in (
+            ([basic, ("Cookie", f"{COOKIE}={anna}")], "anna"),
+            ([basic, key], "key-admin"),
+        ):
+            assert (await client.get(SESSION, headers=shown)).json()["name"] == name
+
+
+async def test_a_known_person_gets_in_while_strangers_take_all_places(
+    access: Any, anna: str
+) -> None:
+    assert anna  # from the same place before
+    while access.desk._work._places.acquire(blocking=False):
+        pass
+    statuses = []
+    for peer in ("192.0.2.7", "192.0.2.8"):
+        async with access.client(peer) as client:
+            statuses.append((await client.post(SESSION, json=ANNA)).status_code)
+    assert statuses == [201, 503]
+
+
+async def test_a_login_that_cannot_be_written_down_opens_nothing(
+    access: Any, anna: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise StoreError("disk full")
+
+    assert anna
+    with monkeypatch.context() as full:
+        full.setattr(access.service.store.audit, "record", refuse)
+        async with access.client() as client:
+            answer = await client.post(SESSION, json=ANNA)
+    assert answer.status_code == 503
+    with access.service.store._reader() as reader:
+        assert reader.execute("SELECT count(*) FROM session").fetchone()[0] == 1
 
 
 async def test_a_login_never_takes_a_token_that_was_there_before(
@@ -180,6 +223,7 @@ async def test_the_first_account_is_made_with_the_printed_token_and_once(access:
     assert before == {
         "login_required": True,
         "set_up_needed": True,
+        "password_change_needed": False,
         "name": None,
         "role": None,
         "permissions": [],

@@ -23,11 +23,13 @@ async def test_only_so_many_passwords_wait_and_nobody_else_for_them(
     held: threading.Event,
 ) -> None:
     work = AccessWork()
-    logins = [asyncio.create_task(work.hashed(held.wait)) for _ in range(MAX_WAITING)]
+    logins = [
+        asyncio.create_task(work.hashed(held.wait, is_known=False)) for _ in range(MAX_WAITING)
+    ]
     await asyncio.sleep(0)
 
     with pytest.raises(TooManyLoginsError):
-        await work.hashed(held.wait)
+        await work.hashed(held.wait, is_known=False)
     assert await work.looked_up(lambda: "found") == "found"
     held.set()
     assert await asyncio.gather(*logins) == [True] * MAX_WAITING
@@ -37,7 +39,9 @@ async def test_only_so_many_passwords_wait_and_nobody_else_for_them(
 
 async def test_at_the_end_nothing_more_is_begun(held: threading.Event) -> None:
     work = AccessWork()
-    logins = [asyncio.create_task(work.hashed(held.wait)) for _ in range(MAX_WAITING)]
+    logins = [
+        asyncio.create_task(work.hashed(held.wait, is_known=False)) for _ in range(MAX_WAITING)
+    ]
     await asyncio.sleep(0)
     work.close()
     held.set()
