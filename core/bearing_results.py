@@ -1,6 +1,7 @@
 """From the segments of a unit to the readings of one bearing."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -9,7 +10,7 @@ from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum, average
 from core.estimators import Estimator, preferred_stiffness
 from core.film_results import film_results
-from core.line_results import OrderLine
+from core.line_results import OrderLine, other_line_hz
 from core.machine import Bearing, Unit
 from core.overall_results import overall_results, phase_results
 from core.polarity import signs_checked
@@ -139,7 +140,7 @@ class BearingResults:
         )
 
     def _order_line(self, line: int) -> OrderLine:
-        read = self._line_quality if line == ORDER1 or self._unit.has_vortex else _switched_off
+        read = self._line_quality if line == ORDER1 else self._vortex_quality
         return OrderLine(
             self._bearing,
             self._settings,
@@ -194,7 +195,46 @@ class BearingResults:
         speed = self._segments[-1].speed.rpm
         if speed.value is None:
             return speed
+        if line == ORDER1:
+            return Reading(float(self._orders.frequency_hz[line]), speed.quality)
+        qualities = [self._vortex_quality(shaft) for shaft in (SHAFT_X, SHAFT_Y)]
+        known = [q for q in qualities if isinstance(q, Quality)]
+        quality = known[0] if known else qualities[0]
+        if quality == missing(Reason.OUTSIDE_BAND):
+            return Reading(self._other_line_hz, uncertain(Reason.OUTSIDE_BAND))
+        if isinstance(quality, Reading):
+            return quality
         return Reading(float(self._orders.frequency_hz[line]), speed.quality)
+
+    def _vortex_quality(self, *places: int) -> Quality | Reading:
+        """As `_line_quality`, at the vortex: nothing is read where there is none."""
+        if not self._unit.has_vortex:
+            return missing(Reason.SWITCHED_OFF)
+        quality = self._line_quality(*places)
+        if isinstance(quality, Reading):
+            return quality
+        if quality.reason is Reason.FEW_SEGMENTS:
+            return missing(Reason.FEW_SEGMENTS)
+        return self._no_vortex or quality
+
+    @cached_property
+    def _no_vortex(self) -> Reading | None:
+        """Why no vortex shows in this bearing; None if one does."""
+        if self._segments[-1].has_vortex_peak and self._order_line(VORTEX).is_of_shaft:
+            return None
+        found = self._other_line_hz
+        return missing(Reason.NO_VORTEX if found is None else Reason.OUTSIDE_BAND)
+
+    @cached_property
+    def _other_line_hz(self) -> float | None:
+        turn_hz = float(self._orders.frequency_hz[ORDER1])
+        low, high = self._settings.vortex_band
+        return other_line_hz(
+            self.spectrum,
+            turn_hz,
+            (low * turn_hz, high * turn_hz),
+            self._settings.min_line_to_floor,
+        )
 
     def _line_quality(self, *places: int) -> Quality | Reading:
         """Quality of what is read off a line of these channels, or the reason why nothing is."""
@@ -220,7 +260,3 @@ def _now(newest: Segment, row: int) -> Quality:
 
 def _numbers(readings: Sequence[Reading]) -> FloatArray:
     return np.array([np.nan if r.value is None else r.value for r in readings])
-
-
-def _switched_off(*places: int) -> Reading:  # noqa: ARG001  the same whatever is asked for
-    return missing(Reason.SWITCHED_OFF)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
-from core.quality import Reading, missing
+from core.quality import Reading, Reason, missing
 
 
 class Estimator(StrEnum):
@@ -40,6 +40,8 @@ def preferred_stiffness(
 ) -> tuple[Reading, Estimator | None]:
     """Take the first estimator in order of preference that is good, else the first with a number.
 
+    A number of few segments is no stiffness yet: a single segment makes any noise coherent.
+
     Parameters
     ----------
     axes
@@ -50,7 +52,11 @@ def preferred_stiffness(
     Without any number: why the first choice has none, and no estimator.
     """
     found = [(readings[STIFFNESS_OF[e].format(axes=axes)], e) for e in preference]
-    numbers = [choice for choice in found if choice[0].value is not None]
+    numbers = [
+        (reading, estimator)
+        for reading, estimator in found
+        if reading.value is not None and reading.quality.reason is not Reason.FEW_SEGMENTS
+    ]
     if numbers:
         return min(numbers, key=lambda choice: choice[0].quality.level)
     return missing(found[0][0].quality.reason), None

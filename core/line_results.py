@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.arrays import FloatArray
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.excitation import LineLimits, line_excitation
 from core.machine import Bearing
@@ -17,7 +18,7 @@ from core.spectral_statistics import independent_segments
 from core.stiffness_budget import ratio_budget, transfer_budgets
 from core.transfer import line_transfer
 from core.uncertainty import Budget
-from core.whirl import roundness
+from core.whirl import roundness, vortex_frequency_hz
 
 FLOOR_REACH = 12
 """Bins to each side of a line in which its surroundings are judged."""
@@ -181,16 +182,78 @@ class OrderLine:
         reason = line_excitation(self.orders, self.line, shaft, bearing, limits)
         return Reason.OK if few and reason is Reason.FEW_SEGMENTS else reason
 
+    @property
+    def is_of_shaft(self) -> bool:
+        """Whether the shaft moves at the line, in one direction at least."""
+        return self._stands_out(SHAFT_X) or self._stands_out(SHAFT_Y)
+
     def _stands_out(self, place: int) -> bool:
         """Whether the line stands above its surroundings, less those of the other order line."""
-        frequency_hz = self.bins.frequency_hz
-        positions = (self.orders.frequency_hz / (frequency_hz[1] - frequency_hz[0])).round() - 1
-        number = np.arange(frequency_hz.size)
-        near = np.abs(number - positions[self.line]) <= FLOOR_REACH
-        in_lobe = (np.abs(number[:, np.newaxis] - positions) <= MAIN_LOBE).any(axis=1)
-        floor = np.median(self.bins.power[near & ~in_lobe, place, place])
+        lines_hz = self.orders.frequency_hz
+        floor = floor_power(self.bins, place, float(lines_hz[self.line]), lines_hz)
         peak = self.orders.power[self.line, place, place]
         return bool(peak > self.settings.min_line_to_floor * floor)
+
+
+def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
+    """Where to mark a line in a spectrum; None if there is none, or it is not the one meant.
+
+    Parameters
+    ----------
+    line
+        "order1" or "vortex".
+    """
+    reading = readings[f"{line}_frequency_hz"]
+    return None if reading.quality.reason is Reason.OUTSIDE_BAND else reading.value
+
+
+def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: FloatArray) -> float:
+    """Median power of a channel around a line, µm².
+
+    Parameters
+    ----------
+    bins
+        Cross-spectrum at evenly spaced frequencies.
+    lines_hz
+        Lines whose main lobes are left out.
+    """
+    bin_hz = bins.frequency_hz[1] - bins.frequency_hz[0]
+    number = np.arange(bins.frequency_hz.size)
+    near = np.abs(number - (round(line_hz / bin_hz) - 1)) <= FLOOR_REACH
+    positions = (lines_hz / bin_hz).round() - 1
+    in_lobe = (np.abs(number[:, np.newaxis] - positions) <= MAIN_LOBE).any(axis=1)
+    return float(np.median(bins.power[near & ~in_lobe, place, place]))
+
+
+def other_line_hz(
+    bins: CrossSpectrum, turn_hz: float, band_hz: tuple[float, float], min_line_to_floor: float
+) -> float | None:
+    """Frequency of a line below 1×, outside the vortex band, that shaft and bearing share.
+
+    Parameters
+    ----------
+    bins
+        Cross-spectrum at evenly spaced frequencies.
+    band_hz
+        In which the vortex is looked for.
+
+    Returns
+    -------
+    None if no such line stands out.
+    """
+    bin_hz = float(bins.frequency_hz[1] - bins.frequency_hz[0])
+    margin_hz = (MAIN_LOBE + 1) * bin_hz
+    for low, high in ((margin_hz, band_hz[0]), (band_hz[1], turn_hz - margin_hz)):
+        found_hz = vortex_frequency_hz([bins], (low, high)) if low < high else None
+        if found_hz is None:
+            continue
+        peak = round(found_hz / bin_hz) - 1
+        lines_hz = np.array([found_hz, turn_hz])
+        for place in (SHAFT_X, SHAFT_Y):
+            floor = floor_power(bins, place, found_hz, lines_hz)
+            if bins.power[peak, place, place] > min_line_to_floor * floor:
+                return found_hz
+    return None
 
 
 def _names(axes: str) -> tuple[str, str, str, str]:

@@ -28,6 +28,8 @@ class Reason(StrEnum):
     SPEED_UNKNOWN = "speed_unknown"
     STANDSTILL = "standstill"
     FEW_SEGMENTS = "few_segments"
+    NO_VORTEX = "no_vortex"
+    OUTSIDE_BAND = "outside_band"
     LOW_COVERAGE = "low_coverage"
     INSUFFICIENT_EXCITATION = "insufficient_excitation"
     POOR_FIT = "poor_fit"

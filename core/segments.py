@@ -50,7 +50,9 @@ class Segment:
     bin_phasors_um_pk
         (n_channels, n_lines) displacement phasors at the bins above zero.
     order_frequency_hz
-        (2,) exact frequencies of 1× and of the vortex.
+        (2,) exact frequencies of 1× and of the vortex; of its nominal order where there is no peak.
+    has_vortex_peak
+        Whether a line that bearings share has its peak in the vortex band, up to this segment.
     order_phasors_um_pk
         (n_channels, 2) displacement phasors at exactly these, 1× without runout where that can be
         taken off.
@@ -75,6 +77,7 @@ class Segment:
     speed: Speed
     bin_phasors_um_pk: ComplexArray
     order_frequency_hz: FloatArray
+    has_vortex_peak: bool
     order_phasors_um_pk: ComplexArray
     runout: Mapping[str, RunoutVerdict]
     overall: Overall
@@ -141,7 +144,9 @@ class SegmentTransform:
         speed = self._speed(window, bins, _usable(quality), key_phase)
         clipped = self._clipped(quality, samples)
         quality = self._judged(quality, samples, mean, speed)
-        order_hz = self._order_frequencies(speed, bins, _usable(quality))
+        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        vortex_hz = self._vortex_hz(turn_hz, bins, _usable(quality))
+        order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
         orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
         segment = Segment(
             epoch=window.epoch,
@@ -154,6 +159,7 @@ class SegmentTransform:
             speed=speed,
             bin_phasors_um_pk=bins,
             order_frequency_hz=order_hz,
+            has_vortex_peak=vortex_hz is not None,
             order_phasors_um_pk=orders,
             runout=runout,
             overall=self._overall.of(samples, lines),
@@ -241,15 +247,9 @@ class SegmentTransform:
         )
         return phasors, runout
 
-    def _order_frequencies(
-        self, speed: Speed, bins: ComplexArray, usable: npt.NDArray[np.bool_]
-    ) -> FloatArray:
-        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
-        return np.array([turn_hz, self._vortex_hz(turn_hz, bins, usable)])
-
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
-    ) -> float:
+    ) -> float | None:
         """Where the bearings share a line: over all segments, for one resolves a rope poorly."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
@@ -265,7 +265,7 @@ class SegmentTransform:
             average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
             for rows in self._bearing_rows
         ]
-        return vortex_frequency_hz(spectra, band_hz) or self._settings.vortex_order * turn_hz
+        return vortex_frequency_hz(spectra, band_hz)
 
 
 def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:

@@ -167,6 +167,7 @@ class PollReader:
             speed=speed,
             bin_phasors_um_pk=np.zeros((n_channels, 0), dtype=np.complex128),
             order_frequency_hz=order_hz,
+            has_vortex_peak=False,
             order_phasors_um_pk=np.zeros((n_channels, 2), dtype=np.complex128),
             runout={channel.id: RunoutVerdict.NO_VECTOR for channel in self._unit.channels},
             overall=Overall.of_nothing(n_channels, len(self._unit.bearings)),

@@ -2,6 +2,7 @@
 
 from core.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from core.line_results import marked_hz
 from core.quality import Level, Quality, Reading
 from core.quantities import BY_NAME
 from core.uncertainty import Budget
@@ -201,7 +202,7 @@ def spectrum_model(assessment: Assessment) -> SpectrumModel:
             )
             for name, place in PLACES.items()
         },
-        lines={name: readings[f"{name}_frequency_hz"].value for name in ("order1", "vortex")},
+        lines={name: marked_hz(readings, name) for name in ("order1", "vortex")},
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from core.arrays import FloatArray
 from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
+from core.line_results import marked_hz
 from core.quality import Level, Quality, Reason, worst
 from service.store.database import Connect, Connection
 from service.store.series import series_of
@@ -104,7 +105,7 @@ def _amplitudes(assessment: Assessment) -> FloatArray:
 def _facts(assessment: Assessment, series: int) -> tuple[object, ...]:
     readings, condition = assessment.readings, assessment.condition
     quality = worst(readings[name].quality for name in JUDGED)
-    names = ("speed_rpm", "power_mw", "order1_frequency_hz", "vortex_frequency_hz")
+    lines_hz = [marked_hz(readings, line) for line in ("order1", "vortex")]
     return (
         series,
         int(assessment.time_ns),
@@ -113,7 +114,7 @@ def _facts(assessment: Assessment, series: int) -> tuple[object, ...]:
         int(OperatingState.UNKNOWN if condition is None else condition.state),
         int(quality.level),
         quality.reason.value,
-        *(_number(readings[name].value) for name in names),
+        *map(_number, (readings["speed_rpm"].value, readings["power_mw"].value, *lines_hz)),
         float(assessment.spectrum.frequency_hz[0]),
     )
 

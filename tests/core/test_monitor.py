@@ -12,7 +12,7 @@ from core.assessment import Assessment
 from core.blocks import UNCOUNTED_LOSS, Rejection, SampleBlock
 from core.machine import Unit
 from core.monitor import UnitMonitor
-from core.quality import Level, Reason, bad, missing
+from core.quality import Level, Reason, bad, missing, uncertain
 from core.settings import AnalysisSettings
 from core.speed import SpeedSource
 
@@ -86,22 +86,45 @@ def test_a_vortex_off_its_nominal_order_is_found_and_read_true(results: Results,
     assert newest["vortex_k_eff_xx_n_per_m"].value == pytest.approx(1.18e9 / 4, rel=0.01)
 
 
-@pytest.mark.parametrize("duration_s", [14.0, 200.0], ids=["one segment", "many segments"])
-def test_without_a_vortex_there_is_no_stiffness_there(
-    results: Results, signals, duration_s: float
+@pytest.mark.parametrize("coherent_um", [0.0, 2.0], ids=["noise alone", "hydraulic noise"])
+def test_without_a_vortex_there_is_no_vortex_quantity(
+    results: Results, signals, coherent_um: float
 ) -> None:
-    newest = results(signals(duration_s, noise_um=1.0))[-1].readings
-    assert newest["vortex_k_eff_xx_n_per_m"] == missing(Reason.INSUFFICIENT_EXCITATION)
-    assert newest["order1_k_eff_xx_n_per_m"].value is not None
-
-
-def test_coherent_noise_without_a_line_is_no_vortex(results: Results, signals) -> None:
     """Full load: hydraulic noise moves shaft and bearing together at every frequency."""
-    rows = signals(200.0)
-    common = np.random.default_rng(8).normal(size=rows.shape[1])
-    newest = results(rows + np.array([[-6.0], [-6.0], [2.0], [2.0]]) * common)[-1].readings
-    assert newest["vortex_coherence_xx"].value > 0.95
-    assert newest["vortex_k_eff_xx_n_per_m"].quality == bad(Reason.INSUFFICIENT_EXCITATION)
+    rows = signals(90.0, noise_um=1.0)
+    common = coherent_um * np.random.default_rng(8).normal(size=rows.shape[1])
+    found = results(rows + np.array([[-3.0], [-3.0], [1.0], [1.0]]) * common)
+    for number, assessment in enumerate(found):
+        reason = Reason.FEW_SEGMENTS if number < 3 else Reason.NO_VORTEX
+        of_vortex = {q: r for q, r in assessment.readings.items() if q.startswith("vortex_")}
+        assert set(of_vortex.values()) == {missing(reason)}
+    assert found[-1].readings["order1_k_eff_xx_n_per_m"].value is not None
+
+
+def test_a_few_segments_give_no_preferred_stiffness(results: Results, signals) -> None:
+    """One segment makes any noise coherent."""
+    found = results(signals(90.0))
+    for axes in ("xx", "yy"):
+        preferred = [a.readings[f"stiffness_{axes}_n_per_m"] for a in found]
+        assert preferred[:3] == [missing(Reason.FEW_SEGMENTS)] * 3
+        assert preferred[3].value == pytest.approx(1.18e9 / 3, rel=0.01)
+        assert [a.estimators[axes] for a in found[:3]] == [None] * 3
+
+
+@pytest.mark.parametrize("order", [0.16, 0.47])
+def test_a_line_beside_the_vortex_band_is_told_and_is_no_vortex(
+    results: Results, signals, order: float
+) -> None:
+    rows = signals(90.0, noise_um=1.0)
+    rope = 2 * np.pi * order * 92.3 / 60 * np.arange(rows.shape[1]) / RATE_HZ
+    rows[0] -= 30.0 * np.cos(rope)
+    rows[2] += 10.0 * np.cos(rope)
+    newest = results(rows)[-1].readings
+    frequency = newest["vortex_frequency_hz"]
+    assert frequency.value == pytest.approx(order * 92.3 / 60, rel=0.01)
+    assert frequency.quality == uncertain(Reason.OUTSIDE_BAND)
+    for name in ("vortex_shaft_x_um_pk", "vortex_k_eff_xx_n_per_m", "vortex_roundness"):
+        assert newest[name] == missing(Reason.OUTSIDE_BAND)
 
 
 @pytest.mark.parametrize("n_seeds", fast_and_long(8, 100))

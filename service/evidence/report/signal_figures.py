@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from core.quality import Reason
 from service.evidence.bearing_part import BearingPart
 from service.evidence.plots.plot import Plot
 from service.evidence.plots.scales import Scale
@@ -55,7 +56,8 @@ def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
     lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
     for row, (name, words) in enumerate(lines):
         reading = bearing.readings.get(name)
-        if reading is not None and reading.value is not None:
+        is_there = reading is not None and reading.reason != Reason.OUTSIDE_BAND
+        if reading is not None and is_there and reading.value is not None:
             plot.upright(reading.value, "marked", words, row)
 
 
