@@ -14,7 +14,7 @@ from core.key_phase import KeyPhase, read_key_phase
 from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.overall import Overall, OverallTransform
-from core.quality import Level, Quality, Reading, Reason, bad, uncertain, worst
+from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
 from core.runout import RunoutVerdict
 from core.segment_runout import shaft_angle_rad, without_runout
 from core.sensor_checks import (
@@ -32,6 +32,8 @@ from core.whirl import vortex_frequency_hz
 
 OUTSIDE = uncertain(Reason.SENSOR_FAILURE)
 """Of a channel with a block whose mean lies outside its OK limits."""
+
+CLIPPED = bad(Reason.CLIPPED)
 
 ORDER1, VORTEX = range(2)
 """Where the two order lines stand in `Segment.order_phasors_um_pk`."""
@@ -92,7 +94,7 @@ class Segment:
     def is_grazed(self, row: int) -> bool:
         """Whether a channel is left out for a few clipped samples alone."""
         few = 0.0 < self.clipped_share[row] <= MAX_CLIPPED_SHARE
-        return bool(few) and self.channel_quality[row].reason is Reason.CLIPPED
+        return bool(few) and self.channel_quality[row] == CLIPPED
 
 
 class SegmentTransform:
@@ -189,23 +191,22 @@ class SegmentTransform:
         turning, limits = speed.rpm.value is not None, self._settings.sensors
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         turn_samples = round(self._unit.rate_hz / turn_hz)
-        moved = zip(self._unit.channels, quietest_rms(samples), mean, samples, strict=True)
-        return tuple(
-            worst(
-                (
-                    q if q != OUTSIDE else level_quality(own, turn_samples, c.ok_limits),
-                    signal_quality(rms, at, c.unit_per_count, turning, limits),
-                )
-            )
-            for q, (c, rms, at, own) in zip(quality, moved, strict=True)
-        )
+        found = []
+        moved = zip(quality, self._unit.channels, quietest_rms(samples), mean, samples, strict=True)
+        for before, channel, rms, at, own in moved:
+            signal = signal_quality(rms, at, channel.unit_per_count, turning, limits)
+            if before in (OUTSIDE, CLIPPED):
+                # a cable that breaks clips first: that it is lost counts for more
+                level = level_quality(own, turn_samples, channel.ok_limits)
+                found.append(worst((signal, level, GOOD if before == OUTSIDE else before)))
+            else:
+                found.append(worst((before, signal)))
+        return tuple(found)
 
     def _clipped(self, quality: tuple[Quality, ...], samples: FloatArray) -> FloatArray:
         return np.array(
             [
-                clipped_share(own, c.unit_per_count)
-                if q.reason is Reason.CLIPPED and c.unit_per_count
-                else 0.0
+                clipped_share(own, c.unit_per_count) if q == CLIPPED and c.unit_per_count else 0.0
                 for q, c, own in zip(quality, self._unit.channels, samples, strict=True)
             ]
         )

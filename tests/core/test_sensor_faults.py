@@ -9,7 +9,7 @@ import pytest
 from core.assessment import Assessment
 from core.machine import Unit
 from core.monitor import UnitMonitor
-from core.quality import Reading, Reason, bad, uncertain
+from core.quality import Level, Reading, Reason, bad, uncertain
 from core.settings import AnalysisSettings
 from core.speed import SpeedSource
 
@@ -45,11 +45,12 @@ def test_a_clipped_sample_costs_its_segment_and_not_the_results(
     converter = tuple(replace(c, unit_per_count=0.1) for c in unit.channels)
     monitor = UnitMonitor(replace(unit, channels=converter), AnalysisSettings())
     rows = signals(90.0)
-    rows[2, -5000 : -5000 + n_clipped] = 3276.7
+    where = rows.shape[1] - 5000 - 39 * np.arange(n_clipped)
+    rows[2, where] = np.resize([3276.7, -3276.8], n_clipped)
     clipped = bad(Reason.CLIPPED)
     found = []
     for block in blocks(rows):
-        at_end = bool((block.samples[2] > 3276.6).any())
+        at_end = bool((np.abs(block.samples[2]) > 3276.6).any())
         qualities = (*block.channel_quality[:2], clipped, block.channel_quality[3])
         found += monitor.ingest(replace(block, channel_quality=qualities) if at_end else block)
     newest, expected = found[-1], uncertain(Reason.CLIPPED) if is_few else clipped
@@ -59,6 +60,24 @@ def test_a_clipped_sample_costs_its_segment_and_not_the_results(
         before = found[-2].readings[name].value
         assert newest.readings[name].value == (pytest.approx(before, rel=1e-3) if is_few else None)
     assert newest.readings["order1_bearing_y_um_pk"].quality.reason is Reason.OK
+
+
+def test_a_cable_that_clips_as_it_breaks_is_lost_at_once(unit: Unit, blocks, signals) -> None:
+    converter = tuple(replace(c, unit_per_count=0.1) for c in unit.channels)
+    monitor = UnitMonitor(replace(unit, channels=converter), AnalysisSettings())
+    rows, found = signals(60.0), []
+    rows[0, 29000:] = 0.0  # the last segment ends at 29,696
+    rows[0, 29000:29010] = 3276.7
+    for block in blocks(rows):
+        is_clipped = bool((block.samples[0] > 3276.6).any())
+        quality = bad(Reason.CLIPPED) if is_clipped else block.channel_quality[0]
+        qualities = (quality, *block.channel_quality[1:])
+        found += monitor.ingest(replace(block, channel_quality=qualities))
+    newest = found[-1]
+    assert newest.window.stop_index == 29696
+    assert newest.clipped_share["shaft_x"] == pytest.approx(10 / 8192)
+    for name in ("order1_shaft_x_um_pk", "gap_x_um", "stiffness_xx_n_per_m"):
+        assert newest.readings[name].quality.level is Level.BAD
 
 
 def test_nothing_need_move_while_the_machine_stands(in_counts: Unit, results: Results) -> None:
