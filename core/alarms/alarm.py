@@ -5,6 +5,7 @@ from enum import IntEnum, StrEnum
 from functools import cached_property
 
 from core.alarms.delays import RESTED, DelayTimer
+from core.condition.bearing_condition import OperatingPoint
 
 
 class AlarmLevel(IntEnum):
@@ -116,6 +117,8 @@ class Condition:
         Why it is so, in a word; "ok" if all is well.
     suppressed_by
         Why, by design, the alarm counts for nothing now; None if it counts.
+    point
+        Under which operating condition, where that is known of a level.
     """
 
     level: AlarmLevel | None = None
@@ -124,6 +127,7 @@ class Condition:
     limit: float | None = None
     reason: str = "ok"
     suppressed_by: str | None = None
+    point: OperatingPoint | None = None
 
 
 WITHIN = Condition()
@@ -184,6 +188,8 @@ class Alarm:
         Whether somebody has seen this occurrence.
     raised_ns
         When this occurrence began.
+    raised_at
+        Under which operating condition; None where that was not known.
     n_events
         How many events it has had; the newest has this number.
     condition
@@ -203,6 +209,7 @@ class Alarm:
     occurrence: int = 0
     is_acknowledged: bool = True
     raised_ns: int | None = None
+    raised_at: OperatingPoint | None = None
     n_events: int = 0
     condition: Condition = NEVER_JUDGED
     suppressed_by: str | None = None

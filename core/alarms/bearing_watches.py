@@ -73,5 +73,5 @@ def _watches(
             is_there = kind not in OPPOSITE or getattr(bearing, OPPOSITE[kind]) is not None
             if rule is not None and is_there:
                 identity = AlarmIdentity(unit, bearing.id, kind)
-                watches.append(LimitWatch(identity, rule.rule, source, rule.by_state))
+                watches.append(LimitWatch(identity, rule.rule, source, rule.by_condition))
     return tuple(watches)

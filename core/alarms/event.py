@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmLevel, AlarmState
+from core.condition.bearing_condition import OperatingPoint
 
 
 class AlarmChange(StrEnum):
@@ -50,6 +51,8 @@ class AlarmEvent:
         Who did it; empty if nobody did.
     reason
         Why, in a word or in the words of the actor.
+    raised_at
+        Under which operating condition that occurrence was raised; None where that was not known.
     """
 
     identity: AlarmIdentity
@@ -64,6 +67,7 @@ class AlarmEvent:
     limit: float | None = None
     actor: str = ""
     reason: str = ""
+    raised_at: OperatingPoint | None = None
 
 
 @dataclass(frozen=True)
@@ -114,5 +118,6 @@ def changed(
         limit=after.condition.limit,
         actor=actor,
         reason=reason,
+        raised_at=after.raised_at,
     )
     return after, event

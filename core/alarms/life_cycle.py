@@ -100,6 +100,7 @@ def _announce(events: list[AlarmEvent], alarm: Alarm, level: AlarmLevel, now_ns:
         occurrence=alarm.occurrence + 1,
         is_acknowledged=False,
         raised_ns=now_ns,
+        raised_at=alarm.condition.point,
         is_latched=held is not None and held > level,
     )
     rises = held is not None and not alarm.is_latched

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from core.alarms.alarm import Alarm
-from core.condition.operating_state import OperatingState
+from core.condition.bearing_condition import OperatingPoint
 from core.quality import Reason
 
 
@@ -18,8 +18,8 @@ class AlarmMemory:
         With their delays.
     segment_faults
         What only segments show of channels, by channel.
-    state, state_ns
-        Newest operating state, and when that was.
+    points
+        Newest operating condition of each bearing, and when that was.
     stop
         Epoch and index up to which blocks were taken in.
     is_connected, link_reason
@@ -28,8 +28,7 @@ class AlarmMemory:
 
     alarms: tuple[Alarm, ...]
     segment_faults: Mapping[str, Reason]
-    state: OperatingState | None
-    state_ns: int
+    points: Mapping[str, tuple[OperatingPoint, int]]
     stop: tuple[int, int] | None
     is_connected: bool
     link_reason: str | None

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 from core.alarms.alarm import AlarmRule
+from core.alarms.condition_limits import EVERY_STATE, ConditionLimits, Region, States
 from core.alarms.limits import Limits
-from core.alarms.state_limits import EVERY_STATE, StateLimits, States
 from core.units import ns_from_s
 
 
@@ -21,23 +21,26 @@ class LimitRule:
     ----------
     states
         Operating states in which it counts.
+    tables
+        Regions of the condition in which other limits hold instead.
     """
 
     limits: Limits
     rule: AlarmRule
     states: States = EVERY_STATE
+    tables: tuple[tuple[Region, Limits], ...] = ()
 
     @property
-    def by_state(self) -> StateLimits:
-        """The limits with the states in which they hold."""
-        return StateLimits.single(self.limits, self.states)
+    def by_condition(self) -> ConditionLimits:
+        """The limits with the conditions under which they hold."""
+        return ConditionLimits(self.tables, (Region(self.states), self.limits))
 
 
 @dataclass(frozen=True)
 class ZoneRule:
-    """A value in a zone that is not for long operation; zones differ from state to state."""
+    """A value in a zone that is not for long operation; zones differ by condition."""
 
-    by_state: StateLimits
+    by_condition: ConditionLimits
     rule: AlarmRule
 
 

@@ -1,9 +1,11 @@
 """`UnitAlarms`: all alarms of one unit, and what samples, results, links and people do to them."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from core.alarms.alarm import Alarm, Condition, unknown
 from core.alarms.board import AlarmBoard
+from core.alarms.condition_limits import point_of, worst_of
 from core.alarms.conditions import (
     SENSOR_FAULTS,
     channel_condition,
@@ -17,12 +19,12 @@ from core.alarms.event import AlarmNews
 from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
 from core.alarms.rules import UnitRules
-from core.alarms.state_limits import outside, state_of
 from core.alarms.vector_change import VectorReference, vector_condition
-from core.alarms.watch import LimitWatch
-from core.alarms.watch_list import watch_list
+from core.alarms.watch import LimitWatch, Watch
+from core.alarms.watch_list import DEVICE, watch_list
 from core.assessment import Assessment
 from core.blocks import SampleBlock
+from core.condition.bearing_condition import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.line_results import AMPLITUDES, DIRECTIONS
 from core.machine import Unit
@@ -32,8 +34,8 @@ from core.units import NS_PER_S
 
 NOT_THERE = missing(Reason.NOT_MEASURED)
 
-STATE_HOLDS_NS = 300 * NS_PER_S
-"""For how long a result's operating state is taken for that of slow channels, too."""
+POINT_HOLDS_NS = 300 * NS_PER_S
+"""For how long a result's operating condition is taken for that of what no result is, too."""
 
 
 class UnitAlarms:
@@ -64,10 +66,13 @@ class UnitAlarms:
             for watch in self._watched.channels
         }
         self._channels_of = {bearing.id: bearing.channels for bearing in unit.bearings}
+        self._bearing_of = {
+            id_: bearing.id for bearing in unit.bearings for id_ in bearing.channels
+        }
         self._references = {(r.bearing, r.state): r for r in references}
         self._segment_faults: dict[str, Reason] = {}
         self._clipped_percent: dict[str, float] = {}
-        self._state: tuple[OperatingState | None, int] = (None, 0)
+        self._points: dict[str, tuple[OperatingPoint, int]] = {}
         self._stop: tuple[int, int] | None = None
         self._resting_with: tuple[Quality, ...] | None = None
         self._link: tuple[bool, str | None] = (False, None)
@@ -111,11 +116,11 @@ class UnitAlarms:
         self._take_channels(block)
         for watch in self._watched.slow_channels:
             reading = block.slow.get(watch.source, NOT_THERE)
-            self._board.find(watch, slow_channel_condition(reading), block.stop_ns)
-        state = self._recent_state(block.stop_ns)
+            self._find(watch, slow_channel_condition(reading), block.stop_ns)
         for warmth in self._watched.temperatures:
             reading = block.slow.get(warmth.source, NOT_THERE)
-            self._compare(warmth, reading, block.stop_ns, state)
+            point = self._recent_point(warmth.identity.subject, block.stop_ns)
+            self._compare(warmth, reading, block.stop_ns, point)
         self._take_clock(block, host_ns)
         return self._board.told()
 
@@ -136,7 +141,8 @@ class UnitAlarms:
         """
         films = {watch.id: watch for watch in self._watched.films}
         for id_, condition in conditions.items():
-            self._board.advance(films[id_].id, condition, now_ns)
+            point = self._recent_point(films[id_].source, now_ns)
+            self._board.advance(films[id_].id, _at(point, condition), now_ns)
         return self._board.told()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
@@ -197,14 +203,14 @@ class UnitAlarms:
         return AlarmMemory(
             tuple(self._board.alarms),
             dict(self._segment_faults),
-            *self._state,
+            dict(self._points),
             self._stop,
             *self._link,
         )
 
     def _resume(self, memory: AlarmMemory) -> None:
         self._segment_faults = dict(memory.segment_faults)
-        self._state = (memory.state, memory.state_ns)
+        self._points = dict(memory.points)
         self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
         if self._watched.link is not None:
             self._link = memory.link_by(self._board.alarm(self._watched.link.id))
@@ -229,29 +235,43 @@ class UnitAlarms:
         for axes, places in DIRECTIONS.items():
             for row in places:
                 self._note_sign(self._channels_of[bearing][row], is_reversed(readings, axes))
-        state = state_of(assessment)
-        self._state = (state, now_ns)
+        point = point_of(assessment)
+        self._points[bearing] = (point, now_ns)
         for watch in self._watched.readings[bearing]:
             held = self._board.alarm(watch.id).condition.level
-            condition = watch.limits.judge(readings[watch.source], state, held)
-            self._board.advance(watch.id, condition, now_ns)
+            condition = watch.limits.judge(readings[watch.source], point, held)
+            self._board.advance(watch.id, _at(point, condition), now_ns)
         for watch in self._watched.changes[bearing]:
-            self._board.advance(watch.id, self._change(watch, assessment, state), now_ns)
+            condition = self._change(watch, assessment, point)
+            self._board.advance(watch.id, _at(point, condition), now_ns)
 
     def _change(
-        self, watch: LimitWatch, assessment: Assessment, state: OperatingState | None
+        self, watch: LimitWatch, assessment: Assessment, point: OperatingPoint
     ) -> Condition:
         """What a 1× vector says against the reference of the present state."""
-        limits = watch.limits.at(state)
-        if limits is None:
-            return outside(state)
-        reference = self.reference(assessment.bearing, state or OperatingState.UNKNOWN)
+        reference = self.reference(assessment.bearing, point.state)
         held = self._board.alarm(watch.id).condition.level
-        return vector_condition(assessment.readings, watch.source, reference, limits, held)
+        readings, place = assessment.readings, watch.source
+        found = (
+            vector_condition(readings, place, reference, limits, held)
+            for limits in watch.limits.at(point)
+        )
+        return worst_of(found, point)
 
-    def _recent_state(self, now_ns: int) -> OperatingState | None:
-        state, seen_ns = self._state
-        return state if abs(now_ns - seen_ns) <= STATE_HOLDS_NS else None
+    def _recent_point(self, subject: str, now_ns: int) -> OperatingPoint:
+        """Condition of a bearing by its newest result; of anything else, the unit's state."""
+        point, seen_ns = self._points.get(subject) or (NOWHERE_KNOWN, now_ns)
+        if subject not in self._points and self._points:
+            newest, seen_ns = max(self._points.values(), key=lambda found: found[1])
+            point = OperatingPoint(newest.state)
+        return point if abs(now_ns - seen_ns) <= POINT_HOLDS_NS else NOWHERE_KNOWN
+
+    def _find(self, watch: Watch, condition: Condition, now_ns: int) -> None:
+        """Take in what is found of a channel, the device or its link."""
+        if condition.level is not None:
+            subject = self._bearing_of.get(watch.source, watch.source)
+            condition = _at(self._recent_point(subject, now_ns), condition)
+        self._board.find(watch, condition, now_ns)
 
     def _note_segment(self, channel: str, reading: Reading) -> None:
         """Remember what only a segment shows of a channel, until another one shows otherwise."""
@@ -277,7 +297,7 @@ class UnitAlarms:
         watches = self._watched.channels
         for watch in watches:
             condition = self._channel_condition(watch.source, block)
-            self._board.find(watch, condition, block.stop_ns)
+            self._find(watch, condition, block.stop_ns)
         resting = all(self._board.alarm(watch.id).is_resting for watch in watches)
         self._resting_with = block.channel_quality if resting else None
 
@@ -291,23 +311,30 @@ class UnitAlarms:
 
     def _take_clock(self, block: SampleBlock, host_ns: int) -> None:
         offset, drift, stamps = self._watched.offset, self._watched.drift, self._watched.stamps
+        point = self._recent_point(DEVICE, block.stop_ns)
         if offset is not None:
-            self._compare(offset, offset_reading(block.clock), host_ns)
+            self._compare(offset, offset_reading(block.clock), host_ns, point)
         if drift is not None:
-            self._compare(drift, drift_reading(block.clock), host_ns)
+            self._compare(drift, drift_reading(block.clock), host_ns, point)
         if stamps is not None:
-            self._board.find(stamps, stamp_condition(block.stamp_fault), host_ns)
+            self._find(stamps, stamp_condition(block.stamp_fault), host_ns)
 
     def _take_link(self, host_ns: int) -> None:
         if self._watched.link is not None:
-            self._board.find(self._watched.link, link_condition(*self._link), host_ns)
+            self._find(self._watched.link, link_condition(*self._link), host_ns)
 
     def _compare(
-        self, watch: LimitWatch, reading: Reading, now_ns: int, state: OperatingState | None = None
+        self, watch: LimitWatch, reading: Reading, now_ns: int, point: OperatingPoint
     ) -> None:
         alarm, value = self._board.alarm(watch.id), reading.value
-        limits = watch.limits.at(state)
-        if limits and alarm.is_resting and value is not None and limits.is_within(value):
+        limits = watch.limits.at(point)
+        is_within = value is not None and bool(limits) and all(x.is_within(value) for x in limits)
+        if is_within and alarm.is_resting:
             return  # as nearly always
-        condition = watch.limits.judge(reading, state, alarm.condition.level)
-        self._board.find(watch, condition, now_ns)
+        condition = watch.limits.judge(reading, point, alarm.condition.level)
+        self._board.find(watch, _at(point, condition), now_ns)
+
+
+def _at(point: OperatingPoint, condition: Condition) -> Condition:
+    """What was found, with the operating condition under which it was, where it is a level."""
+    return condition if condition.level is None else replace(condition, point=point)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from core.alarms.alarm import AlarmIdentity, AlarmRule
-from core.alarms.state_limits import StateLimits
+from core.alarms.condition_limits import ConditionLimits
 
 
 @dataclass(frozen=True)
@@ -31,4 +31,4 @@ class Watch:
 class LimitWatch(Watch):
     """One that compares a value with limits."""
 
-    limits: StateLimits
+    limits: ConditionLimits

@@ -90,7 +90,7 @@ def _channel(unit: Unit, channel: str, rule: AlarmRule) -> Watch:
 
 
 def _limit(unit: Unit, subject: str, kind: AlarmKind, rule: LimitRule, source: str) -> LimitWatch:
-    return LimitWatch(_identity(unit, subject, kind), rule.rule, source, rule.by_state)
+    return LimitWatch(_identity(unit, subject, kind), rule.rule, source, rule.by_condition)
 
 
 def _offset(unit: Unit, clock: ClockRules | None) -> LimitWatch | None:

@@ -1,9 +1,23 @@
-"""`BearingCondition`: under which condition a bearing ran at one moment."""
+"""Under which condition a bearing ran at one moment: `BearingCondition`, `OperatingPoint`."""
 
 from dataclasses import dataclass
 
 from core.condition.cells import Cell
 from core.condition.operating_state import OperatingState
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Operating state, eccentricity, attitude and oil temperature; None where not known."""
+
+    state: OperatingState = OperatingState.UNKNOWN
+    eccentricity_ratio: float | None = None
+    attitude_deg: float | None = None
+    oil_temperature_c: float | None = None
+
+
+NOWHERE_KNOWN = OperatingPoint()
+"""Of which nothing is known."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """From the plant file's settings to the rules of a unit."""
 
 from core.alarms.chatter import ChatterRule
+from core.alarms.condition_limits import ConditionLimits
 from core.alarms.limits import Limits
 from core.alarms.rules import (
     BearingRules,
@@ -10,7 +11,6 @@ from core.alarms.rules import (
     ZoneRule,
     rule_of,
 )
-from core.alarms.state_limits import StateLimits
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.alarms.zones import ZoneLimits
 from core.units import ns_from_s
@@ -78,22 +78,28 @@ def _bearing(bearing: BearingSettings) -> BearingRules:
 def _limits(found: LimitSettings | None) -> LimitRule | None:
     if found is None:
         return None
+    rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
+    tables = tuple(
+        (table.region(found.states), _values(found.within(table))) for table in found.table
+    )
+    return LimitRule(_values(found), rule, states_of(found.states), tables)
+
+
+def _values(found: LimitSettings) -> Limits:
     below = (
         (found.alert_below, found.danger_below)
         if isinstance(found, GapLimitSettings)
         else (None, None)
     )
-    rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
-    limits = Limits(found.alert, found.danger, found.deadband, *below)
-    return LimitRule(limits, rule, states_of(found.states))
+    return Limits(found.alert, found.danger, found.deadband, *below)
 
 
 def _zones(found: ZoneSettings | None) -> ZoneRule | None:
     if found is None:
         return None
-    tables = tuple((states_of(table.states), _table(table)) for table in found.table)
+    tables = tuple((table.region(table.states), _table(table)) for table in found.table)
     rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
-    return ZoneRule(StateLimits(tables), rule)
+    return ZoneRule(ConditionLimits(tables), rule)
 
 
 def _table(table: ZoneTableSettings) -> ZoneLimits:

@@ -8,9 +8,9 @@ from core.account import SampleAccount
 from core.alarms.alarm import WITHIN, Alarm, AlarmKind, AlarmLevel, Condition
 from core.alarms.board import AlarmBoard
 from core.alarms.event import AlarmNews
-from core.alarms.limits import judge
 from core.alarms.operation import Action
 from core.alarms.watch import LimitWatch
+from core.condition.bearing_condition import NOWHERE_KNOWN
 from core.quality import Reading
 from core.units import NS_PER_S
 from service.alarms.health import LookAtHealth, ServiceHealth
@@ -189,7 +189,7 @@ class ServiceAlarms:
         if not isinstance(watch, LimitWatch):
             raise TypeError(f"{key} has no limits")
         held = self._board.alarm(watch.id).condition.level
-        return judge(Reading(value), watch.limits.strictest, held)
+        return watch.limits.judge(Reading(value), NOWHERE_KNOWN, held)
 
     def _find(self, key: str, condition: Condition, now_ns: int) -> None:
         self._board.find(self._watches[key], condition, now_ns)

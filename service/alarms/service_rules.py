@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from core.alarms.alarm import PLANT, AlarmIdentity, AlarmKind, AlarmRule
+from core.alarms.condition_limits import ConditionLimits
 from core.alarms.limits import Limits
 from core.alarms.rules import rule_of
-from core.alarms.state_limits import StateLimits
 from core.alarms.watch import LimitWatch, Watch
 from service.alarms.stream_alarms import STREAM
 from service.settings.alarms import AlarmSettings
@@ -93,4 +93,4 @@ def _identity(subject: str, kind: AlarmKind) -> AlarmIdentity:
 
 
 def _limit(subject: str, kind: AlarmKind, rule: AlarmRule, limits: Limits) -> LimitWatch:
-    return LimitWatch(_identity(subject, kind), rule, subject, StateLimits.single(limits))
+    return LimitWatch(_identity(subject, kind), rule, subject, ConditionLimits.single(limits))

@@ -10,7 +10,7 @@ from service.api.alarm_names import (
     AlarmLevelName,
     AlarmStateName,
 )
-from service.api.film_models import FilmConditionModel
+from service.api.film_models import CellModel, FilmConditionModel, OperatingStateName
 from service.api.models import ApiModel, Time
 
 ConditionName = Literal["active", "within_limits", "unknown"]
@@ -34,6 +34,26 @@ class HoldModel(ApiModel):
 
     until: Time | None
     """Until when, if it ends by itself."""
+
+
+class RaisedAtModel(ApiModel):
+    """Operating condition under which an occurrence of an alarm was raised."""
+
+    operating_state: OperatingStateName
+    """What the unit did."""
+
+    eccentricity_ratio: Annotated[float | None, Field(examples=[0.37])]
+    """Share of the clearance by which the shaft was off centre; null if not known, as of alarms
+    about no bearing."""
+
+    attitude_deg: Annotated[float | None, Field(examples=[47.0])]
+    """Attitude angle; null if not known."""
+
+    oil_temperature_c: Annotated[float | None, Field(examples=[46.2])]
+    """Oil temperature, °C; null if not known."""
+
+    cell: CellModel | None
+    """The condition cell that these lie in; null where one of them is not known."""
 
 
 class AlarmModel(ApiModel):
@@ -75,6 +95,9 @@ class AlarmModel(ApiModel):
 
     raised: Time | None
     """When the newest occurrence began."""
+
+    raised_at: RaisedAtModel | None
+    """Under which operating condition; null if that was not known, or it was never raised."""
 
     condition: ConditionName
     """What it watches, now: "unknown" where there are no good data. That is never a return to
@@ -197,6 +220,9 @@ class AlarmEventModel(ApiModel):
 
     reason: str
     """Why."""
+
+    raised_at: RaisedAtModel | None
+    """Under which operating condition that occurrence was raised; null if that was not known."""
 
 
 class AlarmEventsModel(ApiModel):

@@ -1,5 +1,6 @@
 """Alarms: the list, their history, and what people do to them."""
 
+from dataclasses import replace
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
@@ -34,9 +35,16 @@ from service.api.alarm_requests import (
     ShelveModel,
 )
 from service.api.alarm_tables import event_table
-from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model
-from service.api.bearing_routes import Moment
+from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model, grid_of
+from service.api.bearing_routes import (
+    Moment,
+    attitude_range,
+    eccentricity_range,
+    oil_temperature_range,
+)
 from service.api.context import Context
+from service.api.film_conditions import states_named
+from service.api.film_routes import States
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
 from service.api.shared import SharedAnswer
@@ -45,6 +53,7 @@ from service.api.times import ns_from_datetime, require_order
 from service.load.allowance import Allowance
 from service.security.roles import Permission
 from service.store.port import AlarmQuery
+from service.store.value_range import ValueRange
 
 MAX_EVENTS = 1000
 
@@ -112,16 +121,20 @@ def alarm_router(context: Context) -> APIRouter:
     ) -> Response:
         """Every transition of every alarm, newest first, page by page.
 
+        State, eccentricity, attitude and oil temperature choose occurrences by the condition under
+        which they were raised.
+
         As CSV or Parquet, too: a row for each transition.
         """
-        one_more = AlarmQuery(**{**vars(query), "limit": query.limit + 1})
+        one_more = replace(query, limit=query.limit + 1)
+        grid = grid_of(films)
         found = await worked(lambda: context.store.alarm_events(one_more))
         page, is_more = list(found[: query.limit]), len(found) > query.limit
         if wanted == "json":
             return await rendered(
-                lambda: alarm_events_model(page, context.origin, there_is_more=is_more)
+                lambda: alarm_events_model(page, context.origin, grid, there_is_more=is_more)
             )
-        columns = await worked(lambda: event_table(page))
+        columns = await worked(lambda: event_table(page, grid))
         cursor = str(page[-1].id) if is_more else None
         return table_response(wanted, columns, "alarm-events", cursor)
 
@@ -215,6 +228,9 @@ def alarm_by_id_router(context: Context) -> APIRouter:
 
 
 async def event_query(
+    eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
+    oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
+    attitude: Annotated[ValueRange, Depends(attitude_range)],
     unit: Annotated[
         str | None, Query(max_length=32, description="Of this unit only.", examples=["U1"])
     ] = None,
@@ -245,6 +261,7 @@ async def event_query(
     limit: Annotated[
         int, Query(ge=1, le=MAX_EVENTS, description="Most events in the answer.")
     ] = 100,
+    state: States = None,
 ) -> AlarmQuery:
     """Check which events are wanted."""
     everything = AlarmQuery()
@@ -259,6 +276,10 @@ async def event_query(
         kind=None if kind is None else AlarmKind(kind),
         start_ns=max(start_ns, 0),
         end_ns=min(max(end_ns, 0), everything.end_ns),
+        states=states_named(state),
+        eccentricity_ratio=eccentricity,
+        oil_temperature_c=oil_temperature,
+        attitude_deg=attitude,
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from core.condition.cells import CellGrid
 from service.api.alarm_models import AlarmEventModel
 from service.api.alarm_views import event_model
 from service.api.tables import Column, ColumnKind
@@ -17,13 +18,28 @@ KINDS: dict[str, ColumnKind] = {
 """Of columns that are no text."""
 
 
-def event_table(events: Sequence[StoredEvent]) -> list[Column]:
+RAISED_AT: dict[str, tuple[ColumnKind, str | None]] = {
+    "operating_state": ("text", None),
+    "eccentricity_ratio": ("number", "1"),
+    "attitude_deg": ("number", "deg"),
+    "oil_temperature_c": ("number", "°C"),
+}
+"""Columns of the condition under which an occurrence was raised, with their units."""
+
+
+def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
     """Columns as the fields of the JSON answer; times in the column ``time_utc``."""
-    rows = [event_model(stored) for stored in events]
+    rows = [event_model(stored, grid) for stored in events]
     times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
+    flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]
+    points = [row.raised_at for row in rows]
     return [
         times,
-        *(_column(name, rows) for name in AlarmEventModel.model_fields if name != "time"),
+        *(_column(name, rows) for name in flat),
+        *(
+            Column(name, kind, [point and getattr(point, name) for point in points], unit)
+            for name, (kind, unit) in RAISED_AT.items()
+        ),
     ]
 
 

@@ -9,6 +9,8 @@ from core.alarms.alarm import (
     Condition,
     Hold,
 )
+from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import CellGrid
 from service.api.alarm_models import (
     AlarmCountModel,
     AlarmEventModel,
@@ -17,9 +19,10 @@ from service.api.alarm_models import (
     AlarmModel,
     ConditionName,
     HoldModel,
+    RaisedAtModel,
 )
 from service.api.alarm_names import AlarmLevelName
-from service.api.film_conditions import condition_model
+from service.api.film_conditions import STATE_NAMES, cell_of, condition_model
 from service.api.film_models import FilmConditionModel
 from service.api.ports import AlarmBoard, FilmBoard
 from service.api.times import rfc3339
@@ -108,6 +111,7 @@ def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmMode
         is_chattering=engine.is_chattering(alarm),
         occurrence=alarm.occurrence,
         raised=None if alarm.raised_ns is None else rfc3339(alarm.raised_ns),
+        raised_at=_raised_at(alarm.raised_at, grid_of(films)),
         condition=_condition(condition) if is_judged else "unknown",
         condition_reason=str(condition.reason) if is_judged else unseen,
         value=condition.value,
@@ -131,17 +135,22 @@ def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | Non
 
 
 def alarm_events_model(
-    events: list[StoredEvent], origin: Origin, *, there_is_more: bool
+    events: list[StoredEvent], origin: Origin, grid: CellGrid, *, there_is_more: bool
 ) -> AlarmEventsModel:
     """A page of the history."""
     return AlarmEventsModel(
         origin=origin.value,
-        events=[event_model(stored) for stored in events],
+        events=[event_model(stored, grid) for stored in events],
         next_before=events[-1].id if there_is_more else None,
     )
 
 
-def event_model(stored: StoredEvent) -> AlarmEventModel:
+def grid_of(films: FilmBoard) -> CellGrid:
+    """Condition cells of all units."""
+    return films.settings.baseline.settings().grid
+
+
+def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
     """One line of the history."""
     event, identity = stored.event, stored.event.identity
     return AlarmEventModel(
@@ -162,6 +171,19 @@ def event_model(stored: StoredEvent) -> AlarmEventModel:
         value_unit=VALUE_UNITS.get(identity.kind),
         actor=event.actor,
         reason=str(event.reason),
+        raised_at=_raised_at(event.raised_at, grid),
+    )
+
+
+def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | None:
+    if point is None:
+        return None
+    return RaisedAtModel(
+        operating_state=STATE_NAMES[point.state],
+        eccentricity_ratio=point.eccentricity_ratio,
+        attitude_deg=point.attitude_deg,
+        oil_temperature_c=point.oil_temperature_c,
+        cell=cell_of(point, grid),
     )
 
 

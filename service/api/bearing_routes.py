@@ -69,6 +69,14 @@ async def oil_temperature_range(
     return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
 
 
+async def attitude_range(
+    attitude_min: Annotated[float | None, _bound("Lowest attitude angle, degrees.", 40.0)] = None,
+    attitude_max: Annotated[float | None, _bound("Highest, degrees.", 50.0)] = None,
+) -> ValueRange:
+    """What was found at an attitude angle within these bounds."""
+    return _ordered(attitude_min, attitude_max, "attitude_min")
+
+
 TimeRange = Annotated[tuple[int, int], Depends(time_range)]
 
 

@@ -1,9 +1,11 @@
 """Conditions and cells in the words of the API."""
 
+import math
 from typing import cast
 
-from core.condition.bearing_condition import BearingCondition
+from core.condition.bearing_condition import BearingCondition, OperatingPoint
 from core.condition.cells import Cell, CellGrid
+from core.condition.film_conditions import FilmConditions
 from core.condition.operating_state import OperatingState
 from service.api.film_models import CellModel, FilmConditionModel, OperatingStateName
 from service.api.times import rfc3339
@@ -26,6 +28,15 @@ def condition_model(
         is_settled=condition.is_settled,
         cell=None if condition.cell is None else cell_model(condition.cell, grid),
     )
+
+
+def cell_of(point: OperatingPoint, grid: CellGrid) -> CellModel | None:
+    """The cell that a point lies in; None where one of its axes is not known."""
+    axes = (point.eccentricity_ratio, point.oil_temperature_c, point.attitude_deg)
+    here = FilmConditions.one(*(math.nan if value is None else value for value in axes))
+    if not grid.is_known(here)[0]:
+        return None
+    return cell_model(tuple(grid.cells(here)[:, 0].tolist()), grid)
 
 
 def cell_model(cell: Cell, grid: CellGrid) -> CellModel:

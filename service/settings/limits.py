@@ -1,11 +1,12 @@
 """Limits that raise alarms: how far, for how long, and in which operating states."""
 
-from itertools import pairwise
+from collections.abc import Sequence
+from itertools import combinations, pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from core.alarms.state_limits import States
+from core.alarms.condition_limits import Region, States
 from core.condition.operating_state import OperatingState
 from service.settings.base import MisfitError, Settings, refuse_twice
 
@@ -25,6 +26,53 @@ def states_of(names: tuple[StateName, ...]) -> States:
     return frozenset(OperatingState[name.upper()] for name in names)
 
 
+Bounds = tuple[float, float]
+
+
+class RegionSettings(Settings):
+    """Part of the operating conditions, such as a condition cell; ranges are [from, up to]."""
+
+    states: StateNames | None = None
+
+    eccentricity_ratio: Annotated[Bounds, Field(examples=[[0.6, 0.7]])] | None = None
+    """Eccentricity ratios, 0 to 5; any without it; example: [0.35, 0.4]."""
+
+    oil_temperature_c: Annotated[Bounds, Field(examples=[[45.0, 47.5]])] | None = None
+    """Oil temperatures, °C, -50 to 200; any without it; example: [45.0, 47.5]."""
+
+    attitude_deg: Annotated[Bounds, Field(examples=[[0.0, 90.0]])] | None = None
+    """Attitude angles, degrees, 0 to 360; any without it; example: [0.0, 90.0]."""
+
+    @model_validator(mode="after")
+    def _check_region(self) -> Self:
+        refuse_twice(("states", n, name) for n, name in enumerate(self.states or ()))
+        for key, (least, most) in RANGES.items():
+            bounds: Bounds | None = getattr(self, key)
+            if bounds is not None and not least <= bounds[0] < bounds[1] <= most:
+                raise MisfitError(f"must rise, and lie within {least:g} to {most:g}", key)
+        return self
+
+    def region(self, states: StateNames) -> Region:
+        """The region as alarms know it; in these states where it gives none."""
+        return Region(states_of(self.states or states), *(getattr(self, key) for key in RANGES))
+
+
+RANGES = {
+    "eccentricity_ratio": (0.0, 5.0),
+    "oil_temperature_c": (-50.0, 200.0),
+    "attitude_deg": (0.0, 360.0),
+}
+"""Ranges of a region, with what they must lie within; in the order of `Region`."""
+
+
+def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
+    """Refuse tables of which two may hold at once; those without states hold in these."""
+    regions = [table.region(states) for table in tables]
+    for n, m in combinations(range(len(tables)), 2):
+        if regions[n].overlaps(regions[m]):
+            raise MisfitError(f"holds under conditions of table {n + 1}, too", "table", m)
+
+
 class WatchSettings(Settings):
     """How an alarm of a measurement behaves."""
 
@@ -39,6 +87,31 @@ class WatchSettings(Settings):
     """Whether the alarm stays active after its condition has gone, until somebody resets it."""
 
 
+class LimitTableSettings(RegionSettings):
+    """Limits in some part of the operating conditions; what is not given is as outside of it."""
+
+    states: StateNames | None = None
+    """Operating states in which these limits hold; those of the limit unless given."""
+
+    alert: float | None = None
+    """As `alert` of the limit."""
+
+    danger: float | None = None
+    """As `danger` of the limit."""
+
+    alert_below: float | None = None
+    """As `alert_below` of a limit that has one."""
+
+    danger_below: float | None = None
+    """As `danger_below` of a limit that has one."""
+
+    deadband: float | None = None
+    """As `deadband` of the limit."""
+
+
+LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
+
+
 class LimitSettings(WatchSettings):
     """Limits that a value must not pass; without alert and danger nothing is watched."""
 
@@ -51,11 +124,31 @@ class LimitSettings(WatchSettings):
     "part_load", "full_load", "run_down". Elsewhere its alarm is suppressed by design. Where the
     state is not known, it counts."""
 
+    table: Annotated[tuple[LimitTableSettings, ...], Field(max_length=100)] = ()
+    """Other limits in some operating states or condition cells; at most 100. Where it is not known
+    which of them hold, all count that may."""
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         refuse_twice(("states", n, name) for n, name in enumerate(self.states))
         self._check_limits()
+        refuse_overlap(self.table, self.states)
+        for n, table in enumerate(self.table):
+            try:
+                self.within(table)
+            except ValidationError as error:
+                found = error.errors()[0]
+                misfit = found.get("ctx", {}).get("error")
+                at = misfit.at if isinstance(misfit, MisfitError) else found["loc"]
+                said = str(misfit) if isinstance(misfit, MisfitError) else found["msg"]
+                raise MisfitError(said, "table", n, *at) from None
         return self
+
+    def within(self, table: LimitTableSettings) -> Self:
+        """The limits in the region of a table: its own, and for the rest these."""
+        own = {key: getattr(self, key) for key in LIMITS if hasattr(self, key)}
+        given = {key: getattr(table, key) for key in LIMITS if getattr(table, key) is not None}
+        return type(self).model_validate(own | given)
 
     def _check_limits(self) -> None:
         alert, danger = self.alert, self.danger

@@ -5,17 +5,23 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from service.settings.base import MisfitError, Settings, refuse_twice
-from service.settings.limits import AT_SPEED, StateNames, WatchSettings
+from service.settings.limits import (
+    AT_SPEED,
+    RegionSettings,
+    StateNames,
+    WatchSettings,
+    refuse_overlap,
+)
 
 Boundary = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
-class ZoneTableSettings(Settings):
-    """Boundaries of the zones in some operating states."""
+class ZoneTableSettings(RegionSettings):
+    """Boundaries of the zones in some operating states or condition cells."""
 
     states: StateNames = AT_SPEED
-    """Operating states in which they hold. In a state without a table the alarm is suppressed by
-    design; where the state is not known, the strictest table holds."""
+    """Operating states in which they hold. In a condition without a table the alarm is suppressed
+    by design; where it is not known, the strictest table that may hold does."""
 
     a_b: Boundary
     """Boundary between zones A and B, in the unit of the measurement."""
@@ -32,7 +38,6 @@ class ZoneTableSettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        refuse_twice(("states", n, name) for n, name in enumerate(self.states))
         if self.b_c <= self.a_b:
             raise MisfitError(f"must be above a_b, {self.a_b:g}", "b_c")
         if self.c_d <= self.b_c:
@@ -45,16 +50,12 @@ class ZoneTableSettings(Settings):
 class ZoneSettings(WatchSettings):
     """Zones of one measurement."""
 
-    table: Annotated[tuple[ZoneTableSettings, ...], Field(min_length=1, max_length=6)]
-    """A table for each group of operating states."""
+    table: Annotated[tuple[ZoneTableSettings, ...], Field(min_length=1, max_length=100)]
+    """A table for each group of operating states or condition cells; at most 100."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        refuse_twice(
-            ("table", n, "states", m, state)
-            for n, table in enumerate(self.table)
-            for m, state in enumerate(table.states)
-        )
+        refuse_overlap(self.table, AT_SPEED)
         return self
 
 

@@ -13,20 +13,31 @@ from core.alarms.alarm import (
     Hold,
 )
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from core.condition.bearing_condition import OperatingPoint
+from core.condition.operating_state import OperatingState
 from service.audit.entry import Deed
 from service.store.audit_deeds import alarm_deeds
 from service.store.commands import answer_command
 from service.store.commands_port import DONE
+from service.store.conditions import (
+    BETWEEN_BOUNDS,
+    IN_STATES,
+    at_least,
+    at_most,
+    condition_arguments,
+)
 from service.store.database import Connection
 from service.store.outbox import insert_letters
 from service.store.outbox_port import Address, nobody
 from service.store.port import AlarmQuery, StoredEvent, StoreError
 
+POINT_COLUMNS = "operating_state, eccentricity_ratio, attitude_deg, oil_temperature_c"
+
 ALARM_COLUMNS = (
     "id, unit, subject, kind, level, occurrence, is_acknowledged, raised_ns, n_events, is_known,"
     " condition_level, value, limit_value, reason, suppressed_by, is_latched,"
     " shelf_actor, shelf_reason, shelf_since_ns, shelf_until_ns,"
-    " outage_actor, outage_reason, outage_since_ns"
+    f" outage_actor, outage_reason, outage_since_ns, {POINT_COLUMNS}"
 )
 ALARM_COLUMN = ALARM_COLUMNS.split(", ")
 UPSERT = (
@@ -38,11 +49,12 @@ UPSERT = (
 
 EVENT_COLUMNS = (
     "alarm, number, unit, subject, kind, change, level, state_before, state_after, time_ns,"
-    " occurrence, value, limit_value, actor, reason"
+    f" occurrence, value, limit_value, actor, reason, {POINT_COLUMNS}"
 )
+EVENT_COLUMN = EVENT_COLUMNS.split(", ")
 INSERT_EVENT = (
-    f"INSERT INTO alarm_event ({EVENT_COLUMNS})"  # noqa: S608
-    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?) ON CONFLICT (alarm, number) DO NOTHING"
+    f"INSERT INTO alarm_event ({EVENT_COLUMNS}) VALUES ({', '.join('?' * len(EVENT_COLUMN))})"  # noqa: S608
+    " ON CONFLICT (alarm, number) DO NOTHING"
 )
 SELECT_EVENTS = f"""
     SELECT id, {EVENT_COLUMNS} FROM alarm_event
@@ -51,6 +63,10 @@ SELECT_EVENTS = f"""
     AND (CAST(:unit AS TEXT) IS NULL OR unit = :unit)
     AND (CAST(:kind AS TEXT) IS NULL OR kind = :kind)
     AND time_ns >= :start_ns AND time_ns < :end_ns
+    AND {IN_STATES}
+    AND {BETWEEN_BOUNDS}
+    AND {at_least("attitude_deg", "attitude_low")}
+    AND {at_most("attitude_deg", "attitude_high")}
     ORDER BY id DESC LIMIT :limit
 """  # noqa: S608
 
@@ -80,8 +96,19 @@ def select_alarms(reader: Connection) -> list[Alarm]:
 
 def select_events(reader: Connection, query: AlarmQuery) -> list[StoredEvent]:
     """Events, newest first."""
-    rows = reader.execute(SELECT_EVENTS, vars(query))
+    rows = reader.execute(SELECT_EVENTS, _arguments(query))
     return [StoredEvent(int(row[0]), _event(row[1:])) for row in rows]
+
+
+def _arguments(query: AlarmQuery) -> dict[str, object]:
+    """What a query asks for, as parameters of the statement."""
+    names = ("before", "limit", "alarm", "unit", "kind", "start_ns", "end_ns")
+    asked = {name: getattr(query, name) for name in names}
+    return (
+        asked
+        | condition_arguments(query.states, query.eccentricity_ratio, query.oil_temperature_c)
+        | {"attitude_low": query.attitude_deg.low, "attitude_high": query.attitude_deg.high}
+    )
 
 
 def _alarm_row(alarm: Alarm) -> tuple[object, ...]:
@@ -94,6 +121,7 @@ def _alarm_row(alarm: Alarm) -> tuple[object, ...]:
         *(str(condition.reason), alarm.suppressed_by, alarm.is_latched),
         *(*_hold_row(shelf), shelf.until_ns if shelf else None),
         *_hold_row(outage),
+        *_point_row(alarm.raised_at),
     )
 
 
@@ -107,8 +135,20 @@ def _event_row(event: AlarmEvent) -> tuple[object, ...]:
         *(identity.id, event.number, identity.unit, identity.subject, identity.kind.value),
         *(event.change.value, event.level, event.state_before.value, event.state_after.value),
         *(event.time_ns, event.occurrence, event.value, event.limit, event.actor),
-        str(event.reason),
+        *(str(event.reason), *_point_row(event.raised_at)),
     )
+
+
+def _point_row(point: OperatingPoint | None) -> tuple[float | None, ...]:
+    if point is None:
+        return (None,) * 4
+    numbers = (point.eccentricity_ratio, point.attitude_deg, point.oil_temperature_c)
+    return (int(point.state), *numbers)
+
+
+def _point(found: dict[str, Any]) -> OperatingPoint | None:
+    state, *numbers = (found[name] for name in POINT_COLUMNS.split(", "))
+    return None if state is None else OperatingPoint(OperatingState(state), *numbers)
 
 
 def _alarm(row: tuple[Any, ...]) -> Alarm:
@@ -133,13 +173,14 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
             shelf=_hold(found, "shelf", found["shelf_until_ns"]),
             outage=_hold(found, "outage", None),
             is_latched=bool(found["is_latched"]),
+            raised_at=_point(found),
         )
     except ValueError as error:
         raise StoreError(f"alarm {found['id']}: {error}") from error
 
 
 def _event(row: tuple[Any, ...]) -> AlarmEvent:
-    found = dict(zip(EVENT_COLUMNS.split(", "), row, strict=True))
+    found = dict(zip(EVENT_COLUMN, row, strict=True))
     try:
         return AlarmEvent(
             identity=_identity(found),
@@ -154,6 +195,7 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
             limit=found["limit_value"],
             actor=found["actor"],
             reason=found["reason"],
+            raised_at=_point(found),
         )
     except ValueError as error:
         raise StoreError(f"event {found['number']} of alarm {found['alarm']}: {error}") from error

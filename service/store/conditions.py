@@ -1,5 +1,10 @@
 """Parts of statements that choose readings by condition, where NULL asks for nothing."""
 
+from collections.abc import Iterable
+
+from core.condition.operating_state import OperatingState
+from service.store.value_range import ValueRange
+
 IN_STATES = """(
         CAST(:states AS TEXT) = '' OR CAST(:states AS TEXT) LIKE '%,' || operating_state || ',%'
     )"""
@@ -21,3 +26,16 @@ BETWEEN_BOUNDS = f"""{at_least("eccentricity_ratio", "eccentricity_low")}
     AND {at_least("oil_temperature_c", "oil_low")}
     AND {at_most("oil_temperature_c", "oil_high")}"""
 """Whether a single reading lies within the bounds that are asked for."""
+
+
+def condition_arguments(
+    states: Iterable[OperatingState], eccentricity_ratio: ValueRange, oil_temperature_c: ValueRange
+) -> dict[str, object]:
+    """Parameters of `IN_STATES` and `BETWEEN_BOUNDS`."""
+    return {
+        "eccentricity_low": eccentricity_ratio.low,
+        "eccentricity_high": eccentricity_ratio.high,
+        "oil_low": oil_temperature_c.low,
+        "oil_high": oil_temperature_c.high,
+        "states": "".join(f",{int(state)}," for state in states),
+    }

@@ -15,7 +15,7 @@ from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_reading import FilmValue
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
-from service.store.conditions import BETWEEN_BOUNDS, IN_STATES
+from service.store.conditions import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 from service.store.database import Connection
 from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision
 from service.store.moments import free_moment
@@ -186,11 +186,7 @@ def _arguments(query: FilmQuery) -> dict[str, Any]:
         "estimator": query.estimator.value,
         "start_ns": max(0, min(query.start_ns, 2**63 - 1)),
         "end_ns": max(0, min(query.end_ns, 2**63 - 1)),
-        "states": "".join(f",{int(state)}," for state in query.states),
-        "eccentricity_low": query.eccentricity_ratio.low,
-        "eccentricity_high": query.eccentricity_ratio.high,
-        "oil_low": query.oil_temperature_c.low,
-        "oil_high": query.oil_temperature_c.high,
+        **condition_arguments(query.states, query.eccentricity_ratio, query.oil_temperature_c),
         "newest": 2**63 - 1 if query.newest is None else query.newest,
     }
 

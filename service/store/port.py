@@ -124,6 +124,8 @@ class StoredReadings:
 class AlarmQuery:
     """Which events of alarms are wanted, newest first; None where anything will do.
 
+    Events of an occurrence are found by the operating condition under which it was raised.
+
     Parameters
     ----------
     before
@@ -132,6 +134,8 @@ class AlarmQuery:
         Most events that are read.
     start_ns, end_ns
         From the first, up to but not including the second.
+    states
+        Only of occurrences raised in these operating states; empty for all.
     """
 
     before: int = 2**63 - 1
@@ -141,6 +145,10 @@ class AlarmQuery:
     kind: str | None = None
     start_ns: int = 0
     end_ns: int = 2**63 - 1
+    states: tuple[OperatingState, ...] = ()
+    eccentricity_ratio: ValueRange = field(default_factory=ValueRange)
+    oil_temperature_c: ValueRange = field(default_factory=ValueRange)
+    attitude_deg: ValueRange = field(default_factory=ValueRange)
 
 
 @dataclass(frozen=True)

@@ -152,5 +152,12 @@ MIGRATIONS = (
     RETENTION_TABLES,
     POSITION_TABLES,
     MUST_CHANGE,
+    "".join(
+        f"ALTER TABLE {table} ADD COLUMN operating_state INTEGER;"
+        f" ALTER TABLE {table} ADD COLUMN eccentricity_ratio REAL;"
+        f" ALTER TABLE {table} ADD COLUMN attitude_deg REAL;"
+        f" ALTER TABLE {table} ADD COLUMN oil_temperature_c REAL;"
+        for table in ("alarm", "alarm_event")
+    ),
 )
 """Statement lists; the n-th leads from schema n to schema n + 1."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from core.quality import Level
 from service.store.codec import Layout
-from service.store.conditions import BETWEEN_BOUNDS, IN_STATES
+from service.store.conditions import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 from service.store.database import Connection
 from service.store.port import QueryTooLargeError, StoreError, TrendQuery
 from service.store.summaries import Summaries
@@ -107,11 +107,7 @@ def arguments(query: TrendQuery) -> dict[str, object]:
         "bearing": query.bearing,
         "start_ns": storable(query.start_ns),
         "end_ns": storable(query.end_ns),
-        "eccentricity_low": query.eccentricity_ratio.low,
-        "eccentricity_high": query.eccentricity_ratio.high,
-        "oil_low": query.oil_temperature_c.low,
-        "oil_high": query.oil_temperature_c.high,
-        "states": "".join(f",{int(state)}," for state in query.states),
+        **condition_arguments(query.states, query.eccentricity_ratio, query.oil_temperature_c),
     }
 
 

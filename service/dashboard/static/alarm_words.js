@@ -1,6 +1,7 @@
 /** Alarms in words for people, and how each of them looks. */
 
 import { amplitudeUnit, shownAmplitude } from "./amplitudes.js";
+import { stateWords as operationWords } from "./film_words.js";
 import { formatFixed, formatTime } from "./format.js";
 import { reasonWords } from "./words.js";
 
@@ -158,6 +159,18 @@ export function valueWords({ kind, value, limit, value_unit: unit }) {
 function filmWords(value, limit) {
   const percent = (ln) => `${formatFixed(100 * Math.expm1(ln), 1)} %`;
   return percent(value) + (limit === null ? "" : `, limit ${percent(Math.sign(value) * Math.abs(limit))}`);
+}
+
+/** `full load, eccentricity 0.37, attitude 47°, oil 46.2 °C`: what is known of where it was raised. */
+export function raisedWords({ raised_at: at }) {
+  if (at === null) return "";
+  const known = (words, number, digits, unit) => (number === null ? [] : [`${words} ${formatFixed(number, digits)}${unit}`]);
+  return [
+    ...(at.operating_state === "unknown" ? [] : [operationWords(at.operating_state)]),
+    ...known("eccentricity", at.eccentricity_ratio, 2, ""),
+    ...known("attitude", at.attitude_deg, 0, "°"),
+    ...known("oil", at.oil_temperature_c, 1, " °C"),
+  ].join(", ");
 }
 
 /** What an alarm watches, now; what is not known is said to be unknown, never to be well. */

@@ -83,6 +83,13 @@ async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
     history = page.get_by_role("table", name="History")
     for words in ("raised", "acknowledged", "shelved", "back from the shelf"):
         await expect(history.get_by_role("cell", name=words, exact=True).first).to_be_visible()
+    asking = page.get_by_role("search", name="History")
+    await asking.get_by_label("Raised at").select_option("full load")
+    await asking.get_by_role("button", name="Look").click()
+    await expect(history).to_be_hidden()
+    await expect(page.get_by_text("Nothing was raised under that condition.")).to_be_visible()
+    await asking.get_by_role("button", name="Clear").click()
+    await expect(history).to_be_visible()
     assert complaints == []
 
 

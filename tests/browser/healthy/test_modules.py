@@ -38,6 +38,10 @@ async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page: Page) 
     found = [await page.evaluate(CALL, ["alarm_place", "alarmPlace", alarm]) for alarm in told]
     place = "#/units/U1/bearings/UJB"
     assert found == [f"{place}/film", "#/units/U1", "#/sources", *([place] * len(bearing))]
+    at = {"operating_state": "full_load", "eccentricity_ratio": 0.37, "attitude_deg": None}
+    raised = {"raised_at": at | {"oil_temperature_c": 46.2}}
+    words = await page.evaluate(CALL, ["alarm_words", "raisedWords", raised])
+    assert words == "full load, eccentricity 0.37, oil 46.2 °C"
 
 
 async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(plant, page) -> None:

@@ -1,11 +1,13 @@
 """A probe that fails and works again, and what people ask the API to do about it."""
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import httpx2
 import numpy as np
 
+from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.quality import GOOD, Reading, Reason, bad
 from service.recorder import Findings
@@ -25,12 +27,14 @@ class Probes:
         self.n_blocks = 0
         service.alarms.link("U1", True)
 
-    def send(self, n_blocks: int, reason: Reason = Reason.OK) -> None:
-        """Let blocks come."""
+    def send(
+        self, n_blocks: int, reason: Reason = Reason.OK, results: Sequence[Assessment] = ()
+    ) -> None:
+        """Let blocks come, and with each of them some results."""
         for _ in range(n_blocks):
-            self._take(bad(reason) if reason is not Reason.OK else GOOD)
+            self._take(bad(reason) if reason is not Reason.OK else GOOD, results)
 
-    def _take(self, first_probe: Any) -> None:
+    def _take(self, first_probe: Any, results: Sequence[Assessment]) -> None:
         start = self.n_blocks
         self.n_blocks += 1
         block = SampleBlock(
@@ -43,7 +47,7 @@ class Probes:
             channel_quality=(first_probe,) + (GOOD,) * 11,
             slow={"speed": Reading(92.3)},
         )
-        news = self._service.alarms.take(block, [])
+        news = self._service.alarms.take(block, results)
         if news:
             self._service.recorder.put(Findings(alarms=news))
 

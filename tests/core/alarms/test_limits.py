@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.alarms.alarm import AlarmLevel
+from core.alarms.condition_limits import AT_SPEED, ConditionLimits, Region
 from core.alarms.conditions import (
     channel_condition,
     drift_reading,
@@ -14,14 +15,20 @@ from core.alarms.conditions import (
     stamp_condition,
 )
 from core.alarms.limits import Limits, judge
-from core.alarms.state_limits import AT_SPEED, StateLimits
 from core.alarms.zones import ZoneLimits
+from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.device_clock import DeviceClock, StampFault
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 
 ALERT, DANGER = AlarmLevel
 LIMITS = Limits(150.0, 200.0, 10.0)
+
+
+def in_(*states: OperatingState) -> Region:
+    return Region(frozenset(states))
+
+
 LEVELS = st.sampled_from([None, ALERT, DANGER])
 
 
@@ -119,10 +126,10 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
     assert judge(Reading(409.0), GAP, DANGER).level is DANGER
     assert judge(Reading(411.0), GAP, DANGER).level is ALERT
 
-    found = StateLimits(((frozenset({FULL}), Limits(100.0)), (frozenset({PART}), Limits(150.0))))
+    found = ConditionLimits(((in_(FULL), Limits(100.0)), (in_(PART), Limits(150.0))))
 
-    assert found.judge(Reading(120.0), FULL, None).level is ALERT
-    assert found.judge(Reading(120.0), PART, None).level is None
+    assert found.judge(Reading(120.0), OperatingPoint(FULL), None).level is ALERT
+    assert found.judge(Reading(120.0), OperatingPoint(PART), None).level is None
 
 
 @pytest.mark.parametrize("state", [RUN_UP, OperatingState.STANDSTILL, OperatingState.RUN_DOWN])
@@ -130,28 +137,58 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
 def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
     state: OperatingState, value: float
 ) -> None:
-    found = StateLimits.single(Limits(100.0), AT_SPEED).judge(Reading(value), state, ALERT)
+    limits = ConditionLimits.single(Limits(100.0), AT_SPEED)
+    found = limits.judge(Reading(value), OperatingPoint(state), ALERT)
 
     assert not found.is_known
     assert found.suppressed_by == found.reason == state.name.lower()
 
 
-@pytest.mark.parametrize("state", [None, OperatingState.UNKNOWN])
-def test_where_the_state_is_not_known_the_strictest_limits_count(
-    state: OperatingState | None,
-) -> None:
-    found = StateLimits(((frozenset({PART}), Limits(150.0)), (frozenset({FULL}), Limits(100.0))))
-    condition = found.judge(Reading(120.0), state, None)
+def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
+    found = ConditionLimits(((in_(PART), Limits(150.0)), (in_(FULL), Limits(100.0))))
+    condition = found.judge(Reading(120.0), OperatingPoint(), None)
 
     assert (condition.level, condition.limit, condition.suppressed_by) == (ALERT, 100.0, None)
 
 
-def test_a_state_has_one_table() -> None:
-    tables = ((frozenset({FULL, PART}), Limits(100.0)), (frozenset({FULL}), Limits(150.0)))
+@pytest.mark.parametrize(
+    ("eccentricity", "attitude_deg", "oil_c", "passed"),
+    [
+        (0.35, 30.0, 45.0, [150.0]),
+        (0.349, 30.0, 45.0, [100.0]),
+        (0.4, 30.0, 45.0, [100.0]),
+        (0.37, -330.0, 47.4, [150.0]),
+        (0.37, 91.0, 46.0, [100.0]),
+        (0.37, 30.0, 47.5, [60.0]),
+        (None, 30.0, 46.0, [150.0, 100.0]),
+        (0.37, None, None, [150.0, 60.0, 100.0]),
+    ],
+)
+def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_count_that_may(
+    eccentricity: float | None, attitude_deg: float | None, oil_c: float | None, passed: list[float]
+) -> None:
+    cell = Region(AT_SPEED, (0.35, 0.4), (45.0, 47.5), (0.0, 90.0))
+    warm = Region(AT_SPEED, oil_temperature_c=(47.5, 50.0))
+    tables = ((cell, Limits(150.0)), (warm, Limits(60.0)))
+    found = ConditionLimits(tables, (Region(AT_SPEED), Limits(100.0)))
+    point = OperatingPoint(FULL, eccentricity, attitude_deg, oil_c)
+
+    assert [limits.alert for limits in found.at(point)] == passed
+    condition = found.judge(Reading(120.0), point, None)
+    assert condition.level is (ALERT if min(passed) < 120.0 else None)
+    assert condition.limit == min(passed)
+
+
+def test_a_condition_has_one_table() -> None:
+    tables = ((in_(FULL, PART), Limits(100.0)), (in_(FULL), Limits(150.0)))
     with pytest.raises(ValueError, match="two limits for the operating state full_load"):
-        StateLimits(tables)
+        ConditionLimits(tables)
     with pytest.raises(ValueError, match="count in no operating state"):
-        StateLimits(((frozenset(), Limits(100.0)),))
+        in_()
+    with pytest.raises(ValueError, match="must rise"):
+        Region(eccentricity_ratio=(0.4, 0.4))
+    apart = [Region(oil_temperature_c=(low, low + 5.0)) for low in (40.0, 45.0)]
+    assert ConditionLimits(tuple((region, LIMITS) for region in apart)).tables
 
 
 @pytest.mark.parametrize(

@@ -7,16 +7,18 @@ from typing import Any
 import pytest
 
 from core.alarms.alarm import AlarmState
+from core.alarms.condition_limits import AT_SPEED
+from core.alarms.event import AlarmEvent
 from core.alarms.limits import Limits
+from core.alarms.operation import Acknowledge
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
-from core.alarms.state_limits import AT_SPEED
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.blocks import SampleBlock
-from core.condition.bearing_condition import BearingCondition
+from core.condition.bearing_condition import BearingCondition, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.machine import Unit
-from core.quality import Reading, Reason, missing
+from core.quality import GOOD, Reading, Reason, bad, missing
 from core.quantities import CATALOGUE
 
 SECOND = 1_000_000_000
@@ -50,6 +52,7 @@ class Machine:
         reference = VectorReference("U1", "UJB", FULL, {"shaft_x": OrderVector(50.0)})
         self.alarms = UnitAlarms(unit, RULES, references=[reference])
         self.block, self.n = block, 0
+        self.told: list[AlarmEvent] = []
 
     def runs(self, state: OperatingState | None, oil_c: float = 45.0, **found: Any) -> list[str]:
         self.n += 1
@@ -67,6 +70,7 @@ class Machine:
             clipped_share={},
         )
         news = self.alarms.take(self.block(self.n, oil_c), [assessment], 0)
+        self.told += [event for told in news for event in told.events]
         return [f"{e.identity.kind} {e.change}" for told in news for e in told.events]
 
     def state(self, id_: str) -> AlarmState:
@@ -148,3 +152,26 @@ def test_an_alarm_shows_what_was_found_last_and_slow_channels_share_the_state(
 
     assert "oil_temperature raised" not in machine.runs(PART, oil_c=65.0)
     assert "oil_temperature raised" in machine.runs(FULL, oil_c=65.0)
+
+
+def test_an_alarm_and_its_events_carry_the_condition_at_which_it_was_raised(
+    machine: Machine,
+) -> None:
+    there = {"eccentricity_ratio": 0.4, "attitude_angle_deg": 47.0, "oil_temperature_c": 52.0}
+    machine.runs(FULL, **there, overall_shaft_x_um_pp=210.0)
+    failed = (bad(Reason.SENSOR_FAILURE), *(GOOD,) * 3, bad(Reason.DEAD))
+    blocks = [machine.block(second, qualities=failed) for second in (60, 61)]
+    of_channels = [told for block in blocks for told in machine.alarms.take(block, [], 0)]
+    machine.n = 100
+    machine.runs(PART, overall_shaft_x_um_pp=120.0)
+    machine.alarms.operate(SPAN, Acknowledge("A. Name", 1), 0)
+    raised_anew = machine.alarms.take(machine.block(401, 65.0), [], 0)  # of no recent result
+
+    point = OperatingPoint(FULL, 0.4, 47.0, 52.0)
+    assert machine.alarms.alarm(SPAN).raised_at == point
+    of_span = [e for e in machine.told if e.identity.id == SPAN]
+    assert [(e.change, e.raised_at) for e in of_span] == [("raised", point), ("returned", point)]
+    seen = {e.identity.subject: e.raised_at for told in of_channels for e in told.events}
+    assert seen == {"sx": point, "spare": OperatingPoint(FULL)}
+    [oil] = [e for told in raised_anew for e in told.events if e.change == "raised"]
+    assert oil.raised_at == OperatingPoint()

@@ -1,9 +1,16 @@
 """Alarms over HTTP: the list, the history, and what people may do."""
 
+import csv
+import io
+from dataclasses import replace
 from typing import Any
 
+import pytest
+from rigs.assessments import assessment
 from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, PROBE, SHELVE, Probes, post
 
+from core.condition.bearing_condition import BearingCondition
+from core.condition.operating_state import OperatingState
 from core.quality import Reason
 from service.api.alarm_routes import N_COMMENTS, S_PER_COMMENT
 
@@ -145,3 +152,38 @@ async def test_the_history_comes_page_by_page_and_by_what_is_asked(
     assert rest["next_before"] is None
     assert of_kind["events"] == []
     assert [e["change"] for e in at_first["events"]] == ["raised"]
+
+
+async def test_the_history_says_and_is_asked_by_the_condition_at_which_an_alarm_was_raised(
+    service: Any, probes: Probes
+) -> None:
+    point = {"eccentricity_ratio": 0.37, "attitude_deg": 47.0, "oil_temperature_c": 46.2}
+    found = assessment(attitude_angle_deg=point.pop("attitude_deg"), **point)
+    settled = BearingCondition(OperatingState.FULL_LOAD, True, None)
+    probes.send(3, Reason.SENSOR_FAILURE, [replace(found, condition=settled)])
+    service.alarms.link("U1", False, "no route")
+    service.clock.step(3_600_000_000_000)
+    service.alarms.tick()
+    await post(service, ACKNOWLEDGE, {**ANNA, "occurrence": 1})
+    path = f"{ALARMS}/events"
+
+    probe, link = (await service.json(ALARMS))["alarms"][::-1]
+    events = {e["change"]: e for e in (await service.json(path, alarm=PROBE))["events"]}
+
+    cell = {"eccentricity_low": 0.35, "eccentricity_high": 0.4}
+    cell |= {"oil_temperature_low_c": 45.0, "oil_temperature_high_c": 47.5}
+    cell |= {"attitude_low_deg": None, "attitude_high_deg": None}
+    there = {"operating_state": "full_load", **point, "attitude_deg": 47.0, "cell": cell}
+    assert probe["raised_at"] == events["raised"]["raised_at"] == there
+    assert events["acknowledged"]["raised_at"] == there
+    assert (link["kind"], link["raised_at"]["cell"]) == ("link_lost", None)
+    inside = {"state": "full_load", "eccentricity_min": 0.35, "eccentricity_max": 0.4}
+    inside |= {"oil_temperature_min": 45.0, "attitude_max": 50.0}
+    chosen = (await service.json(path, **inside))["events"]
+    assert [e["change"] for e in chosen] == ["acknowledged", "raised"]
+    for outside in ({"state": "part_load"}, {"oil_temperature_min": 47.5}, {"attitude_max": 40.0}):
+        assert (await service.json(path, **{**inside, **outside}))["events"] == []
+    table = (await service.get(path, format="csv", alarm=PROBE, limit=1)).text
+    [row] = csv.DictReader(io.StringIO(table, newline=""))
+    assert row["operating_state"] == "full_load"
+    assert float(row["oil_temperature_c [°C]"]) == pytest.approx(46.2)

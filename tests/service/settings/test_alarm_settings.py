@@ -7,10 +7,11 @@ import pytest
 
 from core.alarms.alarm import AlarmRule
 from core.alarms.chatter import ChatterRule
+from core.alarms.condition_limits import AT_SPEED, EVERY_STATE, Region
 from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule
-from core.alarms.state_limits import AT_SPEED, EVERY_STATE
 from core.alarms.vector_change import OrderVector, VectorReference
+from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
 from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.origin import Origin
@@ -112,13 +113,39 @@ def test_zones_differ_from_state_to_state(rules: Callable[[str], BearingRules]) 
     ).shaft_zones
 
     assert found is not None
-    full, part = found.by_state.at(FULL), found.by_state.at(PART)
-    assert full is not None
-    assert part is not None
+    [full], [part] = (found.by_condition.at(OperatingPoint(state)) for state in (FULL, PART))
     assert (full.alert, full.danger, full.deadband) == (200.0, 300.0, 5.0)
     assert (part.alert, part.danger, part.deadband) == (250.0, 400.0, 1.0)
-    assert found.by_state.at(OperatingState.SPEED_NO_LOAD) is None
+    assert not found.by_condition.at(OperatingPoint(OperatingState.SPEED_NO_LOAD))
     assert found.rule.off_delay_ns == 5 * SECOND
+
+
+def test_every_limit_may_differ_by_operating_state_and_by_condition_cell(
+    rules: Callable[[str], BearingRules],
+) -> None:
+    cell = "eccentricity_ratio = [0.35, 0.4], oil_temperature_c = [45.0, 47.5]"
+    found = rules(
+        "alarms.shaft_order1_um_pk = { alert = 150.0, danger = 250.0, table = ["
+        ' { states = ["part_load"], alert = 180.0 },'
+        f' {{ states = ["full_load"], {cell}, alert = 120.0, deadband = 3.0 }}] }}\n'
+        "alarms.gap_um = { alert_below = 600.0, alert = 2400.0, table = ["
+        " { attitude_deg = [0.0, 90.0], alert_below = 500.0 }] }\n"
+        "alarms.zones.shaft_um_pp = { table = ["
+        f" {{ {cell}, a_b = 100.0, b_c = 200.0, c_d = 300.0 }}] }}"
+    )
+
+    assert found.shaft_order1 is not None
+    assert found.shaft_order1.tables == (
+        (Region(frozenset({PART})), Limits(180.0, 250.0, 5.0)),
+        (Region(frozenset({FULL}), (0.35, 0.4), (45.0, 47.5)), Limits(120.0, 250.0, 3.0)),
+    )
+    assert found.gap is not None
+    [(region, limits)] = found.gap.tables
+    assert region == Region(AT_SPEED, attitude_deg=(0.0, 90.0))
+    assert limits == Limits(2400.0, None, 10.0, 500.0)
+    assert found.shaft_zones is not None
+    [(region, _)] = found.shaft_zones.by_condition.tables
+    assert region == Region(AT_SPEED, (0.35, 0.4), (45.0, 47.5))
 
 
 def test_a_reference_holds_in_each_state_it_names(plant_of: PlantOf) -> None:
@@ -150,6 +177,7 @@ ORDER1, SPAN, ECCENTRICITY = "shaft_order1_um_pk", "shaft_overall_um_pp", "eccen
 VELOCITY, OIL_C, GAP = "bearing_overall_mm_s_rms", "oil_temperature_c", "gap_um"
 ZONES, REFERENCE = "zones.bearing_mm_s_rms", "order1_reference"
 TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
+OTHER = "alert = 150.0, table = [{"
 ONE_TABLE = "{{ table = [{{ a_b = {}, b_c = {}, c_d = {} }}] }}"
 BETWEEN = "alert_below = 600.0, alert = 700.0"
 
@@ -184,7 +212,29 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
         (ZONES, ONE_TABLE.format(1.0, 2.0, 1.5), ".table[1].c_d = 1.5", "b_c, 2"),
         (ZONES, ONE_TABLE.format(0.0, 2.0, 3.0), ".table[1].a_b = 0.0", "than 0"),
         (ZONES, f"{{ table = [{{ {TABLE}, deadband = 2.0 }}] }}", ".table[1].deadband", "b_c, 2"),
-        (ZONES, f"{{ table = [{{ {TABLE} }}, {{ {TABLE} }}] }}", ".table[2].states[1]", "twice"),
+        (ZONES, f"{{ table = [{{ {TABLE} }}, {{ {TABLE} }}] }}", ".table[2]", "of table 1, too"),
+        (ORDER1, f"{{ {OTHER} states = [] }}] }}", ".table[1].states", "least"),
+        (ORDER1, f"{{ {OTHER} danger = 140.0 }}] }}", ".table[1].danger", "above alert, 150"),
+        (ORDER1, f"{{ {OTHER} alert = -1.0 }}] }}", ".table[1].alert", "greater than 0"),
+        (ORDER1, f"{{ {OTHER} alert_below = 9.0 }}] }}", ".table[1].alert_below", "not permitted"),
+        (
+            ORDER1,
+            f"{{ {OTHER} attitude_deg = [-5.0, 9.0] }}] }}",
+            ".table[1].attitude_deg",
+            "0 to 360",
+        ),
+        (
+            ORDER1,
+            f"{{ {OTHER} eccentricity_ratio = [0.4, 0.3] }}] }}",
+            ".table[1].eccentricity_ratio",
+            "must rise",
+        ),
+        (
+            ORDER1,
+            f"{{ {OTHER} }}, {{ states = ['full_load'] }}] }}",
+            ".table[2]",
+            "of table 1, too",
+        ),
         (ZONES, "{ table = [] }", ".table", "at least 1"),
         ("zones.x", f"{{ table = [{{ {TABLE} }}] }}", "", "known here: bearing_mm_s_rms, shaft"),
         (REFERENCE, "[{}]", "[1].shaft_x", "gives no vector"),

@@ -21,11 +21,16 @@ from core.alarms.delays import RESTED
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
+from core.condition.bearing_condition import OperatingPoint
+from core.condition.operating_state import OperatingState
 from service.store.port import AlarmQuery, StoreError
 from service.store.sqlite import SqliteStore
+from service.store.value_range import ValueRange
 
 T0 = 1_767_225_600_000_000_000
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
+POINT = OperatingPoint(FULL, 0.37, -12.5, 46.2)
+ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit", point=POINT)
 
 
 def identity(subject: str = "UJB", unit: str = "U1") -> AlarmIdentity:
@@ -43,7 +48,7 @@ def then(news: AlarmNews, condition: Condition, now_ns: int) -> AlarmNews:
 
 def as_stored(alarm: Alarm) -> Alarm:
     """All of an alarm but its timers, which a restart forgets."""
-    condition = replace(alarm.condition, suppressed_by=alarm.suppressed_by)
+    condition = replace(alarm.condition, suppressed_by=alarm.suppressed_by, point=None)
     return replace(alarm, condition=condition, timers=(RESTED, RESTED))
 
 
@@ -57,7 +62,7 @@ LIFE = st.lists(
     st.sampled_from(
         [
             ALERT,
-            Condition(AlarmLevel.DANGER, value=250.0, limit=200.0),
+            Condition(AlarmLevel.DANGER, value=250.0, limit=200.0, point=OperatingPoint()),
             Condition(value=3.0),
             unknown("sensor_failure"),
             unknown("standstill", "standstill"),
@@ -137,3 +142,33 @@ def test_events_are_found_by_alarm_unit_kind_and_time_page_by_page(store: Sqlite
         pages.append([stored.event.time_ns - T0 for stored in page])
         before = page[-1].id
     assert pages == [[9, 8, 7, 6], [5, 4, 3, 2], [1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found"),
+    [
+        ({}, "ABCDE"),
+        ({"states": (FULL,)}, "AB"),
+        ({"states": (FULL, PART)}, "ABC"),
+        ({"eccentricity_ratio": ValueRange(0.35, 0.4)}, "AC"),
+        ({"oil_temperature_c": ValueRange(high=46.2)}, "AB"),
+        ({"attitude_deg": ValueRange(low=0.0)}, "BC"),
+        ({"states": (FULL,), "attitude_deg": ValueRange(high=0.0)}, "A"),
+    ],
+)
+def test_events_are_found_by_the_condition_at_which_their_occurrence_was_raised(
+    store: SqliteStore, wanted: dict[str, object], found: str
+) -> None:
+    others = (OperatingPoint(FULL, 0.5, 10.0, 40.0), OperatingPoint(PART, 0.38, 20.0, 48.0))
+    points = dict(zip("ABCDE", (POINT, *others, OperatingPoint(), None), strict=True))
+    for subject, point in points.items():
+        first = AlarmNews(
+            *advance(Alarm(identity(subject)), replace(ALERT, point=point), T0, AlarmRule())
+        )
+        store.append([], [], [first, then(first, Condition(), T0 + 5)])
+
+    events = [s.event for s in store.alarm_events(AlarmQuery(**wanted))]  # type: ignore[arg-type]
+
+    assert {event.identity.subject for event in events} == set(found)
+    assert len(events) == 2 * len(found)
+    assert all(event.raised_at == points[event.identity.subject] for event in events)

@@ -1,14 +1,14 @@
 /** The newest events of all alarms, one line each. */
 
-import { alarmReasonWords, changeWords, kindWords, placeWords, valueWords } from "../alarm_words.js";
+import { alarmReasonWords, changeWords, kindWords, placeWords, raisedWords, valueWords } from "../alarm_words.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { evidenceLinks } from "../parts/evidence.js";
 
-const HEADS = ["Time", "Where", "What", "Change", "Value", "By", "Reason"];
+const HEADS = ["Time", "Where", "What", "Change", "Value", "Raised at", "By", "Reason"];
 
-/** Returns `{ node, draw(events), fail(sentence) }`. */
-export function historyTable() {
+/** Returns `{ node, draw(events), fail(sentence) }`; `filter` says which events are wanted. */
+export function historyTable(filter) {
   const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
   const body = element("tbody", { role: "rowgroup" });
   const sentence = element("p", { class: "sentence" }, "Nothing has happened yet.");
@@ -18,15 +18,16 @@ export function historyTable() {
     element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads)),
     body,
   );
-  let newest = null;
+  let shown = null;
   return {
-    node: element("section", { class: "panel alarm-list" }, element("h2", {}, "History"), sentence, table),
+    node: element("section", { class: "panel alarm-list" }, element("h2", {}, "History"), filter.node, sentence, table),
     draw(events) {
       table.hidden = events.length === 0;
       sentence.hidden = events.length > 0;
-      setText(sentence, "Nothing has happened yet.");
-      if (events[0]?.id === newest) return; // events never change
-      newest = events[0]?.id ?? null;
+      setText(sentence, filter.query().length ? "Nothing was raised under that condition." : "Nothing has happened yet.");
+      const ids = events.map(({ id }) => id).join();
+      if (ids === shown) return; // events never change
+      shown = ids;
       body.replaceChildren(...events.map(eventRow));
     },
     fail(words) {
@@ -43,6 +44,7 @@ function eventRow(event) {
     kindWords(event.kind),
     changeWords(event.change) + (event.change === "raised" && event.level === "danger" ? " as danger" : ""),
     valueWords(event),
+    raisedWords(event),
     event.actor,
     event.actor ? event.reason : alarmReasonWords(event.reason),
   ];

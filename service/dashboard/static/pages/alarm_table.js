@@ -1,6 +1,6 @@
 /** Alarms as a table; a row stays the same row as long as its alarm is there. */
 
-import { conditionWords, holdWords, kindWords, levelMark, placeWords, stateWords, valueWords } from "../alarm_words.js";
+import { conditionWords, holdWords, kindWords, levelMark, placeWords, raisedWords, stateWords, valueWords } from "../alarm_words.js";
 import { alarmPlace } from "../alarm_place.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
@@ -50,13 +50,14 @@ function alarmRow(actor, again) {
   const priority = mark();
   const texts = HEADS.slice(1, -1).map((head) => element(head === "Where" ? "a" : "span"));
   const hold = element("span", { class: "hold" });
+  const raisedAt = element("span", { class: "hold" });
   const actions = alarmActions(actor, again);
   const cells = [priority.node, ...texts, actions.node].map((node, index) =>
     element("td", { role: "cell", "data-head": HEADS[index] }, node),
   );
   const evidence = evidenceLinks();
   cells[1].append(hold);
-  cells[6].append(evidence.node);
+  cells[6].append(raisedAt, evidence.node);
   const node = element("tr", { role: "row" }, ...cells);
   return {
     node,
@@ -75,6 +76,7 @@ function alarmRow(actor, again) {
       texts.forEach((text, index) => setText(text, words[index]));
       setAttribute(texts[HEADS.indexOf("Where") - 1], "href", alarmPlace(alarm));
       setText(hold, holdWords(alarm));
+      setText(raisedAt, raisedWords(alarm));
       evidence.draw(alarm.id, alarm.occurrence);
       actions.draw(alarm);
     },

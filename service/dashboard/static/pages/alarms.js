@@ -9,6 +9,7 @@ import { deliveryView } from "../parts/delivery.js";
 import { mark } from "../parts/mark.js";
 import { poll } from "../poll.js";
 import { actorField } from "./alarm_actor.js";
+import { alarmFilter } from "./alarm_filter.js";
 import { historyTable } from "./alarm_history.js";
 import { ratesLine } from "./alarm_rates.js";
 import { alarmTable } from "./alarm_table.js";
@@ -31,7 +32,8 @@ export function alarmsPage(main) {
   const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);
   const unjudged = unjudgedView();
   const rates = ratesLine();
-  const history = historyTable();
+  const filter = alarmFilter(() => histories.again());
+  const history = historyTable(filter);
   const head = element("div", { class: "alarms-head" }, element("h1", { tabindex: "-1" }, "Alarms"), state.node, done, actor.node);
   const delivery = deliveryView();
   main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, rates.node, history.node);
@@ -64,7 +66,7 @@ export function alarmsPage(main) {
 
   async function askHistory(signal) {
     try {
-      history.draw((await ask(["alarms", "events"], [["limit", N_EVENTS]], signal)).events);
+      history.draw((await ask(["alarms", "events"], [["limit", N_EVENTS], ...filter.query()], signal)).events);
     } catch (error) {
       if (!signal.aborted) history.fail(error.message);
     }
