@@ -1,6 +1,6 @@
 """`Assessment`: what is known of one bearing at one refresh."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -9,6 +9,7 @@ from core.condition.bearing_condition import BearingCondition
 from core.cross_spectrum import CrossSpectrum
 from core.estimators import Estimator
 from core.quality import Quality, Reading
+from core.recent import RecentReadings
 from core.runout import RunoutVerdict
 from core.speed import SpeedSource
 from core.uncertainty import Budget
@@ -90,6 +91,9 @@ class Assessment:
     clipped_share
         Share of the newest segment's samples at an end of the converter's range, by "shaft_x" to
         "bearing_y"; empty without waveforms.
+    recent
+        Vibration just now, oldest first: of the newest parts of what `readings` average; empty if
+        it is not known apart.
     evidence
         Waveforms, or what a rack has made of them: then there is no coherence, and equation (5)
         cannot tell noise from motion.
@@ -110,5 +114,6 @@ class Assessment:
     orbit: OrbitTrace | None
     runout: Mapping[str, RunoutVerdict]
     clipped_share: Mapping[str, float] = field(default_factory=dict)
+    recent: Sequence[RecentReadings] = ()
     evidence: Evidence = Evidence.WAVEFORMS
     condition: BearingCondition | None = None

@@ -12,6 +12,7 @@ from core.line_results import AMPLITUDES
 from core.machine import Bearing, Unit
 from core.monitor_state import MonitorState
 from core.monitored_unit import MonitoredUnit
+from core.overall_results import recent_results
 from core.position_results import measured_growth
 from core.quality import worst
 from core.ring import Ring
@@ -157,11 +158,15 @@ class UnitMonitor(MonitoredUnit):
                 "shaft_y": newest.runout[bearing.shaft_y],
             },
             clipped_share=self._clipped_share(bearing, newest),
+            recent=recent_results(newest, self._rows(bearing), self.unit.rate_hz),
         )
 
-    def _clipped_share(self, bearing: Bearing, newest: Segment) -> dict[str, float]:
+    def _rows(self, bearing: Bearing) -> list[int]:
         by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
-        rows = [by_id[id_] for id_ in bearing.channels]
+        return [by_id[id_] for id_ in bearing.channels]
+
+    def _clipped_share(self, bearing: Bearing, newest: Segment) -> dict[str, float]:
+        rows = self._rows(bearing)
         shares = newest.clipped_share[rows].tolist()
         return dict(zip(AMPLITUDES, shares, strict=True))
 

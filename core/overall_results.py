@@ -7,12 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.line_results import AMPLITUDES
 from core.quality import Quality, Reading, Reason, current_mean, missing, worst
+from core.recent import RecentReadings
 from core.segments import ORDER1, Segment
+from core.units import ns_from_s
 
 SHAFT_SPANS = {
     "overall_shaft_x_um_pp": SHAFT_X,
     "overall_shaft_y_um_pp": SHAFT_Y,
 }
+SHAFTS = {SHAFT_X: "shaft_x", SHAFT_Y: "shaft_y"}
 BEARING_SPEEDS = {
     "overall_bearing_x_mm_s_rms": BEARING_X,
     "overall_bearing_y_mm_s_rms": BEARING_Y,
@@ -56,6 +59,44 @@ def overall_results(
         )
         for name, place in BEARING_SPEEDS.items()
     }
+
+
+def recent_results(
+    segment: Segment, rows: Sequence[int], rate_hz: float
+) -> tuple[RecentReadings, ...]:
+    """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    """
+    recent, found = segment.recent, []
+    if recent is None:
+        return ()
+    for part, stop in enumerate(recent.stop.tolist()):
+        behind_ns = ns_from_s((segment.stop_index - segment.first_index - stop) / rate_hz)
+        readings = {}
+        for place, name in SHAFTS.items():
+            row = rows[place]
+            is_span = not math.isnan(segment.overall.peak_to_peak_um[row])
+            span = recent.peak_to_peak_um[part, row] if is_span else math.nan
+            readings[f"overall_{name}_um_pp"] = _reading(segment, (row,), span)
+            readings[f"order1_{name}_um_pk"] = _turning(
+                segment, _reading(segment, (row,), recent.order1_um_pk[part, row])
+            )
+        found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
+    speeds = {name: _speed(segment, rows[place]) for name, place in BEARING_SPEEDS.items()}
+    newest = found[-1]
+    return (*found[:-1], RecentReadings(newest.time_ns, {**newest.readings, **speeds}))
+
+
+def _turning(segment: Segment, amplitude: Reading) -> Reading:
+    """An amplitude at 1×, as far as the speed is known."""
+    speed = segment.speed.rpm
+    if speed.value is None or amplitude.value is None:
+        return speed if speed.value is None else amplitude
+    return Reading(amplitude.value, worst((amplitude.quality, speed.quality)))
 
 
 def phase_results(

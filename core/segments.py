@@ -15,6 +15,7 @@ from core.lines import bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.overall import Overall, OverallTransform
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
+from core.recent import RecentVibration, parts_of
 from core.runout import RunoutVerdict
 from core.segment_runout import shaft_angle_rad, without_runout
 from core.sensor_checks import (
@@ -67,6 +68,8 @@ class Segment:
     shaft_angle_rad
         Angle that the shaft has turned at the first sample since its mark passed the pick-up; None
         where no key-phase says so.
+    recent
+        Vibration of the newest parts; None without waveforms.
     """
 
     epoch: int
@@ -85,6 +88,7 @@ class Segment:
     overall: Overall
     clipped_share: FloatArray
     shaft_angle_rad: float | None = None
+    recent: RecentVibration | None = None
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
@@ -166,6 +170,7 @@ class SegmentTransform:
             runout=runout,
             overall=self._overall.of(samples, lines),
             clipped_share=clipped,
+            recent=self._recent(samples, window.rate_hz, turn_hz, speed, key_phase),
             shaft_angle_rad=shaft_angle_rad(speed, key_phase),
         )
         self.segments.append(segment)
@@ -247,6 +252,27 @@ class SegmentTransform:
             phasors[:, ORDER1], self._unit, rows, speed, key_phase
         )
         return phasors, runout
+
+    def _recent(
+        self,
+        samples: FloatArray,
+        rate_hz: float,
+        turn_hz: float,
+        speed: Speed,
+        key_phase: KeyPhase | None,
+    ) -> RecentVibration:
+        starts, stops = parts_of(samples.shape[1], self._settings.hop_samples, rate_hz / turn_hz)
+        order_hz, rows = np.array([turn_hz]), np.flatnonzero(self._is_shaft).tolist()
+        factor = _factors(self._unit.channels, order_hz)[:, 0]
+        amplitudes, spans = [], []
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            part = samples[:, start:stop]
+            phasors = factor * exact_phasors(tapered(part), rate_hz, order_hz)[:, 0]
+            phasors *= np.exp(-2j * np.pi * turn_hz * start / rate_hz)  # of the segment's first
+            clean, _ = without_runout(phasors, self._unit, rows, speed, key_phase)
+            amplitudes.append(np.abs(clean))
+            spans.append(np.ptp(part, axis=1))
+        return RecentVibration(stops, np.array(amplitudes), np.array(spans))
 
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]

@@ -3,11 +3,9 @@
 from collections import deque
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from core.assessment import Assessment, AveragingWindow
 from core.blocks import SampleBlock
-from core.cross_spectrum import CrossSpectrum
+from core.cross_spectrum import NO_SPECTRUM
 from core.machine import Bearing, Unit
 from core.monitor import JUDGED
 from core.monitor_state import MonitorState
@@ -140,13 +138,14 @@ class VectorMonitor(MonitoredUnit):
             readings=results.readings,
             budgets=results.budgets,
             estimators=results.estimators,
-            spectrum=no_spectrum(),
+            spectrum=NO_SPECTRUM,
             orbit=None,
             runout={
                 "shaft_x": self._runout(bearing.shaft_x),
                 "shaft_y": self._runout(bearing.shaft_y),
             },
             evidence=results.evidence,
+            recent=results.recent,
         )
 
     def _runout(self, id_: str) -> RunoutVerdict:
@@ -155,13 +154,3 @@ class VectorMonitor(MonitoredUnit):
         return runout_verdict(
             channel.slow_roll, channel.probe, self.unit.rated_speed_rpm, has_key_phase=False
         )
-
-
-def no_spectrum() -> CrossSpectrum:
-    """The spectrum of what has no waveform: no lines, of no segments."""
-    return CrossSpectrum(
-        frequency_hz=np.empty(0),
-        matrix=np.empty((0, 4, 4), dtype=np.complex128),
-        power=np.empty((0, 4, 4)),
-        n_segments=np.zeros((4, 4), dtype=np.int64),
-    )

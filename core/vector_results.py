@@ -10,11 +10,12 @@ from core.assessment import Evidence
 from core.estimators import STIFFNESS_OF, Estimator, preferred_stiffness
 from core.film_results import NAMES as DYNAMIC_NAMES
 from core.machine import Bearing, Unit
-from core.overall_results import OVERALL_NAMES
+from core.overall_results import OVERALL_NAMES, SHAFTS
 from core.polarity import signs_checked
 from core.position_results import mean_slow, position_results
 from core.probe_axes import Growth
 from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, uncertain, worst
+from core.recent import RecentReadings
 from core.segments import ORDER1, VORTEX
 from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
@@ -47,6 +48,8 @@ class VectorResults:
         Of the readings whose uncertainty is known, by quantity.
     estimators
         Where `stiffness` came from, by axes "xx" and "yy".
+    recent
+        Shaft vibration at 1× of each poll since the result before.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class VectorResults:
         self.budgets: Mapping[str, Budget] = {}
         self.estimators: Mapping[str, Estimator | None] = {}
         self.readings = self._readings()
+        self.recent = [self._recent(poll) for poll in polls[-averaging.hop_polls :]]
 
     def _line(self, line: int) -> VectorLine:
         polls = self._polls
@@ -116,6 +120,17 @@ class VectorResults:
         chosen = {axes: self._preferred(readings, axes) for axes in ("xx", "yy")}
         self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
         return readings | {f"stiffness_{a}_n_per_m": reading for a, (reading, _) in chosen.items()}
+
+    def _recent(self, poll: Poll) -> RecentReadings:
+        found = {f"order1_{name}_um_pk": self._amplitude(poll, p) for p, name in SHAFTS.items()}
+        return RecentReadings(poll.time_ns, found)
+
+    def _amplitude(self, poll: Poll, place: int) -> Reading:
+        row, speed = self._rows[place], poll.speed.rpm
+        quality = worst((speed.quality, poll.quality[row][ORDER1]))
+        if speed.value is None or not poll.usable(ORDER1)[row]:
+            return missing(quality.reason)
+        return Reading(float(abs(poll.phasors_um_pk[row, ORDER1])), quality)
 
     def _preferred(
         self, readings: Mapping[str, Reading], axes: str

@@ -37,6 +37,9 @@ READINGS: dict[str, dict[AlarmKind, str]] = {
 }
 """The alarms of each rule of a bearing, and the reading that each of them looks at."""
 
+FAST = ("shaft_order1", "shaft_overall", "bearing_overall")
+"""Rules about what may change within seconds. Zones are for steady operation (ISO 20816-1)."""
+
 CHANGES: dict[str, dict[AlarmKind, str]] = {
     "shaft_change": {
         AlarmKind.CHANGE_SHAFT_X: "shaft_x",
@@ -73,5 +76,7 @@ def _watches(
             is_there = kind not in OPPOSITE or getattr(bearing, OPPOSITE[kind]) is not None
             if rule is not None and is_there:
                 identity = AlarmIdentity(unit, bearing.id, kind)
-                watches.append(LimitWatch(identity, rule.rule, source, rule.by_condition))
+                watches.append(
+                    LimitWatch(identity, rule.rule, source, rule.by_condition, name in FAST)
+                )
     return tuple(watches)

@@ -238,9 +238,10 @@ class UnitAlarms:
         point = point_of(assessment)
         self._points[bearing] = (point, now_ns)
         for watch in self._watched.readings[bearing]:
-            held = self._board.alarm(watch.id).condition.level
-            condition = watch.limits.judge(readings[watch.source], point, held)
-            self._board.advance(watch.id, _at(point, condition), now_ns)
+            for then_ns, reading in _seen(watch, assessment):
+                held = self._board.alarm(watch.id).condition.level
+                condition = watch.limits.judge(reading, point, held)
+                self._board.advance(watch.id, _at(point, condition), then_ns)
         for watch in self._watched.changes[bearing]:
             condition = self._change(watch, assessment, point)
             self._board.advance(watch.id, _at(point, condition), now_ns)
@@ -333,6 +334,14 @@ class UnitAlarms:
             return  # as nearly always
         condition = watch.limits.judge(reading, point, alarm.condition.level)
         self._board.find(watch, _at(point, condition), now_ns)
+
+
+def _seen(watch: LimitWatch, assessment: Assessment) -> list[tuple[int, Reading]]:
+    """What an alarm looks at in a result, with its times: vibration just now, or an average."""
+    source = watch.source
+    recent = assessment.recent if watch.is_fast else ()
+    found = [(each.time_ns, each.readings[source]) for each in recent if source in each.readings]
+    return found or [(assessment.time_ns, assessment.readings[source])]
 
 
 def _at(point: OperatingPoint, condition: Condition) -> Condition:

@@ -29,6 +29,13 @@ class Watch:
 
 @dataclass(frozen=True)
 class LimitWatch(Watch):
-    """One that compares a value with limits."""
+    """One that compares a value with limits.
+
+    Parameters
+    ----------
+    is_fast
+        Whether it looks at what is known of just now, and not at averages over minutes.
+    """
 
     limits: ConditionLimits
+    is_fast: bool = False

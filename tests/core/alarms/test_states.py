@@ -62,6 +62,7 @@ class Machine:
         readings |= {n: r if isinstance(r, Reading) else Reading(r) for n, r in found.items()}
         condition = state if state is None else BearingCondition(state, False, None)
         assessment: Any = SimpleNamespace(
+            recent=(),
             unit="U1",
             bearing="UJB",
             time_ns=self.n * SECOND,

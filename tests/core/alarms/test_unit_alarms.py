@@ -43,6 +43,7 @@ def assessed(**readings: Reading) -> Any:
         readings=all_,
         condition=None,
         clipped_share={"shaft_x": 0.04},
+        recent=(),
     )
 
 
