@@ -43,7 +43,7 @@ from service.stream.consumer import Consumer
 from service.stream.consumer_metrics import consumer_metrics
 from service.stream.names import identity_of
 from service.stream.progress import UnitProgress
-from service.stream.silence import Silence
+from service.stream.silence import Silence, silences_s
 from service.stream.stored import memories_of, usable
 from service.supervision import Supervision
 from service.wiring.delivery import router_of
@@ -174,8 +174,8 @@ class Analysing:
         everywhere = [unit.id for unit in self._plant.unit]
         silent = SilentUnits(everywhere, analysis.alarms, ground.store, ground.clock)
         self._silent_units = silent
-        after_s = self._settings.silent_after_s
-        self._silence = Silence(monitors, after_s, analysis.analyser, ground.live, ground.clock)
+        after_s = silences_s(ground.plant.unit, self._settings.silent_after_s)
+        self._silence = Silence(after_s, analysis.analyser, ground.live, ground.clock)
         tend = ground.beats.tend
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)

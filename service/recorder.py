@@ -81,6 +81,9 @@ class Recorder:
         Called when news of alarms has been written.
     timed
         Entered, in the thread, while the store writes.
+    finds_again
+        Whether what was not written when the process ends is found once more by the next one, as
+        by blocks that stay on a stream.
     """
 
     def __init__(
@@ -92,9 +95,12 @@ class Recorder:
         capacity: int = 5000,
         told: Callable[[], None] = lambda: None,
         timed: Callable[[], AbstractContextManager[None]] = nullcontext,
+        *,
+        finds_again: bool = False,
     ) -> None:
         self._store, self._live, self._clock, self._parked = store, live, clock, parked
         self._capacity, self._told, self._timed = capacity, told, timed
+        self._finds_again = finds_again
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
         self._waits_since_s = 0.0
@@ -186,9 +192,13 @@ class Recorder:
     async def flush(self) -> None:
         """Write what is queued now, once; used at the end."""
         if (self._waiting or self._alarms) and not await self._write():
-            log.error(
-                "results are lost", n_findings=len(self._waiting), n_alarm_news=len(self._alarms)
-            )
+            counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
+            if self._finds_again:
+                log.warning(
+                    "results were not stored; they are found again at the next start", **counts
+                )
+            else:
+                log.error("results are lost", **counts)
 
     async def _write(self) -> bool:
         batch, alarms = list(self._waiting), list(self._alarms)

@@ -58,7 +58,7 @@ class ServiceHealth:
     stream_trouble
         Why blocks are not read from the stream just now; None if they are, or need not be.
     accounts
-        Where samples went, by unit.
+        Where samples went, by unit of which some have come since the start.
     disk
         Judges how full the disks are.
     """
@@ -128,7 +128,11 @@ def health_of(
             refused=load.words if load else None,
             stored_trouble=soundness.trouble if soundness else None,
             stream_trouble=stream.trouble() if stream else None,
-            accounts={unit: live.status(unit).account for unit in names},
+            accounts={
+                unit: status.account
+                for unit in names
+                if (status := live.status(unit)).last_sample_ns is not None
+            },
             disk=enough_room if space is None else space.condition,
         )
 

@@ -45,6 +45,10 @@ class SampleLoss:
         n_dropped = n_repeated if n_repeated > n_new else 0
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
+    def reaches_back(self, now_ns: int) -> bool:
+        """Whether all of the last ten minutes was seen here, or nearly."""
+        return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
+
 
 class ServiceAlarms:
     """Owns the alarms that belong to no unit, and those of units that are there no more.
@@ -77,6 +81,7 @@ class ServiceAlarms:
         self._watches = {key: its for key, its in watches.items() if leads or key in own}
         self._board = AlarmBoard(self._watches.values())
         self._losses = {unit: SampleLoss() for unit in names}
+        self._inherited: set[str] = set()
         self._n_unstored = 0
         self._n_damaged = 0
 
@@ -103,8 +108,17 @@ class ServiceAlarms:
         return self._board.told()
 
     def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
-        """Go on where the service stopped."""
+        """Go on where the service stopped.
+
+        Of what was lost before nothing is known here: lost samples that are an alarm stay one until
+        this process has seen ten minutes without.
+        """
         self._board.restore(alarms, host_ns)
+        self._inherited = {
+            unit
+            for unit in self._losses
+            if self._board.alarm(self._watches[loss_key(unit)].id).level is not None
+        }
         return self._board.told()
 
     def pause(self) -> None:
@@ -155,8 +169,12 @@ class ServiceAlarms:
 
     def _count_losses(self, health: ServiceHealth, now_ns: int) -> None:
         for unit, account in health.accounts.items():
-            share = self._losses[unit].share(account, now_ns)
-            self._find(loss_key(unit), self._compared(loss_key(unit), share), now_ns)
+            seen = self._losses[unit]
+            condition = self._compared(loss_key(unit), seen.share(account, now_ns))
+            if condition.level is not None or seen.reaches_back(now_ns):
+                self._inherited.discard(unit)
+            if unit not in self._inherited:
+                self._find(loss_key(unit), condition, now_ns)
 
     def _store(self, health: ServiceHealth) -> Condition:
         found = self._compared(AlarmKind.RESULTS_NOT_STORED, health.store_behind_s)

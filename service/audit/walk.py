@@ -43,6 +43,9 @@ class Verdict:
         What is wrong with what follows; None if nothing is.
     n_behind
         By how many entries the head lags, as after a crash; it is repaired by the next entry.
+    is_shared
+        Whether other hosts write to the trail as well, each with a head of its own: then it lags
+        by what they have written since.
     told
         Entries which tell that the head did not fit the chain when they were written.
     """
@@ -52,6 +55,7 @@ class Verdict:
     finding: Finding | None
     n_behind: int = 0
     told: tuple[int, ...] = ()
+    is_shared: bool = False
 
     @property
     def is_whole(self) -> bool:
@@ -60,7 +64,11 @@ class Verdict:
 
 
 def walk(
-    entries: Iterable[AuditEntry], head: AuditHead | str, rename: Callable[[AuditEntry], str]
+    entries: Iterable[AuditEntry],
+    head: AuditHead | str,
+    rename: Callable[[AuditEntry], str],
+    *,
+    is_shared: bool = False,
 ) -> Verdict:
     """Look at every entry, oldest first, and compare the last with the head.
 
@@ -71,21 +79,23 @@ def walk(
         behind them, never the other way round.
     rename
         Says in words where an entry belongs whose hash is not its own.
+    is_shared
+        Whether other hosts write to the trail as well.
     """
     number, hash_, at_head = 0, FIRST, ""
     told: list[int] = []
     for entry in entries:
         finding = _wrong(entry, number, hash_, rename)
         if finding is not None:
-            return Verdict(number, hash_, finding, told=tuple(told))
+            return Verdict(number, hash_, finding, told=tuple(told), is_shared=is_shared)
         number, hash_ = entry.number, entry.hash
         if entry.action == HEAD_DIFFERED:
             told.append(number)
         if isinstance(head, AuditHead) and number == head.number:
             at_head = hash_
-    finding = _wrong_head(number, at_head, head)
+    finding = _wrong_head(number, at_head, head, is_shared)
     n_behind = 0 if finding or isinstance(head, str) else number - head.number
-    return Verdict(number, hash_, finding, n_behind, tuple(told))
+    return Verdict(number, hash_, finding, n_behind, tuple(told), is_shared)
 
 
 def _wrong(
@@ -105,7 +115,9 @@ def _wrong(
     return None
 
 
-def _wrong_head(number: int, at_head: str, head: AuditHead | str) -> Finding | None:
+def _wrong_head(
+    number: int, at_head: str, head: AuditHead | str, is_shared: bool
+) -> Finding | None:
     if isinstance(head, str):
         return Finding(None, f"the head {head}: nothing says how far the trail went")
     if head.number > number:
@@ -113,7 +125,7 @@ def _wrong_head(number: int, at_head: str, head: AuditHead | str) -> Finding | N
         if head.number == number + 1:
             count = f"entry {head.number} is"
         return Finding(number + 1, f"{count} missing at the end: the head names {head.number}")
-    if number - head.number > MAX_BEHIND:
+    if number - head.number > MAX_BEHIND and not is_shared:
         return Finding(None, f"the head names entry {head.number}, the trail goes to {number}")
     if (at_head if head.number else FIRST) != head.hash:
         return Finding(head.number or None, f"entry {head.number} is not the one the head names")

@@ -69,7 +69,12 @@ def _lines(verdict: Verdict, told: list[int]) -> list[str]:
     lines = [f"{verdict.n_entries} entries are whole; the last has the hash {verdict.hash}"]
     if verdict.finding is not None:
         lines.append(f"NOT WHOLE: {verdict.finding.detail}")
-    if verdict.n_behind:
+    if verdict.n_behind and verdict.is_shared:
+        lines.append(
+            f"the head of this host names entry {verdict.n_entries - verdict.n_behind}; the"
+            f" {verdict.n_behind} after it are other hosts', or this one's just before a crash"
+        )
+    elif verdict.n_behind:
         lines.append(
             f"the head lags by {verdict.n_behind}, as after a crash; the next entry repairs it"
         )

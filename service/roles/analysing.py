@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Mapping
 
+from core.account import SampleAccount
 from core.blocks import SampleBlock
 from core.counts import Counts
 from core.monitor_port import Monitor
@@ -73,14 +74,22 @@ class Analyser:
             return Findings(assessments, gaps, news, films)
         return NOTHING
 
-    async def relive(self, block: SampleBlock, sampled_s: float) -> None:
-        """Take a block in whose findings are stored already; nobody is told again."""
+    async def relive(
+        self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
+    ) -> None:
+        """Take a block in whose findings are stored already; nobody is told again.
+
+        Parameters
+        ----------
+        account
+            Of the unit's samples, as it was stored: the monitor counts these a second time.
+        """
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].again(block)
         for _ in monitor.steps(block):
             await _others()
         monitor.drain_gaps()
-        self._live.set_received(block, monitor.account, sampled_s)
+        self._live.set_received(block, account or monitor.account, sampled_s)
 
     def state(self, unit: str) -> MonitorState:
         """What must be known of a monitor beside its newest samples."""

@@ -150,8 +150,15 @@ async def analysis_on(
             monitor.go_on(await asyncio.to_thread(store.reach, unit))
     deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
     commits = ground.timings.commits
-    parked = ParkedRows(Path(plant.service.data_folder) / FILE)
-    recorder = Recorder(store, live, clock, parked, told=deliveries.wake, timed=commits.timed)
+    recorder = Recorder(
+        store,
+        live,
+        clock,
+        ParkedRows(Path(plant.service.data_folder) / FILE),
+        told=deliveries.wake,
+        timed=commits.timed,
+        finds_again=stream is not None,
+    )
     captures = captures_of(plant, origin, clock)
     recordings = waveform_keeper(plant, store, clock)
     load = LoadWatch(bus, LoadLimits(), clock)

@@ -60,8 +60,9 @@ class StreamSettings(Settings):
     """Most memory for blocks that wait for the servers, MB; then blocks wait at the devices, whose
     own rings overrun later."""
 
-    silent_after_s: Annotated[float, Field(ge=2.0, le=3600.0)] = 30.0
-    """After how long without a block a unit counts as lost, also right after a start; s."""
+    silent_after_s: Annotated[float, Field(ge=2.0, le=3600.0)] = 5.0
+    """After how long without a block a unit counts as not connected, also right after a start; s.
+    Where blocks come more slowly, at least as long as three of them take."""
 
     acquire_port: Annotated[int, Field(ge=0, le=65535)] = 8091
     """Port of the health page of padwatch acquire, on this computer only; 0 takes a free one."""

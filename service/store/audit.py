@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from service.audit.entry import AuditEntry, Deed
@@ -69,10 +70,12 @@ class Trail:
         Opens a look at the database, in which text tells every byte from every other.
     head
         File that names the newest entry.
+    is_shared
+        Whether other hosts write to it as well, each with a head of its own.
     """
 
-    def __init__(self, reading: Connect, head: Path) -> None:
-        self._reading, self._head = reading, head
+    def __init__(self, reading: Connect, head: Path, *, is_shared: bool = False) -> None:
+        self._reading, self._head, self._is_shared = reading, head, is_shared
 
     def verify(self) -> Verdict:
         """Walk all of it, without changing anything.
@@ -85,7 +88,15 @@ class Trail:
         head = self._read_head()  # first: it may lag, but not lead
         with self._reading() as reader:
             last = newest_of(reader).number
-            return walk(_all(reader), head, lambda entry: place_of(entry, last))
+            verdict = walk(
+                _all(reader),
+                head,
+                lambda entry: place_of(entry, last),
+                is_shared=self._is_shared,
+            )
+        if verdict.n_behind and self._read_head() == AuditHead(verdict.n_entries, verdict.hash):
+            return replace(verdict, n_behind=0)  # somebody wrote in between
+        return verdict
 
     @contextmanager
     def entries(self) -> Iterator[Iterator[AuditEntry]]:

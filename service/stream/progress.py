@@ -161,7 +161,8 @@ class UnitProgress:
             return
         self._live.set_link(self.unit, LinkState.CONNECTED)
         self._rewind(message.block)
-        await self._analyser.relive(message.block, self._sampled_s(message))
+        account = self._memory.monitor.account if self._memory else None
+        await self._analyser.relive(message.block, self._sampled_s(message), account)
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _is_done(self, message: Taken | LinkNews) -> bool:

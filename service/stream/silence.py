@@ -8,9 +8,20 @@ from acquisition.clock import Clock
 from service.live import LinkState, LiveView
 from service.roles.analysing import Analyser
 from service.roles.link_news import LinkNews
+from service.settings.units import UnitSettings
 from service.stream.progress import UnitProgress
 
 log = structlog.get_logger()
+
+MIN_BLOCKS = 3
+"""Blocks that are missing in a row; where a sample is a poll, a block may take a minute."""
+
+
+def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float]:
+    """How long each unit may be silent: by the settings, and as its blocks come."""
+    return {
+        unit.id: max(least_s, MIN_BLOCKS * unit.block_samples / unit.sampling_hz) for unit in units
+    }
 
 
 class Silence:
@@ -22,13 +33,13 @@ class Silence:
     Parameters
     ----------
     after_s
-        How long a unit may be silent.
+        How long each unit may be silent.
     """
 
     def __init__(
-        self, units: Iterable[str], after_s: float, analyser: Analyser, live: LiveView, clock: Clock
+        self, after_s: Mapping[str, float], analyser: Analyser, live: LiveView, clock: Clock
     ) -> None:
-        self._units, self._after_s, self._clock = list(units), after_s, clock
+        self._after_s, self._clock = after_s, clock
         self._analyser, self._live = analyser, live
         self._since_s = clock.monotonic_s()
 
@@ -50,12 +61,12 @@ class Silence:
             Units of which something has come that was not taken in yet: these are not silent,
             however long the store holds them up.
         """
-        for unit in self._units:
+        for unit, after_s in self._after_s.items():
             if unit in waiting:
                 continue
             if unit in begun:
-                begun[unit].fall_silent(self._after_s, trouble)
-            elif self._clock.monotonic_s() - self._since_s > self._after_s:
+                begun[unit].fall_silent(after_s, trouble)
+            elif self._clock.monotonic_s() - self._since_s > after_s:
                 self._lose(unit, trouble or "the stream has not been reached yet")
 
     def _lose(self, unit: str, reason: str) -> None:

@@ -13,7 +13,7 @@ from service.store.postgres.readers import Readers
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
     """Trail of a database, which is opened as it is read, and the head that this host has."""
-    return Trail(partial(_opened, address), head)
+    return Trail(partial(_opened, address), head, is_shared=True)
 
 
 @contextmanager

@@ -105,6 +105,19 @@ def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
     assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
 
 
+def test_an_alarm_about_lost_samples_goes_on_after_a_restart_until_ten_minutes_without(
+    watched: Watched, host: Any
+) -> None:
+    watched.after(0.5, **account(60_000, 0))
+    watched.after(10.0, **account(61_000, 5_000))
+    again = Watched(host)
+    again.alarms.restore(watched.alarms.alarms, host.ns)
+    assert again.after(0.5) == []
+    news = [again.after(60.0, **account(61_000 + 36_000 * n, 5_000)) for n in range(12)]
+    assert [bool(words) for words in news] == [False] * 10 + [True, False]
+    assert news[10][-1] == "plant:U1:samples_lost returned"
+
+
 def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_nothing_else(
     host: Any,
 ) -> None:

@@ -1,9 +1,9 @@
 """Entries follow one another, whoever writes them, and are never changed."""
 
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from core.account import Gap
 from service.audit.entry import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
 from service.audit.head import AuditHead, head_path, read_head
 from service.audit.walk import HEAD_DIFFERED
+from service.store.audit import Trail
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, UnitGap
 from service.store.sqlite import SqliteStore
@@ -105,6 +106,20 @@ def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Bui
     verdict = verify_trail(path)
     assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 72, 0)
     assert read_head(head_path(path)) == AuditHead(72, verdict.hash)
+
+
+def test_an_entry_that_is_written_while_the_trail_is_read_is_no_crash(
+    store: SqliteStore, path: Path, deed: Build
+) -> None:
+    @contextmanager
+    def read_late() -> Iterator[sqlite3.Connection]:
+        store.audit.record([deed(1)])
+        with closing(sqlite3.connect(path)) as reader:
+            yield reader
+
+    store.audit.record([deed(0)])
+    verdict = Trail(read_late, head_path(path)).verify()
+    assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 2, 0)
 
 
 def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(

@@ -12,6 +12,7 @@ from typing import Any
 
 import httpx2
 import pytest
+import structlog
 from rigs.alarm_runs import PROBE, Make, changes, play
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap
@@ -26,8 +27,8 @@ from service.api.app import create_app
 from service.api.context import Context
 from service.api.in_process import InProcess
 from service.delivery.deliveries import Deliveries
-from service.parked_rows import FILE
-from service.recorder import Findings, NotStoredError
+from service.parked_rows import FILE, ParkedRows
+from service.recorder import Findings, NotStoredError, Recorder
 from service.references import ReferencesInForce
 from service.store.port import TrendQuery, UnitGap
 
@@ -130,6 +131,27 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     assert plant.live.n_unstored == 0
     assert set(plant.clock.slept_s) == {1.0}
     assert stored(plant)[-1] == plant.live.assessment("U1", "UJB").readings[K].value
+
+
+@pytest.mark.parametrize(
+    ("finds_again", "said"),
+    [
+        (False, ("error", "results are lost")),
+        (True, ("warning", "results were not stored; they are found again at the next start")),
+    ],
+)
+async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(
+    plant: Any, finds_again: bool, said: tuple[str, str]
+) -> None:
+    parked = ParkedRows(plant.path.with_name(FILE))
+    parts = (plant.store, plant.live, plant.clock, parked)
+    recorder = Recorder(*parts, finds_again=finds_again)
+    break_store(plant)
+    recorder.put(Findings([assessment()]))
+    with structlog.testing.capture_logs() as logs:
+        await recorder.flush()
+    assert said in [(line["log_level"], line["event"]) for line in logs]
+    mend_store(plant)
 
 
 @pytest.mark.parametrize("plant", [3], indirect=True)

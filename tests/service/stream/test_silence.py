@@ -17,12 +17,13 @@ from core.alarms.alarm import AlarmKind
 from service.live import LinkState
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery
-from service.stream.silence import Silence
+from service.stream.silence import Silence, silences_s
 from service.stream.wire import encoded_block
 
 LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
 UNIT = "U1"
 LINK = f"{UNIT}:link:link_lost"
+LOST = f"plant:{UNIT}:samples_lost"
 AFTER_S = 30.0
 LINK_DELAY_S = 10.0
 SURELY_S = AFTER_S + LINK_DELAY_S + 5.0
@@ -68,8 +69,13 @@ class Process:
     @property
     def changes(self) -> list[tuple[str, int]]:
         """What became of the alarm about the link, oldest first, with its occurrence."""
-        found = self.life.analysis.ground.store.alarm_events(AlarmQuery(alarm=LINK))
-        return [(event.event.change.value, event.event.occurrence) for event in reversed(found)]
+        return self.changes_of(LINK)
+
+    def changes_of(self, alarm: str) -> list[tuple[str, int]]:
+        """What became of an alarm, oldest first, with its occurrence."""
+        found = self.life.analysis.ground.store.alarm_events(AlarmQuery(alarm=alarm))
+        events = [(event.event.change.value, event.event.occurrence) for event in reversed(found)]
+        return [each for each in events if not each[0].startswith("condition")]
 
     @property
     def n_judged(self) -> int:
@@ -91,6 +97,7 @@ class Place:
         self.messages = [
             (n, encoded_block(b, identity, clock.now_ns())) for n, b in enumerate(sent, 1)
         ]
+        self.first = self.messages[:N_BLOCKS]
 
     @asynccontextmanager
     async def process(self, back: Back = Back.WINDOW) -> AsyncIterator[Process]:
@@ -99,12 +106,12 @@ class Place:
             life = await self._unit.begun(len(self.messages), stack)
             analysis = life.analysis
             parts = (analysis.analyser, analysis.ground.live, self._clock)
-            process = Process(life, Silence([UNIT], AFTER_S, *parts), self._clock)
+            process = Process(life, Silence({UNIT: AFTER_S}, *parts), self._clock)
             process.is_reached = back is not Back.NO_STREAM
             stored = life.progress.is_reliving
             if back is Back.WINDOW:
                 life.progress.reaches_back(1)
-                for sequence, payload in self.messages[:N_BLOCKS] if stored else []:
+                for sequence, payload in self.first if stored else []:
                     await life.progress.take(sequence, payload)
             elif back is Back.NO_WINDOW:
                 life.progress.reaches_back(N_BLOCKS + 1)
@@ -189,6 +196,37 @@ async def test_a_process_that_was_killed_after_blocks_came_back_raises_nothing_a
         await again.wait(AFTER_S - 1.0)
         await again.take(place.messages[N_BLOCKS:])
         assert again.changes == [("raised", 1), ("returned", 1)]
+
+
+async def test_samples_that_were_lost_before_are_no_new_loss_to_a_process_that_takes_over(
+    place: Place,
+) -> None:
+    place.first = [*place.messages[:2], *place.messages[5:N_BLOCKS]]
+    raised = [("raised", 1)]
+    async with place.process() as first:
+        await first.take(place.first)
+        await first.life.store()
+        assert first.changes_of(LOST) == raised
+        account = first.life.analysis.ground.live.status(UNIT).account
+    async with place.process() as again:
+        assert again.life.analysis.ground.live.status(UNIT).account == account
+        await again.wait(2.0)
+        await again.take(place.messages[N_BLOCKS:])
+        await again.wait(500.0)
+        assert again.changes_of(LOST) == raised
+        await again.wait(200.0)
+        assert again.changes_of(LOST) == [*raised, ("returned", 1)]
+
+
+def test_a_unit_whose_blocks_come_seldom_may_be_silent_for_three_of_them(tmp_path: Path) -> None:
+    stream = '[stream]\nservers = ["nats://127.0.0.1:9"]\n'
+    ports = dict.fromkeys(LEDGER.units, 9)
+    plant = load_plant_file(LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream))
+    assert plant.stream is not None
+    often = plant.unit[0]
+    seldom = often.model_copy(update={"id": "U9", "block_samples": round(60 * often.rate_hz)})
+    after_s = silences_s([often, seldom], plant.stream.silent_after_s)
+    assert after_s == {UNIT: 5.0, "U9": pytest.approx(180.0, rel=1e-3)}
 
 
 async def test_a_unit_whose_blocks_wait_for_the_store_is_not_silent(place: Place) -> None:

@@ -91,10 +91,12 @@ def test_a_host_that_comes_later_begins_its_head_and_says_so(
     elsewhere = tmp_path / "elsewhere" / "head.json"
     with closing(PostgresStore(postgres_place.address, elsewhere)) as store:
         actions = [entry.action for entry in store.audit.entries(AuditQuery())]
+        store.audit.record([Deed(n, "anna", "test.done", "two") for n in range(70)])
 
     assert actions == [HEAD_BEGUN, "test.done"]
     assert server_trail(postgres_place.address, elsewhere).verify().is_whole
-    assert server_trail(postgres_place.address, postgres_place.head).verify().n_behind == 1
+    here = server_trail(postgres_place.address, postgres_place.head).verify()
+    assert (here.finding, here.n_behind, here.is_shared) == (None, 71, True)
 
 
 def test_a_trail_that_was_cut_is_noticed_by_every_host(
