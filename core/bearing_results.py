@@ -14,7 +14,7 @@ from core.line_results import OrderLine, other_line_hz
 from core.machine import Bearing, Unit
 from core.overall_results import overall_results, phase_results
 from core.polarity import signs_checked
-from core.position_results import mean_slow, position_results
+from core.position_results import position_results, slow_channels, slow_results
 from core.probe_axes import Growth
 from core.quality import (
     NOT_TOLD,
@@ -77,6 +77,9 @@ class BearingResults:
         self._whole: npt.NDArray[np.bool_] = np.all(self._usable, axis=1)
         self._bins = np.array([segment.bin_phasors_um_pk[self._rows] for segment in segments])
         self.spectrum = average(frequency_hz, self._bins, self._usable)
+        self._order_phasors: ComplexArray = np.array(
+            [segment.order_phasors_um_pk[self._rows] for segment in segments]
+        )
         self._orders = self._average_orders()
         axes_quality = self._order_line(ORDER1).axes_quality(unit.rotation_sense)
         self._doubts = worst((self._steadiness(), axes_quality))
@@ -87,11 +90,8 @@ class BearingResults:
         self.readings = self._readings()
 
     def _average_orders(self) -> CrossSpectrum:
-        phasors: ComplexArray = np.array(
-            [segment.order_phasors_um_pk[self._rows] for segment in self._segments]
-        )
         frequency_hz = np.mean([segment.order_frequency_hz for segment in self._segments], axis=0)
-        return average(frequency_hz, phasors, self._usable)
+        return average(frequency_hz, self._order_phasors, self._usable)
 
     def _readings(self) -> dict[str, Reading]:
         order1, budgets1 = self._order("order1", ORDER1)
@@ -100,22 +100,33 @@ class BearingResults:
         position, budgets_p = position_results(
             self._unit, self._bearing, self._segments, self._last_growth
         )
+        slow, budgets_s = slow_results(self._segments, slow_channels(self._unit, self._bearing))
+        phases, budgets_ph = phase_results(
+            self._segments, self._rows, self._line_quality, self._order_line(ORDER1).runout_um_pk
+        )
+        number = self._unit.bearings.index(self._bearing)
+        overall, budgets_o = overall_results(self._segments, self._rows, self._bearing, number)
         readings = signs_checked(
             {
                 "speed_rpm": self._segments[-1].speed.rpm,
-                "power_mw": self._slow(self._unit.power_channel),
-                "oil_temperature_c": self._slow(self._bearing.oil_temperature),
+                **slow,
                 **position,
                 **order1,
-                **phase_results(self._segments, self._rows, self._line_quality),
-                **overall_results(
-                    self._segments, self._rows, self._unit.bearings.index(self._bearing)
-                ),
+                **phases,
+                **overall,
                 **vortex,
                 **film,
             }
         )
-        budgets = {**budgets1, **budgets_v, **budgets_f, **budgets_p}
+        budgets = {
+            **budgets_s,
+            **budgets_p,
+            **budgets1,
+            **budgets_ph,
+            **budgets_o,
+            **budgets_v,
+            **budgets_f,
+        }
         self.budgets = {name: b for name, b in budgets.items() if readings[name].value is not None}
         chosen = {
             axes: preferred_stiffness(readings, self._bearing.preference, axes)
@@ -123,9 +134,6 @@ class BearingResults:
         }
         self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
         return readings | {f"stiffness_{a}_n_per_m": reading for a, (reading, _) in chosen.items()}
-
-    def _slow(self, channel: str | None) -> Reading:
-        return mean_slow(self._segments, channel)
 
     def _steadiness(self) -> Quality:
         """Whether speed and load stood still over the averaging window."""
@@ -148,6 +156,8 @@ class BearingResults:
             self.spectrum,
             line,
             read,
+            self._order_phasors[:, :, line],
+            self._usable,
             frozenset(place for place in (SHAFT_X, SHAFT_Y) if self._is_round(place)),
         )
 
@@ -160,9 +170,10 @@ class BearingResults:
     def _order(self, prefix: str, line: int) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
         order = self._order_line(line)
         stiffness, budgets = order.stiffness()
-        readings = {f"{name}_um_pk": reading for name, reading in order.amplitudes().items()}
+        amplitudes, amplitude_budgets = order.amplitudes()
+        readings = {**amplitudes, **stiffness}
         readings |= {"frequency_hz": self._frequency(line), "roundness": order.roundness()}
-        readings |= stiffness
+        budgets = {**amplitude_budgets, **budgets}
         return (
             {f"{prefix}_{name}": reading for name, reading in readings.items()},
             {f"{prefix}_{name}": budget for name, budget in budgets.items()},

@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import ComplexArray, FloatArray
+from core.channel_budget import amplitude_budget, amplitude_lines, with_budgets
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.excitation import LineLimits, line_excitation
 from core.machine import Bearing
@@ -55,6 +57,8 @@ class OrderLine:
         Which of the order lines.
     quality
         Of what is read from some channels at an order line; without a number, why.
+    phasors_um_pk, usable : (n_segments, 4)
+        Of the line in each segment, and whether the channel counts there.
     round_shafts
         Shaft channels whose runout was taken off at 1×.
     """
@@ -65,16 +69,22 @@ class OrderLine:
     bins: CrossSpectrum
     line: int
     quality: Callable[..., Quality | Reading]
+    phasors_um_pk: ComplexArray
+    usable: npt.NDArray[np.bool_]
     round_shafts: frozenset[int] = frozenset()
 
-    def _runout_um_pk(self, shaft: int) -> float:
-        """Runout is locked to the shaft, so that the vortex is free of it."""
-        free = self.line != ORDER1 or shaft in self.round_shafts
+    def runout_um_pk(self, place: int) -> float:
+        """Runout in a channel: it is locked to the shaft, so that the vortex is free of it."""
+        is_shaft = place in (SHAFT_X, SHAFT_Y)
+        free = not is_shaft or self.line != ORDER1 or place in self.round_shafts
         return 0.0 if free else self.bearing.runout_um_pk
 
-    def amplitudes(self) -> dict[str, Reading]:
-        """Amplitude of each channel, by name."""
-        return {name: self._amplitude(place) for name, place in AMPLITUDES.items()}
+    def amplitudes(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+        """Amplitude of each channel and its budget, by quantity."""
+        return with_budgets(
+            {f"{name}_um_pk": self._amplitude(place) for name, place in AMPLITUDES.items()},
+            {f"{name}_um_pk": self._amplitude_budget(place) for name, place in AMPLITUDES.items()},
+        )
 
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Whether shaft and bearing whirl with the rotation, where their line stands out."""
@@ -116,6 +126,12 @@ class OrderLine:
             return quality
         return Reading(float(self.orders.amplitude_um_pk(place)[self.line]), quality)
 
+    def _amplitude_budget(self, place: int) -> Budget | None:
+        amplitude = float(self.orders.amplitude_um_pk(place)[self.line])
+        counted = self.phasors_um_pk[self.usable[:, place], place]
+        lines = amplitude_lines(self.bearing, place, amplitude, self.runout_um_pk(place))
+        return amplitude_budget(amplitude, counted, lines)
+
     def _direction(
         self, axes: str, shaft: int, bearing: int, quality: Quality, budgets: dict[str, Budget]
     ) -> tuple[Reading, ...]:
@@ -133,7 +149,7 @@ class OrderLine:
         )
         if few or found is None:
             return shown, k_eff, missing(Reason.FEW_SEGMENTS), missing(Reason.FEW_SEGMENTS)
-        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk(shaft))
+        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self.runout_um_pk(shaft))
         budgets[f"transfer_k_{axes}_n_per_m"] = of_k
         budgets[f"transfer_c_{axes}_n_s_per_m"] = of_c
         return shown, k_eff, reading_of(of_k, quality), reading_of(of_c, quality)
@@ -157,7 +173,7 @@ class OrderLine:
             self.bearing.bracket,
             self.bearing.accuracy,
             n_segments,
-            self._runout_um_pk(shaft),
+            self.runout_um_pk(shaft),
         )
         if budget is None:
             return Reading(k_eff, quality)
@@ -175,7 +191,7 @@ class OrderLine:
         if (few or self.line == VORTEX) and not self._stands_out(shaft):
             return quiet
         # few segments are coherent with anything
-        runout_um_pk = self._runout_um_pk(shaft)
+        runout_um_pk = self.runout_um_pk(shaft)
         limits = LineLimits(0.0 if few else self.settings.min_coherence, runout_um_pk)
         if few and not self._stands_out(bearing):
             return quiet

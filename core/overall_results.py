@@ -3,12 +3,26 @@
 import cmath
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from core.arrays import ComplexArray
+from core.channel_budget import (
+    amplitude_lines,
+    mean_budget,
+    numbers,
+    phase_budget,
+    phase_lines,
+    with_budgets,
+)
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.line_results import AMPLITUDES
+from core.machine import Bearing
 from core.quality import Quality, Reading, Reason, current_mean, missing, worst
 from core.recent import RecentReadings
 from core.segments import ORDER1, Segment
+from core.uncertainty import Budget
 from core.units import ns_from_s
 
 SHAFT_SPANS = {
@@ -30,9 +44,9 @@ PHASES = {f"order1_{name}_phase_deg": place for name, place in AMPLITUDES.items(
 
 
 def overall_results(
-    segments: Sequence[Segment], rows: Sequence[int], bearing: int
-) -> dict[str, Reading]:
-    """Broad-band vibration, averaged over the segments.
+    segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
 
     Peak-to-peak values and the farthest excursions are averaged as they are, velocities as power.
 
@@ -40,25 +54,25 @@ def overall_results(
     ----------
     rows
         Of the bearing's four channels.
-    bearing
-        Its place in the unit.
+    number
+        The bearing's place in the unit.
     """
+    readings: dict[str, Reading] = {}
+    found: dict[str, Budget | None] = {}
     grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
-    found = {
-        name: current_mean(
-            [_span(segment, rows[place]) for segment in segments], is_grazed=grazed[place]
-        )
-        for name, place in SHAFT_SPANS.items()
-    }
-    found[ORBIT] = current_mean(
-        [_orbit(s, rows[:2], bearing) for s in segments], is_grazed=all(grazed[:2])
-    )
-    return found | {
-        name: _root_mean_square(
-            [_speed(segment, rows[place]) for segment in segments], is_grazed=grazed[place]
-        )
-        for name, place in BEARING_SPEEDS.items()
-    }
+    for name, place in SHAFT_SPANS.items():
+        spans = [_span(segment, rows[place]) for segment in segments]
+        readings[name] = current_mean(spans, is_grazed=grazed[place])
+        found[name] = _mean_budget(readings[name], spans, bearing, place)
+    orbits = [_orbit(segment, rows[:2], number) for segment in segments]
+    readings[ORBIT] = current_mean(orbits, is_grazed=all(grazed[:2]))
+    found[ORBIT] = _mean_budget(readings[ORBIT], orbits, bearing, SHAFT_X)
+    for name, place in BEARING_SPEEDS.items():
+        speeds = [_speed(segment, rows[place]) for segment in segments]
+        squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in speeds]
+        readings[name] = _root(current_mean(squares, is_grazed=grazed[place]))
+        found[name] = _mean_budget(readings[name], squares, bearing, place, is_root=True)
+    return with_budgets(readings, found)
 
 
 def recent_results(
@@ -103,33 +117,81 @@ def phase_results(
     segments: Sequence[Segment],
     rows: Sequence[int],
     quality: Callable[..., Quality | Reading],
-) -> Mapping[str, Reading]:
+    runout_um_pk: Callable[[int], float],
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
     """Phase of each channel's mean 1× vector when the mark passes the pick-up, 0 to 360°.
 
     Parameters
     ----------
     quality
         Of what is read from a channel at 1×; without a number, why.
+    runout_um_pk
+        What is left of the runout in a channel.
     """
-    return {name: _phase(segments, rows[p], quality(p)) for name, p in PHASES.items()}
+    return phase_readings(
+        {
+            name: _vectors(segments, rows[place], quality(place), runout_um_pk(place))
+            for name, place in PHASES.items()
+        }
+    )
 
 
-def phase_of(vector: complex, quality: Quality) -> Reading:
-    """The phase of a vector, positive where it leads."""
-    return Reading(math.degrees(cmath.phase(vector)) % 360.0, quality)
+@dataclass(frozen=True)
+class Vectors:
+    """Vectors (n,) of one channel whose mean has a phase.
+
+    Parameters
+    ----------
+    quality
+        Of what is read from them; without a number, why.
+    """
+
+    um_pk: ComplexArray
+    quality: Quality | Reading
+    runout_um_pk: float
 
 
-def _phase(segments: Sequence[Segment], row: int, quality: Quality | Reading) -> Reading:
-    if isinstance(quality, Reading):
-        return quality
-    if segments[-1].shaft_angle_rad is None:
-        return missing(Reason.NOT_MEASURED)
-    vector = sum(
+def phase_readings(
+    channels: Mapping[str, Vectors],
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Phases, deg, positive where a vector leads, and their budgets, by quantity."""
+    readings: dict[str, Reading] = {}
+    found: dict[str, Budget | None] = {}
+    for name, vectors in channels.items():
+        mean = complex(vectors.um_pk.mean()) if vectors.um_pk.size else 0j
+        if isinstance(vectors.quality, Reading):
+            readings[name] = vectors.quality
+        elif mean == 0j:
+            readings[name] = missing(Reason.INSUFFICIENT_EXCITATION)
+        else:
+            phase_deg = math.degrees(cmath.phase(mean)) % 360.0
+            readings[name] = Reading(phase_deg, vectors.quality)
+            lines = phase_lines(vectors.runout_um_pk, abs(mean))
+            found[name] = phase_budget(phase_deg, vectors.um_pk, lines)
+    return with_budgets(readings, found)
+
+
+def _vectors(
+    segments: Sequence[Segment], row: int, quality: Quality | Reading, runout_um_pk: float
+) -> Vectors:
+    if not isinstance(quality, Reading) and segments[-1].shaft_angle_rad is None:
+        quality = missing(Reason.NOT_MEASURED)
+    turned = [
         complex(s.order_phasors_um_pk[row, ORDER1]) * cmath.exp(-1j * s.shaft_angle_rad)
         for s in segments
         if s.shaft_angle_rad is not None and s.usable[row]
-    )
-    return phase_of(vector, quality) if vector else missing(Reason.INSUFFICIENT_EXCITATION)
+    ]
+    return Vectors(np.array(turned, np.complex128), quality, runout_um_pk)
+
+
+def _mean_budget(
+    reading: Reading, parts: Sequence[Reading], bearing: Bearing, place: int, is_root: bool = False
+) -> Budget | None:
+    if not reading.value:
+        return None
+    lines = amplitude_lines(bearing, place, reading.value)
+    sensitivity = 0.5 / reading.value if is_root else 1.0
+    return mean_budget(reading.value, numbers(parts), lines, sensitivity)
 
 
 def _span(segment: Segment, row: int) -> Reading:
@@ -152,7 +214,5 @@ def _reading(segment: Segment, rows: Sequence[int], value: float) -> Reading:
     return Reading(float(value), worst(segment.channel_quality[row] for row in rows))
 
 
-def _root_mean_square(readings: Sequence[Reading], *, is_grazed: bool) -> Reading:
-    squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in readings]
-    mean = current_mean(squares, is_grazed=is_grazed)
+def _root(mean: Reading) -> Reading:
     return mean if mean.value is None else Reading(math.sqrt(max(mean.value, 0.0)), mean.quality)

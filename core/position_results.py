@@ -1,16 +1,18 @@
 """Where the shaft ran during the averaged segments, from the gaps of two or four probes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from core.arrays import FloatArray
+from core.channel_budget import mean_budget, numbers, with_budgets
 from core.machine import Bearing, Measurand, Unit
-from core.probe_axes import Growth, ProbeAxis
+from core.probe_axes import GapAccuracy, Growth, ProbeAxis
 from core.quality import NOT_TOLD, Reading, Reason, current_mean, missing
 from core.segments import Segment
 from core.shaft_centre import locate_shaft
-from core.uncertainty import Budget
+from core.stiffness_budget import SHAFT_GAIN
+from core.uncertainty import Budget, systematic_line
 
 
 def position_results(
@@ -25,21 +27,24 @@ def position_results(
     last_growth
         Thermal growth of the gaps when it was last measured.
     """
-    near = (
-        _gap(unit, segments, bearing.shaft_x, bearing.gap_x),
-        _gap(unit, segments, bearing.shaft_y, bearing.gap_y),
+    measured = {
+        "gap_x_um": _gap(unit, segments, bearing.shaft_x, bearing.gap_x),
+        "gap_y_um": _gap(unit, segments, bearing.shaft_y, bearing.gap_y),
+        "opposite_gap_x_um": _gap(unit, segments, bearing.opposite_x, bearing.opposite_gap_x),
+        "opposite_gap_y_um": _gap(unit, segments, bearing.opposite_y, bearing.opposite_gap_y),
+    }
+    gaps, gap_budgets = with_budgets(
+        {name: reading for name, (reading, _) in measured.items()},
+        {
+            name: _gap_budget(reading, values, bearing.gap_accuracy)
+            for name, (reading, values) in measured.items()
+        },
     )
-    far = (
-        _gap(unit, segments, bearing.opposite_x, bearing.opposite_gap_x),
-        _gap(unit, segments, bearing.opposite_y, bearing.opposite_gap_y),
-    )
+    near, far = tuple(gaps.values())[:2], tuple(gaps.values())[2:]
     x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
     centre = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth)
     readings = {
-        "gap_x_um": near[0],
-        "gap_y_um": near[1],
-        "opposite_gap_x_um": far[0],
-        "opposite_gap_y_um": far[1],
+        **gaps,
         "gap_growth_um": centre.gap_growth_um,
         "shaft_centre_x_um": centre.x_um,
         "shaft_centre_y_um": centre.y_um,
@@ -48,7 +53,8 @@ def position_results(
     }
     names = {"x_um": "shaft_centre_x_um", "y_um": "shaft_centre_y_um"}
     budgets = {names.get(key, key): budget for key, budget in centre.budgets.items()}
-    return readings, {name: b for name, b in budgets.items() if readings[name].value is not None}
+    known = {name: b for name, b in budgets.items() if readings[name].value is not None}
+    return readings, {**gap_budgets, **known}
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
@@ -59,11 +65,30 @@ def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
     return Growth(growth.value, (growth.interval_95[1] - growth.interval_95[0]) / 2.0)
 
 
-def mean_slow(segments: Sequence[Segment], channel: str | None) -> Reading:
-    """Mean of a slow channel over the segments."""
-    if channel is None:
-        return missing(Reason.NOT_MEASURED)
-    return current_mean([segment.slow.get(channel, NOT_TOLD) for segment in segments])
+def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
+    """Slow channel of the quantities that a bearing has from one."""
+    return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
+
+
+def slow_results(
+    segments: Sequence[Segment], channels: Mapping[str, str | None]
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Means of slow channels over the segments, by quantity, with their scatter.
+
+    How well the plant's own transmitters are calibrated is not known here.
+
+    Parameters
+    ----------
+    channels
+        Slow channel of each quantity, None where it is not measured.
+    """
+    readings: dict[str, Reading] = {}
+    found: dict[str, Budget | None] = {}
+    for name, channel in channels.items():
+        mean, values = _mean_slow(segments, channel)
+        readings[name] = mean
+        found[name] = None if mean.value is None else mean_budget(mean.value, values)
+    return with_budgets(readings, found)
 
 
 def probe_axis(
@@ -84,22 +109,35 @@ def probe_axis(
     )
 
 
+def _mean_slow(segments: Sequence[Segment], channel: str | None) -> tuple[Reading, FloatArray]:
+    if channel is None:
+        return missing(Reason.NOT_MEASURED), np.empty(0)
+    parts = [segment.slow.get(channel, NOT_TOLD) for segment in segments]
+    return current_mean(parts), numbers(parts)
+
+
 def _gap(
     unit: Unit, segments: Sequence[Segment], channel: str | None, slow_channel: str | None
-) -> Reading:
-    """Mean gap, from the slow channel or from a DC-coupled probe, with its scatter."""
+) -> tuple[Reading, FloatArray]:
+    """Mean gap, µm, by the slow channel or a DC-coupled probe, and what it is the mean of."""
     if slow_channel is not None:
-        gap_mm = mean_slow(segments, slow_channel)
-        return gap_mm if gap_mm.value is None else Reading(1e3 * gap_mm.value, gap_mm.quality)
+        gap_mm, values_mm = _mean_slow(segments, slow_channel)
+        if gap_mm.value is None:
+            return gap_mm, values_mm
+        return Reading(1e3 * gap_mm.value, gap_mm.quality), 1e3 * values_mm
     rows = [row for row, c in enumerate(unit.channels) if c.id == channel]
     if not rows or unit.channels[rows[0]].measurand is not Measurand.GAP_UM:
-        return missing(Reason.NOT_MEASURED)
+        return missing(Reason.NOT_MEASURED), np.empty(0)
     gaps = [_segment_gap(segment, rows[0]) for segment in segments]
     mean = current_mean(gaps, is_grazed=segments[-1].is_grazed(rows[0]))
-    values = [gap.value for gap in gaps if gap.value is not None]
-    if mean.value is None or len(values) < 2:
-        return mean
-    return replace(mean, u_random=float(np.std(values, ddof=1)) / len(values) ** 0.5)
+    return mean, numbers(gaps)
+
+
+def _gap_budget(gap: Reading, values_um: FloatArray, accuracy: GapAccuracy) -> Budget | None:
+    if gap.value is None:
+        return None
+    lines = (systematic_line(SHAFT_GAIN, accuracy.gain, gap.value),)
+    return mean_budget(gap.value, values_um, lines)
 
 
 def _segment_gap(segment: Segment, row: int) -> Reading:

@@ -17,13 +17,19 @@ class Quantity:
         What it is, in a few words.
     has_uncertainty
         Whether its readings state a random and a systematic standard uncertainty.
+    keeps_uncertainty
+        Whether these are stored as well, for trends: of results, not of what they come from.
     """
 
     name: str
     unit: str
     label: str
     has_uncertainty: bool = False
+    keeps_uncertainty: bool = False
 
+
+LIVE = (True, False)
+STORED = (True, True)
 
 AXES = ("xx", "xy", "yx", "yy")
 
@@ -31,10 +37,18 @@ AXES = ("xx", "xy", "yx", "yy")
 def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:
     return (
         Quantity(f"{prefix}_frequency_hz", "Hz", f"Frequency of {words}"),
-        Quantity(f"{prefix}_shaft_x_um_pk", "µm 0-pk", f"Relative shaft vibration x, {words}"),
-        Quantity(f"{prefix}_shaft_y_um_pk", "µm 0-pk", f"Relative shaft vibration y, {words}"),
-        Quantity(f"{prefix}_bearing_x_um_pk", "µm 0-pk", f"Absolute bearing vibration x, {words}"),
-        Quantity(f"{prefix}_bearing_y_um_pk", "µm 0-pk", f"Absolute bearing vibration y, {words}"),
+        Quantity(
+            f"{prefix}_shaft_x_um_pk", "µm 0-pk", f"Relative shaft vibration x, {words}", *LIVE
+        ),
+        Quantity(
+            f"{prefix}_shaft_y_um_pk", "µm 0-pk", f"Relative shaft vibration y, {words}", *LIVE
+        ),
+        Quantity(
+            f"{prefix}_bearing_x_um_pk", "µm 0-pk", f"Absolute bearing vibration x, {words}", *LIVE
+        ),
+        Quantity(
+            f"{prefix}_bearing_y_um_pk", "µm 0-pk", f"Absolute bearing vibration y, {words}", *LIVE
+        ),
         Quantity(f"{prefix}_roundness", "1", f"Roundness of the shaft's orbit, {words}, forward +"),
         Quantity(f"{prefix}_coherence_xx", "1", f"Coherence of shaft and bearing x, {words}"),
         Quantity(f"{prefix}_coherence_yy", "1", f"Coherence of shaft and bearing y, {words}"),
@@ -52,33 +66,39 @@ def _in_both_directions(prefix: str, unit: str, words: str) -> tuple[Quantity, .
 
 def _coefficient(prefix: str, axes: str, unit: str, words: str) -> Quantity:
     suffix = {"N/m": "n_per_m", "N·s/m": "n_s_per_m"}[unit]
-    return Quantity(f"{prefix}_{axes}_{suffix}", unit, f"{words}, {axes}", has_uncertainty=True)
+    return Quantity(f"{prefix}_{axes}_{suffix}", unit, f"{words}, {axes}", *STORED)
 
 
 CATALOGUE: tuple[Quantity, ...] = (
     *_in_both_directions("stiffness", "N/m", "Film stiffness by the preferred estimator"),
     Quantity("speed_rpm", "r/min", "Running speed"),
-    Quantity("power_mw", "MW", "Active power"),
-    Quantity("oil_temperature_c", "°C", "Oil temperature"),
-    Quantity("gap_x_um", "µm", "Mean probe gap x"),
-    Quantity("gap_y_um", "µm", "Mean probe gap y"),
-    Quantity("opposite_gap_x_um", "µm", "Mean gap of the probe opposite x"),
-    Quantity("opposite_gap_y_um", "µm", "Mean gap of the probe opposite y"),
-    Quantity("gap_growth_um", "µm", "Thermal growth of all gaps", has_uncertainty=True),
-    Quantity("shaft_centre_x_um", "µm", "Shaft centre x", has_uncertainty=True),
-    Quantity("shaft_centre_y_um", "µm", "Shaft centre y", has_uncertainty=True),
-    Quantity("eccentricity_ratio", "1", "Eccentricity ratio", has_uncertainty=True),
-    Quantity("attitude_angle_deg", "deg", "Attitude angle", has_uncertainty=True),
+    Quantity("power_mw", "MW", "Active power", *LIVE),
+    Quantity("oil_temperature_c", "°C", "Oil temperature", *LIVE),
+    Quantity("gap_x_um", "µm", "Mean probe gap x", *LIVE),
+    Quantity("gap_y_um", "µm", "Mean probe gap y", *LIVE),
+    Quantity("opposite_gap_x_um", "µm", "Mean gap of the probe opposite x", *LIVE),
+    Quantity("opposite_gap_y_um", "µm", "Mean gap of the probe opposite y", *LIVE),
+    Quantity("gap_growth_um", "µm", "Thermal growth of all gaps", *STORED),
+    Quantity("shaft_centre_x_um", "µm", "Shaft centre x", *STORED),
+    Quantity("shaft_centre_y_um", "µm", "Shaft centre y", *STORED),
+    Quantity("eccentricity_ratio", "1", "Eccentricity ratio", *STORED),
+    Quantity("attitude_angle_deg", "deg", "Attitude angle", *STORED),
     *_order_quantities("order1", "1×"),
-    Quantity("order1_shaft_x_phase_deg", "deg", "Phase of relative shaft vibration x, 1×"),
-    Quantity("order1_shaft_y_phase_deg", "deg", "Phase of relative shaft vibration y, 1×"),
-    Quantity("order1_bearing_x_phase_deg", "deg", "Phase of absolute bearing vibration x, 1×"),
-    Quantity("order1_bearing_y_phase_deg", "deg", "Phase of absolute bearing vibration y, 1×"),
-    Quantity("overall_shaft_x_um_pp", "µm pk-pk", "Relative shaft vibration x, broad-band"),
-    Quantity("overall_shaft_y_um_pp", "µm pk-pk", "Relative shaft vibration y, broad-band"),
-    Quantity("overall_shaft_um_pk", "µm 0-pk", "Farthest excursion of the shaft, broad-band"),
-    Quantity("overall_bearing_x_mm_s_rms", "mm/s rms", "Bearing velocity x, broad-band"),
-    Quantity("overall_bearing_y_mm_s_rms", "mm/s rms", "Bearing velocity y, broad-band"),
+    Quantity("order1_shaft_x_phase_deg", "deg", "Phase of relative shaft vibration x, 1×", *LIVE),
+    Quantity("order1_shaft_y_phase_deg", "deg", "Phase of relative shaft vibration y, 1×", *LIVE),
+    Quantity(
+        "order1_bearing_x_phase_deg", "deg", "Phase of absolute bearing vibration x, 1×", *LIVE
+    ),
+    Quantity(
+        "order1_bearing_y_phase_deg", "deg", "Phase of absolute bearing vibration y, 1×", *LIVE
+    ),
+    Quantity("overall_shaft_x_um_pp", "µm pk-pk", "Relative shaft vibration x, broad-band", *LIVE),
+    Quantity("overall_shaft_y_um_pp", "µm pk-pk", "Relative shaft vibration y, broad-band", *LIVE),
+    Quantity(
+        "overall_shaft_um_pk", "µm 0-pk", "Farthest excursion of the shaft, broad-band", *LIVE
+    ),
+    Quantity("overall_bearing_x_mm_s_rms", "mm/s rms", "Bearing velocity x, broad-band", *LIVE),
+    Quantity("overall_bearing_y_mm_s_rms", "mm/s rms", "Bearing velocity y, broad-band", *LIVE),
     *_order_quantities("vortex", "vortex"),
     *(_coefficient("dynamic_k", axes, "N/m", "Film stiffness, dynamic") for axes in AXES),
     *(_coefficient("dynamic_c", axes, "N·s/m", "Film damping, dynamic") for axes in AXES),

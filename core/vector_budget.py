@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.bracket import BracketDynamics
+from core.channel_budget import effective_number
 from core.stiffness_budget import BEARING_GAIN, BRACKET, RUNOUT, SHAFT_GAIN
 from core.uncertainty import BearingAccuracy, Budget, random_line, systematic_line
 
@@ -73,17 +74,10 @@ def n_effective(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> float:
     """How many independent polls would say as much as these, at least 2 of 2 or more.
 
     A rack averages, perhaps for longer than a poll period: neighbouring polls then share much of
-    what they show. For a first-order process that leaves ``n (1 - r) / (1 + r)``, r the correlation
-    of neighbours (Bayley and Hammersley 1946); negative ones are taken for chance.
+    what they show.
     """
     changed = _changed(shaft_um_pk, bearing_um_pk)
-    ratio = bearing_um_pk[changed] / shaft_um_pk[changed]
-    if ratio.size <= 2:
-        return float(ratio.size)
-    rest = ratio - ratio.mean()
-    power = float(rest @ rest)
-    r = max(float(rest[1:] @ rest[:-1]) / power, 0.0) if power > 0.0 else 0.0
-    return max(2.0, ratio.size * (1.0 - r) / (1.0 + r))
+    return effective_number(bearing_um_pk[changed] / shaft_um_pk[changed])
 
 
 def _changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:

@@ -7,11 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray
+from core.channel_budget import amplitude_budget, amplitude_lines, with_budgets
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum, average
 from core.excitation import LineLimits, line_excitation
 from core.line_results import AMPLITUDES, DIRECTIONS, reading_of
 from core.machine import Bearing
-from core.overall_results import PHASES, phase_of
+from core.overall_results import PHASES, Vectors, phase_readings
 from core.quality import GOOD, Quality, Reading, Reason, missing, worst
 from core.ratio import effective_stiffness_n_per_m
 from core.segments import ORDER1
@@ -65,32 +66,33 @@ class VectorLine:
         """Whether the phase of all four channels is known in any poll."""
         return bool((self.usable & self.has_phase).all(axis=1).any())
 
-    def amplitudes(self) -> dict[str, Reading]:
-        """Amplitude of each channel, by name."""
+    def amplitudes(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+        """Amplitude of each channel and its budget, by quantity."""
         spectrum = self.spectrum
-        readings = {}
+        readings: dict[str, Reading] = {}
+        found: dict[str, Budget | None] = {}
         for name, place in AMPLITUDES.items():
             quality = self.quality(self.line, place)
-            readings[name] = (
-                quality
-                if isinstance(quality, Reading)
-                else Reading(float(spectrum.amplitude_um_pk(place)[0]), quality)
+            amplitude = float(spectrum.amplitude_um_pk(place)[0])
+            readings[f"{name}_um_pk"] = (
+                quality if isinstance(quality, Reading) else Reading(amplitude, quality)
             )
-        return readings
+            counted = self.phasors_um_pk[self.usable[:, place], place]
+            lines = amplitude_lines(self.bearing, place, amplitude, self._runout_um_pk())
+            found[f"{name}_um_pk"] = amplitude_budget(amplitude, counted, lines)
+        return with_budgets(readings, found)
 
-    def phases(self) -> dict[str, Reading]:
+    def phases(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
         """Phase of each channel's mean vector to the rack's key-phase, by quantity, at 1×."""
-        return {name: self._phase(place) for name, place in PHASES.items()}
+        return phase_readings({name: self._vectors(place) for name, place in PHASES.items()})
 
-    def _phase(self, place: int) -> Reading:
+    def _vectors(self, place: int) -> Vectors:
         quality = self.quality(self.line, place)
-        if isinstance(quality, Reading):
-            return quality
         counted = self.usable[:, place] & self.has_phase[:, place]
-        if not counted[-1]:
-            return missing(Reason.NOT_MEASURED)
-        vector = complex(self.phasors_um_pk[counted, place].sum())
-        return phase_of(vector, quality) if vector else missing(Reason.INSUFFICIENT_EXCITATION)
+        if not isinstance(quality, Reading) and not counted[-1]:
+            quality = missing(Reason.NOT_MEASURED)
+        runout_um_pk = self._runout_um_pk() if place in (SHAFT_X, SHAFT_Y) else 0.0
+        return Vectors(self.phasors_um_pk[counted, place], quality, runout_um_pk)
 
     def roundness(self) -> Reading:
         """How round the shaft's orbit is, where the phases of both probes are known."""

@@ -12,7 +12,7 @@ from core.film_results import NAMES as DYNAMIC_NAMES
 from core.machine import Bearing, Unit
 from core.overall_results import OVERALL_NAMES, SHAFTS
 from core.polarity import signs_checked
-from core.position_results import mean_slow, position_results
+from core.position_results import position_results, slow_channels, slow_results
 from core.probe_axes import Growth
 from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, uncertain, worst
 from core.recent import RecentReadings
@@ -103,19 +103,22 @@ class VectorResults:
         position, budgets_p = position_results(
             self._unit, self._bearing, [poll.gaps for poll in self._polls], self._last_growth
         )
+        slow, budgets_s = slow_results(
+            [poll.gaps for poll in self._polls], slow_channels(self._unit, self._bearing)
+        )
+        phases, budgets_ph = self._line(ORDER1).phases()
         readings = signs_checked(
             {
                 "speed_rpm": self._polls[-1].speed.rpm,
-                "power_mw": self._slow(self._unit.power_channel),
-                "oil_temperature_c": self._slow(self._bearing.oil_temperature),
+                **slow,
                 **position,
                 **order1,
-                **self._line(ORDER1).phases(),
+                **phases,
                 **vortex,
                 **dict.fromkeys((*DYNAMIC_NAMES, *OVERALL_NAMES), NO_WAVEFORM),
             }
         )
-        budgets = {**budgets1, **budgets_v, **budgets_p}
+        budgets = {**budgets_s, **budgets_p, **budgets1, **budgets_ph, **budgets_v}
         self.budgets = {name: b for name, b in budgets.items() if readings[name].value is not None}
         chosen = {axes: self._preferred(readings, axes) for axes in ("xx", "yy")}
         self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
@@ -147,16 +150,14 @@ class VectorResults:
     def _order(self, prefix: str, line: int) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
         order = self._line(line)
         stiffness, budgets = order.stiffness()
-        readings = {f"{name}_um_pk": reading for name, reading in order.amplitudes().items()}
+        amplitudes, amplitude_budgets = order.amplitudes()
+        readings = {**amplitudes, **stiffness}
         readings |= {"frequency_hz": self._frequency(line, order), "roundness": order.roundness()}
-        readings |= stiffness
+        budgets = {**amplitude_budgets, **budgets}
         return (
             {f"{prefix}_{name}": reading for name, reading in readings.items()},
             {f"{prefix}_{name}": budget for name, budget in budgets.items()},
         )
-
-    def _slow(self, channel: str | None) -> Reading:
-        return mean_slow([poll.gaps for poll in self._polls], channel)
 
     def _frequency(self, line: int, order: VectorLine) -> Reading:
         speed = self._polls[-1].speed.rpm

@@ -22,9 +22,9 @@ U_RANDOM, U_SYSTEMATIC = ".u_random", ".u_systematic"
 
 
 def columns_of(quantities: Iterable[Quantity]) -> tuple[str, ...]:
-    """Names of the columns that hold quantities and, where they have them, their uncertainties."""
+    """Names of the columns that hold quantities and, where they are kept, their uncertainties."""
     suffixes = {False: ("",), True: ("", U_RANDOM, U_SYSTEMATIC)}
-    return tuple(q.name + suffix for q in quantities for suffix in suffixes[q.has_uncertainty])
+    return tuple(q.name + suffix for q in quantities for suffix in suffixes[q.keeps_uncertainty])
 
 
 @dataclass(frozen=True)
