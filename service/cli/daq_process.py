@@ -1,11 +1,12 @@
 """The simulated DAQ as a process of its own, beside the command that needs it."""
 
 import json
+import os
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import IO
 
@@ -13,6 +14,7 @@ from service.cli.plant_file import fail
 from service.settings.plant import PlantFile
 
 STOP_S = 3.0
+TERMINALS = "/dev/pts/"
 
 Endpoints = dict[str, dict[str, str | int]]
 
@@ -50,6 +52,23 @@ class RunningDaq:
 
 
 @contextmanager
+def held_lines(endpoints: Endpoints) -> Iterator[None]:
+    """Hold the pseudo-terminals of some endpoints open, so that nobody else gets their names.
+
+    The system gives the name of a terminal away as soon as no program has it open. A reader that
+    tries again after its DAQ has ended would open, and lock, the terminal of another program.
+    """
+    places = [place for endpoint in endpoints.values() for place in endpoint.values()]
+    with ExitStack() as stack:
+        for place in places:
+            if isinstance(place, str) and place.startswith(TERMINALS):
+                with suppress(OSError):  # the DAQ has ended already, which its reader reports
+                    held = os.open(place, os.O_RDWR | os.O_NOCTTY)
+                    stack.callback(os.close, held)
+        yield
+
+
+@contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
     """Run ``padwatch daq`` with arguments; it ends with this process, however that ends."""
     with subprocess.Popen(  # noqa: S603  our own program
@@ -67,7 +86,8 @@ def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
             daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
             news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)
             news.start()
-            yield daq
+            with held_lines(endpoints):
+                yield daq
         finally:
             _stop(process)
             if news is not None:

@@ -2,10 +2,12 @@
 
 import asyncio
 import json
+import os
 
 import pytest
 
 from acquisition.errors import LinkError
+from service.cli.daq_process import held_lines
 from service.daq_program import obeyed, run_daq
 
 
@@ -72,3 +74,17 @@ async def test_a_server_that_cannot_go_on_says_why_in_one_error(devices) -> None
     with pytest.raises(LinkError, match="unreachable"):
         await run_daq(devices | {"U3": Failing()}, told.append, controlled=False)
     assert json.loads(told[0]) == {name: {"port": 1} for name in ("U1", "U2", "U3")}
+
+
+def test_nobody_else_gets_the_name_of_a_line_whose_daq_has_ended() -> None:
+    ours, theirs = os.openpty()
+    name, others = os.ttyname(theirs), []
+    with held_lines({"U1": {"device": name, "parity": "none"}, "U2": {"port": 502}}):
+        os.close(ours)
+        os.close(theirs)
+        others += [os.openpty() for _ in range(3)]
+        assert name not in {os.ttyname(line) for _, line in others}
+        assert not os.path.exists(name)
+    for ends in others:
+        for end in ends:
+            os.close(end)
