@@ -26,7 +26,8 @@ class CountedSamples:
     """Unwraps a counter with the help of the host's clock, across connections.
 
     A jump that the time since the last sample explains is a gap, exact whatever times the counter
-    has wrapped. One that it does not explain means that the device counts anew: a new epoch.
+    has wrapped. One that it does not explain means that the device counts anew, or that it stopped
+    and its counter with it: a new epoch.
 
     Parameters
     ----------
@@ -40,7 +41,11 @@ class CountedSamples:
         self._rate_hz, self._removes = rate_hz, removes
         self._epoch = epoch
         self._next: int | None = None
-        self._at_s = 0.0
+        self._at_s = self._seen_all_s = 0.0
+
+    def note_seen_all(self, now_s: float) -> None:
+        """Note that the device has no more samples: those that come next are taken from now on."""
+        self._seen_all_s = now_s
 
     def is_ambiguous(self, now_s: float) -> bool:
         """Whether so much time has passed that old samples could pass for new ones.
@@ -59,7 +64,8 @@ class CountedSamples:
         passed = self._passed(now_s)
         jump = ahead + max(0, round((passed - ahead) / WRAP)) * WRAP
         fresh = passed < WRAP / 2 or jump >= passed - self._slack(now_s)
-        if jump > passed + self._slack(now_s) or not fresh:
+        least = (self._seen_all_s - self._at_s) * self._rate_hz - self._slack(now_s)
+        if not least <= jump <= passed + self._slack(now_s) or not fresh:
             self._epoch += 1
             return self._put(counter, now_s)
         return self._put(self._next + jump, now_s)

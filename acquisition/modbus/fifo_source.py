@@ -140,6 +140,7 @@ class FifoSource:
                 raise
             if not drained:
                 continue
+            self._counted.note_seen_all(arrived.steady_s)
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
                 waiting.clear()  # nobody knows where among these the loss is
                 self._uncounted.begin()

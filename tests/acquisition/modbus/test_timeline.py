@@ -150,6 +150,18 @@ def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, t
     assert samples.place(then + 1, passed_s) == Place(8, then + 1)
 
 
+@pytest.mark.parametrize(("has_asked", "epoch"), [(True, 8), (False, 7)])
+def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_nothing_had_waited(
+    has_asked: bool, epoch: int
+) -> None:
+    samples = counted()
+    samples.place(100, 0.0)
+    samples.note_seen_all(5.0 if has_asked else 0.0)
+
+    assert samples.place(101, 5.0) == Place(epoch, 101)
+    assert samples.place(102, 5.0) == Place(epoch, 102)
+
+
 @pytest.mark.parametrize(("passed_s", "is_ambiguous"), [(1.0, False), (55.0, True), (1e6, True)])
 def test_what_waits_in_a_queue_is_doubted_after_half_a_wrap(passed_s, is_ambiguous) -> None:
     samples = counted()
