@@ -38,13 +38,23 @@ hypothesis_settings.load_profile("padwatch")
 START_NS = 1_767_225_600 * NS_PER_S
 
 
-LENGTHY = ("tests/system/", "tests/torture/")
-"""Tests that start programs: they come first, so that no worker is left with one at the end."""
+PROGRAMS = ("tests/system/", "tests/torture/")
+BROWSER = ("tests/browser/",)
 
 
+@pytest.hookimpl(trylast=True)  # when other tiers have been left out
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Refuse a test that would be in two tiers; begin with those that take long."""
-    items.sort(key=lambda item: not item.nodeid.startswith(LENGTHY))
+    """Refuse a test that would be in two tiers; begin with those that take long.
+
+    A worker begins with a part of the list. Tests that start programs stand at its head, those in a
+    browser in the middle, so that one of an even number of workers does them and not several at
+    the end, each with a browser and plants of its own.
+    """
+    first = [item for item in items if item.nodeid.startswith(PROGRAMS)]
+    paged = [item for item in items if item.nodeid.startswith(BROWSER)]
+    rest = [item for item in items if not item.nodeid.startswith(PROGRAMS + BROWSER)]
+    before = max(0, len(items) // 2 - len(first))
+    items[:] = [*first, *rest[:before], *paged, *rest[before:]]
     for item in items:
         if item.get_closest_marker("long") and item.get_closest_marker("torture"):
             raise pytest.UsageError(f"{item.nodeid} is marked both long and torture")
