@@ -110,8 +110,10 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
-        **settings.model_dump(exclude={"dynamic", "max_power_change"}),
-        sensors=SensorLimits(max_power_change=settings.max_power_change),
+        **settings.model_dump(exclude={"dynamic", "speed_tolerance", "max_power_change"}),
+        sensors=SensorLimits(
+            speed_tolerance=settings.speed_tolerance, max_power_change=settings.max_power_change
+        ),
         dynamic=DynamicSettings(
             band_hz=dynamic.band_hz,
             selection=LineSelection(guard_bins=dynamic.guard_bins),

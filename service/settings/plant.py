@@ -155,6 +155,11 @@ class AnalysisModel(Settings):
     min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
     """Share of the rated speed below which the machine counts as standing."""
 
+    speed_tolerance: Annotated[float, Field(ge=0.0005, le=0.05)] = 0.002
+    """Difference of the measured speed and the 1× line, as a share, beyond which results are
+    uncertain (speed_implausible): beside its line an amplitude reads low. Raise it for a speed
+    channel that is coarser; example: 0.005 for one in whole r/min at 200 r/min."""
+
     max_power_change: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
     """Change of power within the averaging time, as a share of rated_power_mw, beyond which results
     are uncertain (non_stationary); without rated_power_mw it is a share of the present power.

@@ -122,7 +122,9 @@ def test_a_speed_no_turbine_reaches_is_none_and_one_that_the_1x_line_contradicts
         checked = checked_speed(Reading(speed_rpm), None, 92.3, DEFAULT_LIMITS)
         assert checked == missing(Reason.SPEED_IMPLAUSIBLE)
     told = Reading(92.3)
-    assert checked_speed(told, 92.0, 92.3, DEFAULT_LIMITS) == told
+    assert checked_speed(told, 92.2, 92.3, DEFAULT_LIMITS) == told
+    assert checked_speed(told, 92.0, 92.3, DEFAULT_LIMITS) != told
+    assert checked_speed(told, 92.0, 92.3, DEFAULT_LIMITS, u_line=0.001) == told
     assert checked_speed(told, None, 92.3, DEFAULT_LIMITS) == told
     doubted = checked_speed(told, 88.0, 92.3, DEFAULT_LIMITS)
     assert doubted == Reading(92.3, uncertain(Reason.SPEED_IMPLAUSIBLE))

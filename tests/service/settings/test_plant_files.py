@@ -75,11 +75,13 @@ def test_a_sensitivity_becomes_engineering_units_per_volt(
     assert channel.unit_per_v == pytest.approx(unit_per_v, rel=1e-12)
 
 
-def test_changes_of_load_are_judged_by_what_the_file_says(plant_text: str) -> None:
-    plant = load_text("[analysis]\nmax_power_change = 0.1\n" + plant_text)
+def test_speed_and_changes_of_load_are_judged_by_what_the_file_says(plant_text: str) -> None:
+    text = "[analysis]\nmax_power_change = 0.1\nspeed_tolerance = 0.01\n"
+    plant = load_text(text + plant_text)
     rated = plant.unit[0].model_copy(update={"rated_power_mw": 15.0})
 
-    assert analysis_of(plant.analysis).sensors.max_power_change == 0.1
+    limits = analysis_of(plant.analysis).sensors
+    assert (limits.max_power_change, limits.speed_tolerance) == (0.1, 0.01)
     assert machine_of(rated).rated_power_mw == 15.0
 
 
