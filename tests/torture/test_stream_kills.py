@@ -81,7 +81,7 @@ def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_p
         pytest.skip("needs nats-server")
     rng = np.random.default_rng(torture.seed)
     with nats_server(tmp_path / "nats") as server, ledger_daq(PLANT, tmp_path) as daq:
-        stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 2.0\n'
+        stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 2.0\nsilent_after_s = 30.0\n'
         files = {
             name: PLANT.write(tmp_path / f"{name}.toml", tmp_path / name, daq.ports, stream)
             for name in ("plant", "single")

@@ -48,7 +48,7 @@ Monitors = dict[str, UnitMonitor]
 
 def written_plant(folder: Path, server: NatsServer, name: str = "plant") -> Path:
     """A plant file whose units come from the stream; their devices are not there."""
-    stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 0.5\n'
+    stream = f'[stream]\nservers = ["{server.url}"]\nmax_gb = 0.5\nsilent_after_s = 30.0\n'
     ports = dict.fromkeys(LEDGER.units, 9)
     return LEDGER.write(folder / f"{name}.toml", folder / name, ports, stream)
 
