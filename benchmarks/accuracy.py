@@ -10,7 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,11 @@ def simulate(job: tuple[str, int]) -> dict[str, list[Estimate]]:
     """Evaluate one run of a row, by bearing."""
     row = ROWS[job[0]]
     found = spectra(row.run, job[1], row.response)
+    if not row.mass_known:
+        found = {
+            bearing: replace(of, bracket=replace(of.bracket, mass_kg=None))
+            for bearing, of in found.items()
+        }
     if row.amplitudes:
         return {bearing: amplitudes(found[bearing]) for bearing in row.bearings}
     return {

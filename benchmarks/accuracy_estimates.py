@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from benchmarks.accuracy_plant import BearingSpectra
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.dynamic import dynamic_stiffness
+from core.dynamic_settings import DynamicSettings
 from core.excitation import LineLimits, line_excitation
 from core.quality import Reason
 from core.segments import ORDER1, VORTEX
@@ -82,8 +83,12 @@ def _dynamic(
     spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool
 ) -> Iterator[Estimate]:
     film = spectra.film
-    result = dynamic_stiffness(spectra.bins, spectra.bracket, spectra.turn_hz, spectra.dynamic)
-    budgets = {} if isinstance(result, Reason) else dynamic_budgets(result, accuracy)
+    result = dynamic_stiffness(
+        spectra.bins, spectra.bracket, spectra.turn_hz, DynamicSettings(), spectra.n_integrations
+    )
+    budgets = (
+        {} if isinstance(result, Reason) else dynamic_budgets(result, spectra.bracket, accuracy)
+    )
     omega = 2.0 * math.pi * float(spectra.orders.frequency_hz[ORDER1])
     for letter, truth in (("k", film.stiffness_n_per_m), ("c", film.damping_n_s_per_m)):
         scale = float(truth[0, 0])
@@ -106,11 +111,12 @@ def _at_line(
         orders, bracket = spectra.orders, spectra.bracket
         excited = line_excitation(orders, line, shaft, bearing, limits) is Reason.OK
         transfer = line_transfer(orders, line, shaft, bearing, bracket) if excited else None
-        budget = transfer_budgets(transfer, accuracy)[0] if transfer else None
+        budget = transfer_budgets(transfer, bracket, accuracy)[0] if transfer else None
         yield _compared(f"transfer {line_name} k_{axes}", budget, true[index], true[0])
         ratio = ratio_budget(orders, line, shaft, bearing, bracket, accuracy) if excited else None
         # what equation (5) asks for leaves out the bracket's inertia
-        asked = effective[index] / (1.0 - bracket.mass_kg * omega**2 / bracket.stiffness_n_per_m)
+        asked = effective[index] * bracket.stiffness_n_per_m
+        asked /= float(bracket.dynamic_stiffness_n_per_m(orders.frequency_hz[[line]])[0].real)
         yield _compared(f"ratio {line_name} k_{axes}", ratio, effective[index], true[0], asked)
 
 

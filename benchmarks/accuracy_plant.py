@@ -22,7 +22,6 @@ from core.arrays import FloatArray
 from core.blocks import SampleBlock
 from core.bracket import BracketDynamics
 from core.cross_spectrum import CrossSpectrum, average
-from core.dynamic_settings import DynamicSettings
 from core.film import Film
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.ring import Ring
@@ -40,9 +39,6 @@ BEARING_CHANNEL = {
     Measurand.VELOCITY_MM_S: ChannelCalibration(10.0, 0.1, -10.0, 10.0),
 }
 """Full scale of 0.5 m/s² and 1 mm/s, ten times what the machine does."""
-
-INTEGRATIONS = {Measurand.ACCELERATION_M_S2: 2, Measurand.VELOCITY_MM_S: 1}
-"""From each to displacement."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +107,8 @@ class BearingSpectra:
         At the lines of the segments.
     orders
         At exactly 1× and the vortex.
-    dynamic
-        How `dynamic` is set up for these channels.
+    n_integrations
+        From the measurands of v_x and v_y to displacement.
     order1_um_pk
         (4,) true amplitudes at 1×, by unbalance alone.
     """
@@ -122,7 +118,7 @@ class BearingSpectra:
     film: Film
     bracket: BracketDynamics
     turn_hz: tuple[float, float]
-    dynamic: DynamicSettings
+    n_integrations: tuple[int, int]
     order1_um_pk: FloatArray
 
 
@@ -258,7 +254,10 @@ def _of_bearing(
         film=scenario.bearings[bearing.id].film,
         bracket=BracketDynamics(bearing.bracket_stiffness_n_per_m, model.mass_kg),
         turn_hz=(float(orders_hz[:, 0].min()), float(orders_hz[:, 0].max())),
-        dynamic=DynamicSettings(n_integrations=INTEGRATIONS[unit.channels[rows[-1]].measurand]),
+        n_integrations=(
+            unit.channels[rows[2]].measurand.n_integrations,
+            unit.channels[rows[3]].measurand.n_integrations,
+        ),
         order1_um_pk=_order1_um_pk(scenario, bearing.id),
     )
 

@@ -60,6 +60,7 @@ class Row:
     limits: LineLimits = field(default_factory=LineLimits)
     response: Response | None = None
     c_over_k_xx: bool = False
+    mass_known: bool = True
     amplitudes: bool = False
     n_runs: int = 200
 
@@ -134,6 +135,11 @@ def _crossed() -> Film:
 HONEST = Required("dynamic *", coverage=(0.90, 1.0))
 """95 %, less three times the 1.5 % by which chance moves the share of 200 runs."""
 
+MASS_UNKNOWN = (
+    Required("dynamic k_??", mean=0.01, random_coverage=(0.93, 0.97)),
+    Required("dynamic c_??", mean=0.01, random_coverage=(0.93, 0.97)),
+)
+
 SHAFT_AT_VORTEX_UM_PK = 68.0
 CORNER = HighPass(0.5)
 
@@ -198,6 +204,18 @@ ROWS = {
     ),
     "quiet-0.5": Row("the same, 0.5 GN/m, 5 kN", _balanced(_isotropic(0.5), 5.0), (HONEST,)),
     "quiet-3": Row("the same, 3 GN/m, 5 kN", _balanced(_isotropic(3.0), 5.0), (HONEST,)),
+    "mass-unknown": Row(
+        "balanced, 10 µm runout, 20 kN, film 0.5 GN/m, bracket mass not known",
+        _balanced(_isotropic(0.5), 20.0),
+        MASS_UNKNOWN,
+        mass_known=False,
+    ),
+    "mass-unknown-quiet": Row(
+        "the same, 5 kN",
+        _balanced(_isotropic(0.5), 5.0),
+        MASS_UNKNOWN,
+        mass_known=False,
+    ),
     "quiet-3-60min": Row(
         "the same, 3 GN/m, 5 kN, 60 min", _balanced(_isotropic(3.0), 5.0, 60.0), (HONEST,)
     ),

@@ -106,14 +106,14 @@ class Analysis:
         turn_hz = SPEED_RPM / 60.0
         found = dynamic_stiffness(bins, bracket, (turn_hz, turn_hz), DynamicSettings())
         if isinstance(found, DynamicStiffness):
-            dynamic_budgets(found, accuracy)
+            dynamic_budgets(found, bracket, accuracy)
         for line in (ORDER1, VORTEX):
             whirl(orders, line)
             for shaft, bearing in ((SHAFT_X, BEARING_X), (SHAFT_Y, BEARING_Y)):
                 ratio_budget(orders, line, shaft, bearing, bracket, accuracy)
                 transfer = line_transfer(orders, line, shaft, bearing, bracket)
                 if transfer is not None:
-                    transfer_budgets(transfer, accuracy)
+                    transfer_budgets(transfer, bracket, accuracy)
         return isinstance(found, DynamicStiffness)
 
 

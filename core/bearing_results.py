@@ -1,13 +1,23 @@
 """From the segments of a unit to the readings of one bearing."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from core.agreement import contradicting
 from core.arrays import ComplexArray, FloatArray
-from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum, average
+from core.cross_spectrum import (
+    BEARING_X,
+    BEARING_Y,
+    SHAFT_X,
+    SHAFT_Y,
+    CrossSpectrum,
+    average,
+)
+from core.dynamic import DynamicStiffness
 from core.estimators import Estimator, preferred_stiffness
 from core.film_results import film_results
 from core.line_results import OrderLine, other_line_hz
@@ -31,6 +41,7 @@ from core.runout import RunoutVerdict
 from core.segments import ORDER1, VORTEX, Segment
 from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
+from core.transducers import line_floor_um_pk
 from core.uncertainty import Budget
 
 
@@ -96,7 +107,7 @@ class BearingResults:
     def _readings(self) -> dict[str, Reading]:
         order1, budgets1 = self._order("order1", ORDER1)
         vortex, budgets_v = self._order("vortex", VORTEX)
-        film, budgets_f = self._film()
+        film, budgets_f, found = self._film()
         position, budgets_p = position_results(
             self._unit, self._bearing, self._segments, self._last_growth
         )
@@ -128,12 +139,31 @@ class BearingResults:
             **budgets_f,
         }
         self.budgets = {name: b for name, b in budgets.items() if readings[name].value is not None}
+        readings |= self._doubted(readings, found)
         chosen = {
             axes: preferred_stiffness(readings, self._bearing.preference, axes)
             for axes in ("xx", "yy")
         }
         self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
         return readings | {f"stiffness_{a}_n_per_m": reading for a, (reading, _) in chosen.items()}
+
+    def _doubted(
+        self, readings: Mapping[str, Reading], found: DynamicStiffness | None
+    ) -> dict[str, Reading]:
+        """Readings of estimators that do not agree, and those that a delay reaches."""
+        names: dict[str, Reason] = {}
+        if readings["dynamic_k_xx_n_per_m"].quality.reason is Reason.CHANNEL_DELAY:
+            delayed = (name for name in self.budgets if "_transfer_" in name)
+            names = dict.fromkeys(delayed, Reason.CHANNEL_DELAY)
+        lines = {"order1": ORDER1, "vortex": VORTEX}
+        differing = contradicting(self.budgets, found, self._orders, lines)
+        names |= dict.fromkeys(differing, Reason.ESTIMATORS_DISAGREE)
+        return {
+            name: replace(
+                readings[name], quality=worst((readings[name].quality, uncertain(reason)))
+            )
+            for name, reason in names.items()
+        }
 
     def _steadiness(self) -> Quality:
         """Whether speed and load stood still over the averaging window."""
@@ -158,6 +188,10 @@ class BearingResults:
             read,
             self._order_phasors[:, :, line],
             self._usable,
+            tuple(
+                line_floor_um_pk(self._unit.channels[row], float(self._orders.frequency_hz[line]))
+                for row in self._rows
+            ),
             frozenset(place for place in (SHAFT_X, SHAFT_Y) if self._is_round(place)),
         )
 
@@ -179,7 +213,9 @@ class BearingResults:
             {f"{prefix}_{name}": budget for name, budget in budgets.items()},
         )
 
-    def _film(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    def _film(
+        self,
+    ) -> tuple[dict[str, Reading], Mapping[str, Budget], DynamicStiffness | None]:
         """All eight coefficients from the segments in which every channel was usable."""
         quality = self._line_quality(*range(len(self._rows)))
         if isinstance(quality, Reading) or not self.n_segments:
@@ -200,7 +236,13 @@ class BearingResults:
             (min(turns_hz), max(turns_hz)),
             quality,
             self._settings.dynamic,
+            self._n_integrations,
         )
+
+    @property
+    def _n_integrations(self) -> tuple[int, int]:
+        x, y = (self._unit.channels[self._rows[place]] for place in (BEARING_X, BEARING_Y))
+        return x.measurand.n_integrations, y.measurand.n_integrations
 
     def _frequency(self, line: int) -> Reading:
         speed = self._segments[-1].speed.rpm

@@ -37,10 +37,6 @@ class DynamicSettings:
         the excitation is insufficient.
     overlap
         Share of a segment that the next one repeats.
-    n_integrations
-        From the bearing channels' measurand to displacement: 2 for acceleration, 1 for velocity, 0.
-        At very high coherence the residual is what integration leaves; how its lines hang together
-        decides the stated uncertainty, nothing else.
     """
 
     band_hz: tuple[float, float] = (0.6, 12.0)
@@ -55,7 +51,6 @@ class DynamicSettings:
     min_coherence: float = 0.1
     max_relative_uncertainty: float = 0.2
     overlap: float = 0.125
-    n_integrations: int = 2
 
     def __post_init__(self) -> None:
         for name, (low, high) in (("band", self.band_hz), ("quiet band", self.quiet_band_hz)):
@@ -63,7 +58,5 @@ class DynamicSettings:
                 raise ValueError(f"{name} must rise from above 0 Hz, got {low} to {high} Hz")
         if min(self.smoothing_reach_bins, self.n_iterations, self.min_lines) < 1:
             raise ValueError("smoothing reach, iterations and least lines must be at least 1")
-        if self.n_integrations not in (0, 1, 2):
-            raise ValueError(f"a signal is integrated 0, 1 or 2 times, got {self.n_integrations}")
         if self.min_segments < 3:
             raise ValueError(f"two inputs need at least 3 segments, got {self.min_segments}")

@@ -4,13 +4,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.cross_spectrum import BEARING_X
 from core.normal_equations import NormalEquations
 from core.probe_noise import conditional_power
-from core.spectral_statistics import SMEARED_IN_PHASE, SMEARED_PRODUCTS, neighbour_inflation
 
 LEAST_SHARE = 0.05
 """Below this share of motion in the shaft spectra their noise-free part may not be invertible."""
@@ -132,36 +130,3 @@ def lack_of_fit(
     whole = (weight * residual).sum(axis=0)
     found: FloatArray = n_segments * (weight * power).sum(axis=0) / (2.0 * whole)
     return found
-
-
-def film_phase(equations: NormalEquations, unknowns: FloatArray) -> FloatArray:
-    """Phase of each row's direct force against the shaft's motion, (n_lines, 2)."""
-    stiffness = np.array([unknowns[0, 0], unknowns[1, 1]])
-    damping = np.array([unknowns[0, 2], unknowns[1, 3]])
-    phase: FloatArray = np.arctan2(equations.ratio[:, np.newaxis] * damping, stiffness)
-    return phase
-
-
-def inflation_of(
-    lines: npt.NDArray[np.bool_], smeared: FloatArray, phase: FloatArray
-) -> FloatArray:
-    """Inflation of the variance by correlated lines, for each unknown, (n_used, 2, 4).
-
-    Parameters
-    ----------
-    smeared : (n_used, 2)
-        Share of the residual that integration at the lines leaves; the rest is noise.
-    phase : (n_used, 2)
-        Of the film's force against the shaft's motion: that residual is in phase with the force.
-    """
-    white = neighbour_inflation(lines)[lines, np.newaxis]
-    apart = neighbour_inflation(lines, SMEARED_PRODUCTS)[lines, np.newaxis]
-    in_phase = neighbour_inflation(lines, SMEARED_IN_PHASE)[lines, np.newaxis] - 1.0
-    swing = np.cos(2.0 * phase) * in_phase
-    of_stiffness, of_damping = (
-        smeared * np.maximum(apart + sign * swing, 0.0) + (1.0 - smeared) * white
-        for sign in (-1.0, 1.0)
-    )
-    pairs = (of_stiffness, of_stiffness, of_damping, of_damping)
-    inflation: FloatArray = np.stack(pairs, axis=2)
-    return inflation

@@ -59,6 +59,8 @@ class OrderLine:
         Of what is read from some channels at an order line; without a number, why.
     phasors_um_pk, usable : (n_segments, 4)
         Of the line in each segment, and whether the channel counts there.
+    floors_um_pk
+        Of (u_x, u_y, v_x, v_y): what a line of each transducer's own noise looks like.
     round_shafts
         Shaft channels whose runout was taken off at 1×.
     """
@@ -71,6 +73,7 @@ class OrderLine:
     quality: Callable[..., Quality | Reading]
     phasors_um_pk: ComplexArray
     usable: npt.NDArray[np.bool_]
+    floors_um_pk: tuple[float, ...]
     round_shafts: frozenset[int] = frozenset()
 
     def runout_um_pk(self, place: int) -> float:
@@ -149,7 +152,9 @@ class OrderLine:
         )
         if few or found is None:
             return shown, k_eff, missing(Reason.FEW_SEGMENTS), missing(Reason.FEW_SEGMENTS)
-        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self.runout_um_pk(shaft))
+        of_k, of_c = transfer_budgets(
+            found, self.bearing.bracket, self.bearing.accuracy, self.runout_um_pk(shaft)
+        )
         budgets[f"transfer_k_{axes}_n_per_m"] = of_k
         budgets[f"transfer_c_{axes}_n_s_per_m"] = of_c
         return shown, k_eff, reading_of(of_k, quality), reading_of(of_c, quality)
@@ -185,7 +190,7 @@ class OrderLine:
         quiet = Reason.INSUFFICIENT_EXCITATION
         if self.orders.power[self.line, shaft, bearing] <= 0.0:
             return quiet
-        if self.orders.amplitude_um_pk(bearing)[self.line] < self.settings.min_bearing_um_pk:
+        if self.orders.amplitude_um_pk(bearing)[self.line] < self.floors_um_pk[bearing]:
             return quiet
         # what is no line must not be read as the vortex's
         if (few or self.line == VORTEX) and not self._stands_out(shaft):

@@ -21,6 +21,11 @@ class Measurand(StrEnum):
     ACCELERATION_M_S2 = "acceleration_m_s2"
     KEY_PHASE_V = "key_phase_v"
 
+    @property
+    def n_integrations(self) -> int:
+        """How many integrations turn it into displacement: 2 for acceleration, 1 for velocity."""
+        return {Measurand.ACCELERATION_M_S2: 2, Measurand.VELOCITY_MM_S: 1}.get(self, 0)
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -34,6 +39,10 @@ class Channel:
         key-phase, -1 if its pulses fall.
     response
         How the transducer changes the signal with frequency; none if it does not.
+    delay_s
+        What the channel is read late by, against the others.
+    line_floor
+        Amplitude of a line, 0-to-peak in the channel's unit, that the transducer's own noise has.
     unit_per_count
         The channel's unit per count of its converter; zero where it is not known.
     ok_limits
@@ -48,6 +57,8 @@ class Channel:
     measurand: Measurand
     direction: int = 1
     response: Response | None = None
+    delay_s: float = 0.0
+    line_floor: float = 0.0
     unit_per_count: float = 0.0
     ok_limits: tuple[float, float] = (-math.inf, math.inf)
     probe: str = ""
@@ -75,9 +86,11 @@ class Bearing:
         Their slow gap channels, where measured.
     opposite_reference_um
         Their gaps (x, y) with the shaft centred.
-    bracket_mass_kg, bracket_damping_n_s_per_m
-        Effective mass and damping of the bracket; zero where not known. Equation (5) leaves them
-        out, the other estimators take them in.
+    bracket_mass_kg
+        Effective mass of the bracket; None if not known: `dynamic` then fits it with the film.
+        Equation (5) leaves it out, the other estimators take it in.
+    bracket_damping_n_s_per_m
+        Damping of the bracket; zero where not known.
     runout_um_pk
         Largest runout of the shaft's surface at 1×, as far as it is not taken off.
     gap_accuracy
@@ -104,7 +117,7 @@ class Bearing:
     opposite_gap_x: str | None = None
     opposite_gap_y: str | None = None
     opposite_reference_um: tuple[float, float] | None = None
-    bracket_mass_kg: float = 0.0
+    bracket_mass_kg: float | None = None
     bracket_damping_n_s_per_m: float = 0.0
     runout_um_pk: float = 0.0
     gap_accuracy: GapAccuracy = field(default_factory=GapAccuracy)

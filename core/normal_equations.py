@@ -29,9 +29,13 @@ class NormalEquations:
         Share of the probes' noise in it.
     force : (n_lines, 2, 4)
         Shaft motion times force of the bracket, for each row.
-    spring : (n_lines, 2, 4)
-        The same for a bracket of 1 N/m without mass and damping.
     force_power : (n_lines, 2)
+    shaft, cross : (n_lines, 2, 2)
+        Spectra of the shaft's motion, its noise included, and of bearing times conjugated shaft.
+    noise_power : (2,)
+        Mean squared phasor of each probe's noise.
+    bracket_n_per_m : (n_lines,)
+        Dynamic stiffness of the bracket.
     ratio : (n_lines,)
         Angular frequency over `omega_unit`.
     omega_unit
@@ -41,8 +45,11 @@ class NormalEquations:
     gram: FloatArray
     noise_gram: FloatArray
     force: FloatArray
-    spring: FloatArray
     force_power: FloatArray
+    shaft: ComplexArray
+    cross: ComplexArray
+    noise_power: FloatArray
+    bracket_n_per_m: ComplexArray
     ratio: FloatArray
     omega_unit: float
 
@@ -58,7 +65,7 @@ class NormalEquations:
         ----------
         weight : (n_lines, 2)
         right : (n_lines, 2, 4)
-            `force` or `spring`.
+            `force`, or a `moment`.
         """
         left = _weighted(weight, self.true_gram)
         moment = np.einsum("lr,lra->ra", weight, right)
@@ -73,25 +80,32 @@ class NormalEquations:
         left: FloatArray = self.force_power - 2.0 * common + modelled
         return np.maximum(left, 0.0)
 
-    def covariance(
-        self, weight: FloatArray, residual: FloatArray, inflation: FloatArray, n_segments: float
-    ) -> FloatArray:
-        """Covariance of the unknowns of each row, (2, 4, 4).
+    def inverse(self, weight: FloatArray) -> FloatArray:
+        """Inverse of the weighted Gram matrix of the motion, for each row, (2, 4, 4)."""
+        return np.asarray(np.linalg.inv(_weighted(weight, self.true_gram)), dtype=np.float64)
+
+    def moment(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
+        """Shaft motion times the force of a bracket of another dynamic stiffness, (n_lines, 2, 4).
 
         Parameters
         ----------
-        weight, residual : (n_lines, 2)
-        inflation : (n_lines, 2, 4)
-            For the correlation of neighbouring lines, for each unknown.
-        n_segments
-            Independent segments.
+        stiffness_n_per_m : (n_lines,)
         """
-        inverse = np.linalg.inv(_weighted(weight, self.true_gram))
-        spread = np.sqrt(weight**2 * residual)[..., np.newaxis] * np.sqrt(inflation)
-        # real part of conj(x) e with circular e: half of its power (Bendat and Piersol, 9.2)
-        score = np.einsum("lra,lab,lrb->rab", spread, self.gram, spread) / (2.0 * n_segments)
-        covariance: FloatArray = inverse @ score @ inverse
-        return covariance
+        return _moment(stiffness_n_per_m[:, np.newaxis, np.newaxis] * self.cross, self.ratio)
+
+    def film(self, unknowns: FloatArray) -> ComplexArray:
+        """Dynamic stiffness of a film at the lines, (n_lines, 2, 2)."""
+        damping = self.ratio[:, np.newaxis, np.newaxis] * unknowns[:, 2:]
+        film: ComplexArray = unknowns[:, :2] + 1j * damping
+        return film
+
+    @cached_property
+    def regressors(self) -> ComplexArray:
+        """What the unknowns of a row multiply, by shaft motion, (n_lines, 4, 2)."""
+        regressors = np.zeros((self.ratio.size, N_UNKNOWNS, 2), dtype=np.complex128)
+        regressors[:, (0, 1), (0, 1)] = 1.0
+        regressors[:, (2, 3), (0, 1)] = 1j * self.ratio[:, np.newaxis]
+        return regressors
 
 
 def normal_equations(
@@ -123,8 +137,11 @@ def normal_equations(
         gram=_gram(shaft, ratio),
         noise_gram=_gram(noise, ratio),
         force=_moment(bracket_n_per_m[:, np.newaxis, np.newaxis] * cross, ratio),
-        spring=_moment(cross, ratio),
         force_power=np.abs(bracket_n_per_m[:, np.newaxis]) ** 2 * power,
+        shaft=shaft,
+        cross=cross,
+        noise_power=noise_power,
+        bracket_n_per_m=bracket_n_per_m,
         ratio=ratio,
         omega_unit=omega_unit,
     )

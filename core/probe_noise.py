@@ -41,8 +41,8 @@ def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexA
 
 def probe_noise_power(
     spectrum: CrossSpectrum, quiet: npt.NDArray[np.bool_], n_segments: float
-) -> FloatArray:
-    """Mean squared phasor of the probes' noise, (2,) in µm², from lines in a quiet band.
+) -> tuple[FloatArray, FloatArray]:
+    """Mean squared phasor of the probes' noise, from lines in a quiet band.
 
     What shaft and bearing have in common is motion and does not count; the rest is the probes'
     noise and, through the film, the bearing transducers'. Where those are quiet the estimate is
@@ -57,11 +57,11 @@ def probe_noise_power(
 
     Returns
     -------
-    Zero if no line is quiet.
+    (2,) in µm², zero if no line is quiet; and their relative standard uncertainties, (2,).
     """
     matrix = spectrum.matrix[quiet]
     if matrix.shape[0] == 0:
-        return np.zeros(2)
+        return np.zeros(2), np.zeros(2)
     shaft, bearing = slice(0, BEARING_X), slice(BEARING_X, None)
     rest = conditional_power(
         matrix[:, shaft, shaft], matrix[:, bearing, bearing], matrix[:, shaft, bearing]
@@ -77,5 +77,6 @@ def probe_noise_power(
     same = sums / counts <= (1.0 + SAME_FLOOR * math.sqrt(2.0) * spread) * (sums / counts).min(
         axis=0
     )
-    floor: FloatArray = (sums * same).sum(axis=0) / (counts * same).sum(axis=0)
-    return floor * n_segments / freedoms
+    counted: FloatArray = (counts * same).sum(axis=0)
+    floor: FloatArray = (sums * same).sum(axis=0) / counted
+    return floor * n_segments / freedoms, np.sqrt(CORRELATED_LINES / (counted * freedoms))

@@ -33,6 +33,8 @@ class Reason(StrEnum):
     LOW_COVERAGE = "low_coverage"
     INSUFFICIENT_EXCITATION = "insufficient_excitation"
     POOR_FIT = "poor_fit"
+    CHANNEL_DELAY = "channel_delay"
+    ESTIMATORS_DISAGREE = "estimators_disagree"
     SWITCHED_OFF = "switched_off"
     DEAD = "dead"
     STUCK = "stuck"

@@ -107,6 +107,8 @@ CATALOGUE: tuple[Quantity, ...] = (
     Quantity("dynamic_lack_of_fit_x", "1", "Lack of fit of the film x, about 1 if it fits"),
     Quantity("dynamic_lack_of_fit_y", "1", "Lack of fit of the film y, about 1 if it fits"),
     Quantity("dynamic_n_lines", "1", "Spectral lines used by dynamic"),
+    Quantity("dynamic_delay_s", "s", "Delay of the bearing channels that dynamic finds"),
+    Quantity("dynamic_bracket_mass_kg", "kg", "Bracket mass, fitted where none is given"),
 )
 
 BY_NAME = {quantity.name: quantity for quantity in CATALOGUE}

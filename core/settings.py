@@ -34,10 +34,6 @@ class AnalysisSettings:
         coherence while there are too few segments to know that.
     min_coverage
         Share of the wanted segments below which a result is marked uncertain.
-    min_bearing_um_pk
-        Bearing amplitude of a line below which equation (5) and `transfer` say nothing: at 1× of
-        92.3 r/min, 4 µm are 0.04 mV of a 1000 mV/g accelerometer. The paper's balanced machine
-        (Table 8), whose figures it calls unreliable, has 1.9 to 3.4 µm.
     sensors
         What counts as a failed transducer or an unsteady record.
     dynamic
@@ -59,7 +55,6 @@ class AnalysisSettings:
     min_coherence: float = 0.9
     min_line_to_floor: float = 10.0
     min_coverage: float = 0.5
-    min_bearing_um_pk: float = 4.0
     min_speed_fraction: float = 0.2
     velocity_low_order: float = 0.25
     velocity_high_hz: float = 1000.0

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import ComplexArray, FloatArray
 
 NOISE_BANDWIDTH_BINS = 1.5
 """Equivalent noise bandwidth of Hann's taper (Harris 1978, table I)."""
@@ -46,43 +46,52 @@ def independent_segments(n_segments: int, overlap: float) -> float:
     return n_segments / (1.0 + excess)
 
 
-WHITE_PRODUCTS = tuple(rho**2 for rho in BIN_CORRELATION[1:])
-"""Correlation, 1 and 2 bins apart, of products of two independent white noises."""
+WHITE_PRODUCTS = (1.0, *(rho**2 for rho in BIN_CORRELATION[1:]))
+"""Correlation, 0, 1 and 2 bins apart, of products of two independent white noises."""
 
-SMEARED_PRODUCTS = (0.0, -1.0 / 12.0)
-SMEARED_IN_PHASE = (1.0 / 3.0, 1.0 / 12.0)
+SMEARED_IN_PHASE = (1.0, -1.0 / 3.0, -1.0 / 6.0)
+SMEARED_IN_QUADRATURE = (1.0, 1.0 / 3.0, 0.0)
+SMEARED_APART = (1.0, 0.0, -1.0 / 12.0)
 """The same of white noise times what it leaves in a line when each of its parts is integrated with
-the line's frequency instead of its own, d times its share in the bins d = -1, 0, 1 of the taper.
-The second is taken off for the part in phase with the noise and added for the part in quadrature,
-by the cosine of twice the phase."""
+the line's frequency instead of its own, d times its share in the bins d = -1, 0, 1 of the taper;
+for the factor's part in phase with the noise, in quadrature, and independent of it. In phase, what
+one line has too much its neighbours have too little: only the ends of a stretch of lines are
+left."""
 
 SMEAR_BINS_SQUARED = 1.0 / 3.0
 """Variance of the frequency, in bins, that a line of broadband noise holds."""
 
 
-def neighbour_inflation(
-    used: npt.NDArray[np.bool_], products: tuple[float, ...] = WHITE_PRODUCTS
+def correlated_sum(
+    terms: FloatArray | ComplexArray, lines: npt.NDArray[np.int64], products: tuple[float, ...]
 ) -> FloatArray:
-    """Factor by which correlated neighbours change the variance of a sum over lines.
-
-    A line without used neighbours counts once.
+    """Covariance of a sum over lines, each of several terms, whose neighbours are correlated.
 
     Parameters
     ----------
-    used : (n_lines,)
+    terms : (n_lines, n, m)
+        Standard deviations of the n summands' m independent complex parts.
+    lines : (n_lines,)
+        Which bins they are, rising.
     products
-        Correlation of the summands 1, 2, ... bins apart.
+        Correlation of the summands 0, 1, 2, ... bins apart.
 
     Returns
     -------
-    (n_lines,) 1 to 1.94 for white noise.
+    (n, n); with no negative variance, as products are of a real process.
     """
-    counted = used.astype(np.float64)
-    inflation = np.ones_like(counted)
-    for distance, correlation in enumerate(products, start=1):
-        inflation[distance:] += correlation * counted[:-distance]
-        inflation[:-distance] += correlation * counted[distance:]
-    return inflation
+    n = terms.shape[1]
+    spread = np.zeros((int(lines[-1] - lines[0]) + 1, n, terms.shape[2]), dtype=np.complex128)
+    spread[lines - lines[0]] = terms
+    covariance = np.zeros((n, n))
+    for distance, correlation in enumerate(products[: spread.shape[0]]):
+        stop = spread.shape[0] - distance
+        left, right = (
+            part.transpose(1, 0, 2).reshape(n, -1) for part in (spread[distance:], spread[:stop])
+        )
+        product = correlation * (left @ right.conj().T).real
+        covariance += product if distance == 0 else product + product.T
+    return covariance
 
 
 @lru_cache(maxsize=8)

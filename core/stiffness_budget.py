@@ -1,19 +1,24 @@
 """Budgets of the three estimators of film stiffness: which errors reach which result, and how."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from core.bracket import BracketDynamics
 from core.cross_spectrum import CrossSpectrum
 from core.dynamic import DynamicStiffness
-from core.transfer import LineTransfer
+from core.transfer import LineTransfer, motion_across
 from core.uncertainty import BearingAccuracy, Budget, BudgetLine, random_line, systematic_line
 
 STATISTICS = "spectral statistics"
 SHAFT_GAIN = "gain of shaft probe"
 BEARING_GAIN = "gain of bearing transducer"
 BRACKET = "bracket stiffness"
+MASS = "bracket mass"
+DAMPING = "bracket damping"
+CROSS_COUPLING = "cross-coupling not known"
+DELAY = "delay between channels"
 RUNOUT = "runout"
 
 RESOLUTION = 0.001
@@ -43,8 +48,8 @@ def ratio_budget(
     """Uncertainty of equation (5), ``|X_b| / |U| k_b``.
 
     What is not coherent sits in one of the two amplitudes, and it is not known in which: the ratio
-    may be high or low by 1/γ - 1. The bracket's inertia, where its mass is known, is left out by
-    equation (5) and stated as what it may amount to.
+    may be high or low by 1/γ - 1. The bracket's inertia is left out by equation (5) and stated as
+    what it may amount to.
 
     Parameters
     ----------
@@ -67,13 +72,18 @@ def ratio_budget(
     omega = 2.0 * math.pi * float(spectrum.frequency_hz[line])
     # two powers of n segments, correlated by γ²: Bendat and Piersol, 9.1
     random = value * math.sqrt((1.0 - coherence) / (2.0 * (counted - 1.0)))
-    inertia = bracket.mass_kg * omega**2 / bracket.stiffness_n_per_m
+    inertia = bracket.max_mass_kg * omega**2 / bracket.stiffness_n_per_m
     return Budget(
         value,
         (
             random_line(STATISTICS, random, 2.0 * (counted - 1.0)),
             *_gains(value, accuracy),
             systematic_line(BRACKET, accuracy.bracket_stiffness, value),
+            systematic_line(
+                CROSS_COUPLING,
+                accuracy.cross_coupling,
+                value * abs(motion_across(spectrum, line, shaft)),
+            ),
             systematic_line("incoherent motion", 1.0 / math.sqrt(coherence) - 1.0, value),
             systematic_line("bracket inertia left out", inertia, value),
             systematic_line(RUNOUT, runout_um_pk, value / shaft_um_pk),
@@ -81,8 +91,24 @@ def ratio_budget(
     )
 
 
+def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> float:
+    """Half-width of the bracket's mass; without one, all that it may be thought to have."""
+    share = 1.0 if bracket.mass_kg is None else accuracy.bracket_mass
+    return share * bracket.max_mass_kg
+
+
+def damping_half_width_n_s_per_m(
+    bracket: BracketDynamics, mass_kg: float, accuracy: BearingAccuracy
+) -> float:
+    """Half-width of the bracket's damping."""
+    return 2.0 * accuracy.bracket_damping * math.sqrt(bracket.stiffness_n_per_m * mass_kg)
+
+
 def transfer_budgets(
-    found: LineTransfer, accuracy: BearingAccuracy, runout_um_pk: float = 0.0
+    found: LineTransfer,
+    bracket: BracketDynamics,
+    accuracy: BearingAccuracy,
+    runout_um_pk: float = 0.0,
 ) -> tuple[Budget, Budget]:
     """Uncertainty of stiffness in N/m and damping in N·s/m from `transfer`.
 
@@ -92,60 +118,83 @@ def transfer_budgets(
         As for `ratio_budget`; its phase is not known, so that it reaches damping as well.
     """
     omega = 2.0 * math.pi * found.frequency_hz
-    film = math.hypot(found.k_n_per_m, omega * found.c_n_s_per_m) / found.shaft_um_pk
-    stiffness, damping = (
-        Budget(
+    mass_kg = mass_half_width_kg(bracket, accuracy)
+    damping = damping_half_width_n_s_per_m(bracket, bracket.max_mass_kg, accuracy)
+    film = complex(found.k_n_per_m, omega * found.c_n_s_per_m)
+    any_phase = abs(film) * (1.0 + 1.0j)
+
+    def budget(value: float, std: float, part: Callable[[complex], float]) -> Budget:
+        """Budget of a part of the film's dynamic stiffness, a linear function of it."""
+        return Budget(
             value,
             (
                 random_line(STATISTICS, std, 2.0 * (found.n_segments - 1.0)),
                 *_gains(value, accuracy),
-                systematic_line(BRACKET, accuracy.bracket_stiffness, per_bracket),
-                systematic_line(RUNOUT, runout_um_pk, per_um),
+                systematic_line(
+                    BRACKET,
+                    accuracy.bracket_stiffness,
+                    part(bracket.stiffness_n_per_m * found.ratio),
+                ),
+                systematic_line(MASS, mass_kg, part(-(omega**2) * found.ratio)),
+                systematic_line(DAMPING, damping, part(1j * omega * found.ratio)),
+                systematic_line(DELAY, accuracy.delay_s, part(1j * omega * film)),
+                # all of it may be in the real or in the imaginary part
+                systematic_line(RUNOUT, runout_um_pk, part(any_phase) / found.shaft_um_pk),
+                systematic_line(
+                    CROSS_COUPLING, accuracy.cross_coupling, part(any_phase) * abs(found.across)
+                ),
             ),
         )
-        for value, std, per_bracket, per_um in (
-            (found.k_n_per_m, found.k_std_n_per_m, found.k_per_bracket_n_per_m, film),
-            (
-                found.c_n_s_per_m,
-                found.c_std_n_s_per_m,
-                found.c_per_bracket_n_s_per_m,
-                film / omega,
-            ),
-        )
+
+    return (
+        budget(found.k_n_per_m, found.k_std_n_per_m, lambda z: z.real),
+        budget(found.c_n_s_per_m, found.c_std_n_s_per_m, lambda z: z.imag / omega),
     )
-    return stiffness, damping
 
 
-def dynamic_budgets(found: DynamicStiffness, accuracy: BearingAccuracy) -> dict[str, Budget]:
+def dynamic_budgets(
+    found: DynamicStiffness, bracket: BracketDynamics, accuracy: BearingAccuracy
+) -> dict[str, Budget]:
     """Uncertainty of all eight coefficients from `dynamic`.
+
+    A mass that was fitted with the film is part of the statistics.
 
     Returns
     -------
     By name, ``k_xx`` in N/m to ``c_yy`` in N·s/m.
     """
-    parts = {
-        "k": (found.k_n_per_m, found.k_std_n_per_m, found.k_per_bracket_n_per_m),
-        "c": (found.c_n_s_per_m, found.c_std_n_s_per_m, found.c_per_bracket_n_s_per_m),
-    }
+    is_fitted = bracket.mass_kg is None
+    mass_kg = 0.0 if is_fitted else mass_half_width_kg(bracket, accuracy)
+    damping = damping_half_width_n_s_per_m(bracket, max(found.bracket_mass_kg, 0.0), accuracy)
+    widths = (
+        (BRACKET, accuracy.bracket_stiffness, found.per_stiffness),
+        (MASS, mass_kg, found.per_mass),
+        (DAMPING, damping, found.per_damping),
+        (DELAY, accuracy.delay_s, found.per_delay),
+    )
     # a shaft spectrum that is too large by a share makes every coefficient too small by as much
     left_in = found.noise_share / (1.0 - found.noise_share)
-    return {
-        f"{letter}_{'xy'[row]}{'xy'[column]}": Budget(
-            float(value[row, column]),
-            (
-                random_line(STATISTICS, float(std[row, column])),
-                *_gains(float(value[row, column]), accuracy),
-                systematic_line(
-                    BRACKET, accuracy.bracket_stiffness, float(per_bracket[row, column])
+    budgets = {}
+    for letter, attribute, std in (
+        ("k", "k_n_per_m", found.k_std_n_per_m),
+        ("c", "c_n_s_per_m", found.c_std_n_s_per_m),
+    ):
+        coefficients = getattr(found, attribute)
+        for at in np.ndindex(2, 2):
+            value = float(coefficients[at])
+            budgets[f"{letter}_{'xy'[at[0]]}{'xy'[at[1]]}"] = Budget(
+                value,
+                (
+                    random_line(STATISTICS, float(std[at])),
+                    *_gains(value, accuracy),
+                    *(
+                        systematic_line(name, width, float(getattr(change, attribute)[at]))
+                        for name, width, change in widths
+                    ),
+                    systematic_line("probe noise taken off", accuracy.probe_noise, value * left_in),
+                    systematic_line(
+                        "spectral resolution", RESOLUTION, float(coefficients[at[0], at[0]])
+                    ),
                 ),
-                systematic_line(
-                    "probe noise taken off",
-                    accuracy.probe_noise,
-                    float(value[row, column]) * left_in,
-                ),
-                systematic_line("spectral resolution", RESOLUTION, float(value[row, row])),
-            ),
-        )
-        for letter, (value, std, per_bracket) in parts.items()
-        for row, column in np.ndindex(2, 2)
-    }
+            )
+    return budgets

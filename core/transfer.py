@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.bracket import BracketDynamics
-from core.cross_spectrum import CrossSpectrum
+from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,10 @@ class LineTransfer:
         Real part, and imaginary part over ω.
     k_std_n_per_m, c_std_n_s_per_m
         Random standard uncertainties.
-    k_per_bracket_n_per_m, c_per_bracket_n_s_per_m
-        Change per relative change of the bracket's stiffness.
+    ratio
+        Bearing motion per shaft motion.
+    across
+        Shaft motion across this direction per motion along it.
     shaft_um_pk
         Amplitude of the shaft's motion.
     coherence
@@ -37,11 +39,18 @@ class LineTransfer:
     c_n_s_per_m: float
     k_std_n_per_m: float
     c_std_n_s_per_m: float
-    k_per_bracket_n_per_m: float
-    c_per_bracket_n_s_per_m: float
+    ratio: complex
+    across: complex
     shaft_um_pk: float
     coherence: float
     n_segments: float
+
+
+def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
+    """Coherent shaft motion across a direction per motion along it; 1 if that is not known."""
+    across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
+    power = float(spectrum.power[line, shaft, across])
+    return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0
 
 
 def line_transfer(
@@ -87,8 +96,8 @@ def line_transfer(
         c_n_s_per_m=film.imag / omega,
         k_std_n_per_m=std,
         c_std_n_s_per_m=std / omega,
-        k_per_bracket_n_per_m=bracket.stiffness_n_per_m * ratio.real,
-        c_per_bracket_n_s_per_m=bracket.stiffness_n_per_m * ratio.imag / omega,
+        ratio=ratio,
+        across=motion_across(spectrum, line, shaft),
         shaft_um_pk=math.sqrt(shaft_power),
         coherence=coherence,
         n_segments=counted,

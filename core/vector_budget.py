@@ -8,7 +8,7 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.bracket import BracketDynamics
 from core.channel_budget import effective_number
-from core.stiffness_budget import BEARING_GAIN, BRACKET, RUNOUT, SHAFT_GAIN
+from core.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, RUNOUT, SHAFT_GAIN
 from core.uncertainty import BearingAccuracy, Budget, random_line, systematic_line
 
 SPREAD = "spread of polls"
@@ -23,6 +23,7 @@ def vector_ratio_budget(
     accuracy: BearingAccuracy,
     coherence: float,
     runout_um_pk: float = 0.0,
+    across: float = 1.0,
 ) -> Budget | None:
     """Uncertainty of ``|X_b| / |U| k_b`` over some polls.
 
@@ -37,6 +38,8 @@ def vector_ratio_budget(
         Squared, of the two; without phases the least that would be accepted of waveforms.
     runout_um_pk
         Largest runout at this line, not taken off.
+    across
+        Shaft amplitude across this direction over that along it.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def vector_ratio_budget(
     each = bearing_um_pk / shaft_um_pk * bracket.stiffness_n_per_m
     random = float(np.std(each, ddof=1)) / math.sqrt(independent)
     omega = 2.0 * math.pi * frequency_hz
-    inertia = bracket.mass_kg * omega**2 / bracket.stiffness_n_per_m
+    inertia = bracket.max_mass_kg * omega**2 / bracket.stiffness_n_per_m
     return Budget(
         value,
         (
@@ -61,6 +64,7 @@ def vector_ratio_budget(
             systematic_line(COHERENCE, 1.0 / math.sqrt(coherence) - 1.0, value),
             systematic_line("bracket inertia left out", inertia, value),
             systematic_line(RUNOUT, runout_um_pk, value / shaft),
+            systematic_line(CROSS_COUPLING, accuracy.cross_coupling, value * across),
         ),
     )
 

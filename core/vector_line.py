@@ -42,6 +42,8 @@ class VectorLine:
         Independent polls below which there is no `transfer`.
     quality
         Of what is read from some channels; without a number, why.
+    floors_um_pk
+        Of (u_x, u_y, v_x, v_y): what a line of each transducer's own noise looks like.
     """
 
     bearing: Bearing
@@ -53,6 +55,7 @@ class VectorLine:
     has_phase: npt.NDArray[np.bool_]
     min_polls: int
     quality: Callable[..., Quality | Reading]
+    floors_um_pk: tuple[float, ...]
 
     @property
     def spectrum(self) -> CrossSpectrum:
@@ -115,8 +118,11 @@ class VectorLine:
 
     def _pair_quality(self, x: int, y: int, rotation_sense: int) -> Quality:
         phased = self._phased(x, y)
-        if phased is None or min(phased.power[0, x, y], phased.power[0, y, x]) < (
-            self.settings.min_bearing_um_pk**2
+        # runout is as round as the shaft's orbit, and turns as it does or against it
+        runout_um_pk = self._runout_um_pk() if x == SHAFT_X else 0.0
+        least_um_pk = max(self.floors_um_pk[x], self.floors_um_pk[y], runout_um_pk)
+        if phased is None or not (
+            min(phased.power[0, x, y], phased.power[0, y, x]) > least_um_pk**2
         ):
             return GOOD
         power, cross = phased.power[0], complex(phased.matrix[0, x, y])
@@ -162,7 +168,7 @@ class VectorLine:
         spectrum, quiet = self.spectrum, Reason.INSUFFICIENT_EXCITATION
         if not spectrum.n_segments[shaft, bearing] or spectrum.power[0, shaft, bearing] <= 0.0:
             return quiet
-        if spectrum.amplitude_um_pk(bearing)[0] < self.settings.min_bearing_um_pk:
+        if spectrum.amplitude_um_pk(bearing)[0] < self.floors_um_pk[bearing]:
             return quiet
         limits = LineLimits(0.0, self._runout_um_pk())
         reason = line_excitation(spectrum, 0, shaft, bearing, limits)
@@ -190,11 +196,19 @@ class VectorLine:
                 0.0 if phased is None else float(phased.coherence(shaft, bearing)[0]),
             ),
             self._runout_um_pk(),
+            self._across(shaft),
         )
         if budget is None:
             return Reading(k_eff, quality)
         budgets[f"k_eff_{axes}_n_per_m"] = budget
         return reading_of(budget, quality)
+
+    def _across(self, shaft: int) -> float:
+        """Shaft motion across a direction per motion along it; 1 where that is not known."""
+        power = self.spectrum.power[0]
+        across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
+        along, beside = float(power[shaft, across]), float(power[across, shaft])
+        return (beside / along) ** 0.5 if along > 0.0 else 1.0
 
     def _transfer(
         self, axes: str, shaft: int, bearing: int, quality: Quality, budgets: dict[str, Budget]
@@ -208,7 +222,9 @@ class VectorLine:
         if n_independent(*common) < self.min_polls or found is None:
             few = missing(Reason.FEW_SEGMENTS)
             return few, few
-        of_k, of_c = transfer_budgets(found, self.bearing.accuracy, self._runout_um_pk())
+        of_k, of_c = transfer_budgets(
+            found, self.bearing.bracket, self.bearing.accuracy, self._runout_um_pk()
+        )
         budgets[f"transfer_k_{axes}_n_per_m"] = of_k
         budgets[f"transfer_c_{axes}_n_s_per_m"] = of_c
         return reading_of(of_k, quality), reading_of(of_c, quality)

@@ -19,6 +19,7 @@ from core.recent import RecentReadings
 from core.segments import ORDER1, VORTEX
 from core.sensor_checks import stationarity
 from core.settings import AnalysisSettings
+from core.transducers import line_floor_um_pk
 from core.uncertainty import Budget
 from core.vector_budget import n_independent
 from core.vector_line import VectorLine
@@ -95,6 +96,9 @@ class VectorResults:
             has_phase=has_phase if line == ORDER1 else np.zeros_like(has_phase),
             min_polls=self._averaging.min_polls,
             quality=self._quality,
+            floors_um_pk=tuple(
+                line_floor_um_pk(self._unit.channels[row], frequency_hz) for row in self._rows
+            ),
         )
 
     def _readings(self) -> dict[str, Reading]:

@@ -16,6 +16,10 @@ from service.settings.units import UnitSettings
 
 ACCURACY_KEYS = {
     "bracket_stiffness_uncertainty",
+    "bracket_mass_uncertainty",
+    "bracket_damping_uncertainty",
+    "cross_coupling_uncertainty",
+    "delay_uncertainty_s",
     "gap_reference_uncertainty_um",
     "thermal_growth_um",
     "thermal_growth_change_um",
@@ -48,6 +52,8 @@ def _channel(settings: ChannelSettings) -> Channel:
         measurand=settings.measurand,
         direction=settings.sign,
         response=response_of(settings.response),
+        delay_s=settings.delay_s,
+        line_floor=settings.floor,
         unit_per_count=calibration.unit_per_count,
         ok_limits=calibration.ok_limits,
         probe=settings.probe or "",
@@ -91,6 +97,10 @@ def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
         bracket_stiffness=settings.bracket_stiffness_uncertainty,
+        bracket_mass=settings.bracket_mass_uncertainty,
+        bracket_damping=settings.bracket_damping_uncertainty,
+        delay_s=settings.delay_uncertainty_s,
+        cross_coupling=settings.cross_coupling_uncertainty,
     )
 
 

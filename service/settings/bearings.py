@@ -95,16 +95,32 @@ class BearingSettings(Settings):
     bracket_stiffness_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.10
     """Half-width of what the bracket's stiffness may be off, as a share; example: 0.10."""
 
-    bracket_mass_kg: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
-    """Effective mass of bracket and bearing in kg; 0 if not known. Equation (5) leaves it out,
-    the other estimators take its inertia in. Example: 45.0e3."""
+    bracket_mass_kg: Annotated[float, Field(gt=0.0, le=1e7)] | None = None
+    """Effective mass of bracket and bearing in kg; without it dynamic fits it with the film, which
+    makes its result less certain. Equation (5) leaves it out. Example: 45.0e3."""
+
+    bracket_mass_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
+    """Half-width of what bracket_mass_kg may be off, as a share; example: 0.2."""
 
     bracket_damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=1e10)] = 0.0
     """Damping of the bracket in N·s/m; 0 if not known."""
 
-    runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    bracket_damping_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.02
+    """Half-width of what the damping of the bracket may be off, as a share of critical damping;
+    example: 0.02."""
+
+    cross_coupling_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
+    """Half-width of the film's cross-coupled over its direct stiffness, which transfer and equation
+    (5) do not see; example: 0.3."""
+
+    delay_uncertainty_s: Annotated[float, Field(ge=0.0, le=0.1)] = 2e-4
+    """Half-width of what the bearing channels may be late or early by against the shaft channels,
+    s; the delay_s of a channel takes out what is known. Example: 0.0002."""
+
+    runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.0
     """Largest runout of the shaft's surface at 1×, µm zero-to-peak; widens the uncertainty of what
-    is read at 1×. Example: 10.0."""
+    is read at 1×, where a shaft that moves by less than four times as much gives no stiffness.
+    Example: 10.0."""
 
     preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
     """Estimators that the stiffness for trends and alarms is taken from, best first: the first

@@ -65,10 +65,22 @@ PLAUSIBLE_V_PER_UNIT = {
 }
 """Sensitivities outside these are mistakes of unit: no such transducer is sold."""
 
+LINE_FLOORS = {
+    Transducer.PROXIMITY_PROBE: 0.1,
+    Transducer.DISPLACEMENT: 0.1,
+    Transducer.VELOCITY: 1e-3,
+    Transducer.ACCELEROMETER: 2e-5,
+    Transducer.KEY_PHASE: 0.0,
+}
+"""Amplitude of a line that a transducer's noise has, 0-to-peak in µm, mm/s or m/s²."""
+
 SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
 """What a shaft may be looked at with, and so what may see its runout."""
 
-NOT_OF_A_KEY_PHASE = ("sensitivity", "sensitivity_unit", "response", "probe", "slow_roll")
+NOT_OF_A_KEY_PHASE = (
+    *("sensitivity", "sensitivity_unit", "response", "delay_s", "line_floor", "probe"),
+    "slow_roll",
+)
 """Keys that say nothing of pulses: their angle counts, not their height."""
 
 
@@ -107,6 +119,15 @@ class ChannelSettings(Settings):
     """How the transducer changes the signal with frequency, in parts that work one after the
     other; nothing is a flat response. Example: [{ kind = "high_pass", corner_hz = 0.5 }]."""
 
+    delay_s: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
+    """What the channel is read late by, against the others, in s: a converter that samples its
+    channels one after the other, or a filter that others do not have; example: 0.00167."""
+
+    line_floor: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """Amplitude of a line, 0-to-peak in µm, mm/s or m/s², below which it may be the transducer's
+    own noise: a bearing line below has no stiffness. Default: 2e-5 m/s² for an accelerometer, which
+    is 5 µg/√Hz in a line of 0.07 Hz, 0.001 mm/s for a velocity transducer, 0.1 µm for others."""
+
     direction: Literal[1, -1] | None = None
     """+1 if a growing reading is motion along the positive bearing axis, -1 if against it. Default:
     -1 for a proximity probe, which sits on the positive axis and sees its gap shrink; else +1. Of a
@@ -134,7 +155,7 @@ class ChannelSettings(Settings):
 
     def _check_key_phase(self) -> None:
         for key in NOT_OF_A_KEY_PHASE:
-            if getattr(self, key) not in (None, ()):
+            if getattr(self, key) not in (None, (), 0.0):
                 raise MisfitError("a key_phase has none; leave it out", key)
 
     def _check_runout(self) -> None:
@@ -170,6 +191,11 @@ class ChannelSettings(Settings):
         if self.sensitivity is None or self.sensitivity_unit is None:
             return 1.0
         return 1.0 / (self.sensitivity * V_PER_ENGINEERING_UNIT[self.sensitivity_unit])
+
+    @property
+    def floor(self) -> float:
+        """Line floor with its default filled in."""
+        return LINE_FLOORS[self.transducer] if self.line_floor is None else self.line_floor
 
     @property
     def sign(self) -> int:

@@ -145,10 +145,6 @@ class AnalysisModel(Settings):
     min_coverage: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     """Share of the possible segments below which a result is uncertain."""
 
-    min_bearing_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 4.0
-    """Bearing amplitude of a line, µm zero-to-peak, below which equation (5) and transfer give no
-    stiffness; lower it for transducers better than a 1000 mV/g accelerometer."""
-
     dynamic: DynamicModel = DynamicModel()
     """How all eight film coefficients are sought."""
 

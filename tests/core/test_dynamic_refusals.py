@@ -53,7 +53,7 @@ def test_each_demand_on_the_evidence_can_refuse_alone(
     recording: Recording, stricter: dict[str, float]
 ) -> None:
     spectrum = averaged(recording(probe_um=0.1, bearing_um=0.1))
-    base = DynamicSettings(n_integrations=0)
+    base = DynamicSettings()
 
     assert isinstance(dynamic_stiffness(spectrum, BRACKET, TURN_HZ, base), DynamicStiffness)
     strict = replace(base, **stricter)

@@ -22,7 +22,7 @@ Operating = partial(OperatingLimits, rated_speed_rpm=92.3)
 PAIR, ZEROS = (1.0, 2.0), (0.0, 0.0)
 Sheet = partial(ResponseTable, frequency_hz=PAIR, magnitude=PAIR, phase_deg=ZEROS)
 Vector = partial(VectorSettings, n_polls=60)
-SHARES = ("shaft_gain", "bearing_gain", "bracket_stiffness", "probe_noise")
+SHARES = tuple(vars(BearingAccuracy()))
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,6 @@ SHARES = ("shaft_gain", "bearing_gain", "bracket_stiffness", "probe_noise")
         (DynamicSettings, {"quiet_band_hz": (25.0, 15.0)}, "quiet band"),
         (DynamicSettings, {"min_segments": 2}, "3 segments"),
         (DynamicSettings, {"min_lines": 0}, "at least 1"),
-        (DynamicSettings, {"n_integrations": 3}, "0, 1 or 2"),
         (Limits, {}, "give alert, danger or both"),
         (Limits, {"alert": math.nan}, "limit nan must be a number above 0"),
         (Limits, {"danger": math.inf}, "limit inf"),

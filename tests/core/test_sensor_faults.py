@@ -6,13 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import core.bearing_results
+import core.film_results
 from core.assessment import Assessment
-from core.machine import Unit
+from core.machine import Channel, Measurand, Unit
 from core.monitor import UnitMonitor
-from core.quality import Level, Reading, Reason, bad, uncertain
+from core.quality import GOOD, Level, Reading, Reason, bad, uncertain
 from core.settings import AnalysisSettings
 from core.speed import SpeedSource
+from service.settings.bearings import BearingSettings
 
+OMEGA = 2.0 * np.pi * 92.3 / 60.0
 Results = Callable[..., list[Assessment]]
 STIFFNESS = ("order1_k_eff_xx_n_per_m", "order1_transfer_k_xx_n_per_m", "stiffness_xx_n_per_m")
 
@@ -144,10 +148,49 @@ def test_runout_that_could_be_all_of_the_motion_is_no_excitation(
 
 @pytest.mark.parametrize(("shaft_um", "bearing_um"), [(23, 3.4), (12, 1.9), (10, 2.1)])
 def test_the_papers_balanced_rows_have_no_stiffness(
-    results: Results, signals, shaft_um: float, bearing_um: float
+    unit: Unit, results: Results, signals, shaft_um: float, bearing_um: float
 ) -> None:
     """Table 8, balanced: shaft 10 to 23 µm, bearing 1.9 to 3.4 µm; unreliable, the paper says."""
+    assumed = BearingSettings.model_fields["runout_um_pk"].default
+    unit = replace(unit, bearings=(replace(unit.bearings[0], runout_um_pk=assumed),))
     scale = np.array([[shaft_um / 60], [shaft_um / 60], [bearing_um / 20], [bearing_um / 20]])
-    readings = results(signals(90.0, 0.2) * scale)[-1].readings
+    readings = results(signals(90.0, 0.2) * scale, unit)[-1].readings
     for name in STIFFNESS:
         assert readings[name].quality == bad(Reason.INSUFFICIENT_EXCITATION), name
+
+
+@pytest.mark.parametrize(
+    ("measurand", "amplitude"),
+    [
+        (Measurand.DISPLACEMENT_UM, 20.0),
+        (Measurand.VELOCITY_MM_S, 20e-3 * OMEGA),
+        (Measurand.ACCELERATION_M_S2, 20e-6 * OMEGA**2),
+    ],
+)
+def test_a_line_below_the_noise_of_its_transducer_has_no_stiffness_in_whatever_unit(
+    unit: Unit, results: Results, signals, measurand: Measurand, amplitude: float
+) -> None:
+    found = []
+    for floor in (0.97, 1.03):
+        noisy = (Channel(id_, measurand, line_floor=floor * amplitude) for id_ in ("bx", "by"))
+        unit = replace(unit, channels=(*unit.channels[:2], *noisy))
+        scale = np.array([[1.0], [1.0], [amplitude / 20.0], [amplitude / 20.0]])
+        readings = results(signals(75.0) * scale, unit)[-1].readings
+        found.append(readings["order1_k_eff_xx_n_per_m"].quality)
+    assert found == [GOOD, bad(Reason.INSUFFICIENT_EXCITATION)]
+
+
+def test_how_often_a_bearing_channel_is_integrated_follows_from_its_transducer(
+    unit: Unit, results: Results, signals, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[int, int]] = []
+    monkeypatch.setattr(
+        core.bearing_results,
+        "film_results",
+        lambda *given: asked.append(given[-1]) or core.film_results.film_results(*given),
+    )
+    velocity = Channel("bx", Measurand.VELOCITY_MM_S)
+    acceleration = Channel("by", Measurand.ACCELERATION_M_S2)
+    unit = replace(unit, channels=(*unit.channels[:2], velocity, acceleration))
+    results(signals(15.0), unit)
+    assert set(asked) == {(1, 2)}

@@ -10,10 +10,11 @@ from core.spectral_statistics import (
     CORRELATED_LINES,
     SMEAR_BINS_SQUARED,
     SMEARED_IN_PHASE,
-    SMEARED_PRODUCTS,
+    SMEARED_IN_QUADRATURE,
+    WHITE_PRODUCTS,
+    correlated_sum,
     independent_segments,
     leakage_kernel,
-    neighbour_inflation,
     phasor_power_per_density,
 )
 from core.usable_lines import LineSelection, between_harmonics, little_leakage
@@ -93,11 +94,15 @@ def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> No
 
 
 def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
-    every = neighbour_inflation(np.ones(9, dtype=bool))
-    alone = neighbour_inflation(np.array([True, False, False, True]))
+    def variance(lines: list[int], products: tuple[float, ...] = WHITE_PRODUCTS) -> float:
+        terms = np.ones((len(lines), 1, 1), dtype=complex)
+        return float(correlated_sum(terms, np.array(lines), products)[0, 0])
 
-    assert every[4] == pytest.approx(CORRELATED_LINES)
-    np.testing.assert_allclose(alone, 1.0 + np.array([0.0, 4 / 9 + 1 / 36, 4 / 9 + 1 / 36, 0.0]))
+    assert variance(list(range(2000))) / 2000 == pytest.approx(CORRELATED_LINES, rel=0.001)
+    assert variance([0, 3]) == 2.0
+    assert variance([4, 5, 7]) == pytest.approx(3.0 + 2.0 * (4 / 9 + 1 / 36))
+    # what one line has too much the next has too little: only the ends are left, but they are
+    assert variance(list(range(99)), SMEARED_IN_PHASE) == pytest.approx(4 / 3)
 
     assert independent_segments(24, 0.0) == 24.0
     assert independent_segments(24, 0.125) == pytest.approx(24.0, rel=1e-3)
@@ -130,9 +135,10 @@ def test_what_integration_leaves_behind_hangs_together_as_stated() -> None:
     stated = SMEAR_BINS_SQUARED * (2.0 / (bins + 1)) ** 2
     assert np.mean(share / stated) == pytest.approx(1.0, abs=0.1)
     product = left * moved.conj() / (np.abs(moved) ** 2).mean(axis=0) * (bins + 1)
-    for distance, (apart, in_phase) in enumerate(
-        zip(SMEARED_PRODUCTS, SMEARED_IN_PHASE, strict=True), start=1
-    ):
-        for part, stated in ((product.real, apart - in_phase), (product.imag, apart + in_phase)):
+    for distance in (1, 2):
+        for part, stated in (
+            (product.real, SMEARED_IN_PHASE[distance]),
+            (product.imag, SMEARED_IN_QUADRATURE[distance]),
+        ):
             found = (part[:, :-distance] * part[:, distance:]).mean() / (part**2).mean()
             assert found == pytest.approx(stated, abs=0.03)

@@ -117,8 +117,8 @@ def blocks(settings: UnitSettings) -> list[SampleBlock]:
 
 
 def upper(unit: Unit, blocks: list[SampleBlock], min_coherence: float = 0.9) -> Assessment:
-    """The newest assessment of the upper bearing; its lines are small, and read all the same."""
-    settings = AnalysisSettings(min_bearing_um_pk=0.1, min_coherence=min_coherence)
+    """The newest assessment of the upper bearing."""
+    settings = AnalysisSettings(min_coherence=min_coherence)
     monitor = UnitMonitor(unit, settings)
     found = [a for block in blocks for a in monitor.ingest(block) if a.bearing == "UJB"]
     return found[-1]
@@ -140,6 +140,7 @@ def with_channels(unit: Unit, **changes: object) -> Unit:
 def test_equation_5_reads_the_film_only_when_runout_of_this_probe_is_taken_off(
     unit: Unit, blocks: list[SampleBlock]
 ) -> None:
+    unit = with_runout_limit(unit, 0.0)
     found = upper(unit, blocks)
     bare = upper(with_channels(unit, slow_roll=None), blocks)
     replaced = upper(with_channels(unit, probe="another"), blocks)

@@ -18,6 +18,8 @@ const REASONS = {
   low_coverage: ["gaps in the record", "Samples are missing in the averaged window."],
   insufficient_excitation: ["not enough excitation", "The motion is too small to tell stiffness from noise."],
   poor_fit: ["poor fit", "One constant film does not explain the motion at all frequencies; see the lack of fit."],
+  channel_delay: ["channels out of step?", "The bearing channels seem to be late or early against the shaft channels; or the bracket’s mass or a transducer’s response is wrong."],
+  estimators_disagree: ["estimators disagree", "Two ways to measure this film differ by more than chance and the stated limits explain: a transducer’s response, runout or bracket may be other than stated."],
   switched_off: ["switched off", "This estimate is switched off for this bearing in the plant file."],
   dead: ["no signal", "A transducer’s output rests at zero while the machine turns; its cable or supply may be broken."],
   stuck: ["signal stuck", "A transducer’s output does not move while the machine turns."],

@@ -13,8 +13,7 @@ TURN_HZ = (92.3 / 60.0, 92.3 / 60.0)
 BRACKET = BracketDynamics(1.18e9, 0.45e5)
 STIFFNESS = np.array([[1.2e9, -0.33e9], [-0.25e9, 0.7e9]])
 DAMPING = np.array([[1.5e7, 2.0e6], [-1.0e6, 0.9e7]])
-# These phasors are displacement from the start: nothing is integrated.
-NOISE_FREE = DynamicSettings(probe_noise_um2_per_hz=(0.0, 0.0), n_integrations=0)
+NOISE_FREE = DynamicSettings(probe_noise_um2_per_hz=(0.0, 0.0))
 BIN_HZ = float(FREQUENCY_HZ[0])
 
 
@@ -49,7 +48,12 @@ def averaged(phasors: ComplexArray) -> CrossSpectrum:
     return average(FREQUENCY_HZ, phasors, np.ones(phasors.shape[:2], dtype=bool))
 
 
-def found(phasors: ComplexArray, settings: DynamicSettings = NOISE_FREE) -> DynamicStiffness:
-    result = dynamic_stiffness(averaged(phasors), BRACKET, TURN_HZ, settings)
+def found(
+    phasors: ComplexArray,
+    settings: DynamicSettings = NOISE_FREE,
+    bracket: BracketDynamics = BRACKET,
+    n_integrations: tuple[int, int] = (0, 0),  # these phasors are displacement from the start
+) -> DynamicStiffness:
+    result = dynamic_stiffness(averaged(phasors), bracket, TURN_HZ, settings, n_integrations)
     assert isinstance(result, DynamicStiffness)
     return result
