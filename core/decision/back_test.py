@@ -12,7 +12,7 @@ from core.condition.film_conditions import FilmConditions
 from core.decision.decision import least_step_ns, readings_of
 from core.decision.finding_history import FindingHistory, finding_history
 from core.decision.level_history import level_history
-from core.decision.limits import ChangeLimits
+from core.decision.limits import ChangeLimits, sure_size
 from core.decision.verdict import OF_EVIDENCE, Verdict
 from core.stiffness_history import DIRECTIONS, CodeArray, StiffnessHistory, TimeArray
 
@@ -131,9 +131,10 @@ def _level(
 
 
 def _is_passed(findings: FindingHistory, limit: float, limits: ChangeLimits) -> _Bools:
-    """(n,) whether a change is large enough and sure on any time scale."""
-    is_sure = findings.significance >= _sure(findings, limits)
-    return np.asarray(np.any(is_sure & (np.abs(findings.change) >= limit), axis=0))
+    """(n,) whether a change is sure, and surely beyond the limit, on any time scale."""
+    sure = _sure(findings, limits)
+    is_beyond = sure_size(findings.change, findings.significance, sure) >= limit
+    return np.asarray(np.any((findings.significance >= sure) & is_beyond, axis=0))
 
 
 def _sure(findings: FindingHistory, limits: ChangeLimits) -> FloatArray:

@@ -10,7 +10,7 @@ from core.baseline.baseline import QuantityBaseline
 from core.condition.film_conditions import FilmConditions
 from core.decision.gathered import NOTHING_GATHERED, Counted, Finding, GatheredEvidence
 from core.decision.level_timer import REST, LevelTimer
-from core.decision.limits import ChangeLimits
+from core.decision.limits import ChangeLimits, sure_size
 from core.decision.reading import WatchedReading
 from core.decision.verdict import OF_EVIDENCE, Verdict, counted_verdict
 from core.units import NS_PER_S
@@ -176,9 +176,10 @@ def _judged(
 
 
 def _is_passed(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
-    """Whether a change is large enough and sure."""
-    is_sure = finding.significance >= limits.sure_from(finding.time_scale_h)
-    return is_sure and abs(finding.change) >= limit
+    """Whether a change is sure, and surely beyond the limit."""
+    significance, sure = finding.significance, limits.sure_from(finding.time_scale_h)
+    is_beyond = sure_size(finding.change, significance, sure) >= limit
+    return significance >= sure and bool(is_beyond)
 
 
 def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:

@@ -3,9 +3,17 @@
 import math
 from dataclasses import dataclass, fields
 
+import numpy as np
+
+from core.arrays import FloatArray
+
 REFERENCE_H = 4.0
 LEAST_SIGNIFICANCE = 3.0
 """However long the time scale."""
+
+BEYOND = 0.5
+"""Share of the significance by which a change must be beyond a limit to have reached it. Healthy
+films must never be called changed; films that are near their limit are few."""
 
 
 @dataclass(frozen=True)
@@ -15,7 +23,7 @@ class ChangeLimits:
     Parameters
     ----------
     alert_change, danger_change
-        Size from which a change that is sure is an alert, or danger.
+        Size that a change that is sure must surely exceed to be an alert, or danger.
     deadband
         How far below its limit a change must fall for a level to be left; significance must fall by
         the same share.
@@ -72,3 +80,18 @@ class ChangeLimits:
         """Significance from which a mean over a time scale is sure."""
         fall = self.significance_fall * math.log(time_scale_h / REFERENCE_H, 4.0)
         return max(self.significance - fall, LEAST_SIGNIFICANCE)
+
+
+def sure_size(
+    change: FloatArray | float, significance: FloatArray | float, sure: FloatArray | float
+) -> FloatArray:
+    """Size that a mean deviation surely has: by how much its uncertainty leaves it away from zero.
+
+    Parameters
+    ----------
+    significance
+        Standard uncertainties away from zero; nothing is sure of one that is not above zero.
+    sure
+        Standard uncertainties from which a change is sure (`ChangeLimits.sure_from`).
+    """
+    return np.asarray(np.abs(change) * (1.0 - BEYOND * sure / np.maximum(significance, 1e-9)))
