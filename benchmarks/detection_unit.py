@@ -20,7 +20,7 @@ from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
-from core.decision.attribution import Attribution, attribute
+from core.decision.attribution import Attribution, PlaceReadings, attribute
 from core.decision.back_test import DecisionHistory, back_test
 from core.decision.limits import ChangeLimits
 from core.decision.verdict import JUDGED
@@ -96,13 +96,22 @@ class LearnedUnit:
 
     def attribution(self, later: Later, place: Place, row: int) -> Attribution:
         """What a change at a place is put down to after a row."""
-        ln_k, ln_shaft = place_columns(later.histories)
-        deviation = np.stack([self._deviation(later, *other) for other in self.places()])
-        known = np.isfinite(deviation[self.places().index(place), : row + 1])
-        newest = np.flatnonzero(known)[-MEAN_READINGS:]
-        ln_k, ln_shaft, deviation = (c[:, newest] for c in (ln_k, ln_shaft, deviation))
+        readings = self.place_readings(later)
+        known = np.isfinite(readings.deviation[self.places().index(place), : row + 1])
+        newest = readings.columns(np.flatnonzero(known)[-MEAN_READINGS:])
         brackets = np.array([BRACKETS_N_PER_M[bearing] for bearing, _ in self.places()])
-        return attribute(place, self.response, ln_k, ln_shaft, deviation, brackets)
+        return attribute(place, self.response, newest, brackets)
+
+    def place_readings(self, later: Later) -> PlaceReadings:
+        """All of a unit's settled readings."""
+        places = [(later.histories[b], self.stiffness(b, d)) for b, d in self.places()]
+        rises = [film.eccentricity_rise(FilmConditions.of(history)) for history, film in places]
+        return PlaceReadings(
+            *place_columns(later.histories),
+            np.stack([self._deviation(later, *place) for place in self.places()]),
+            np.stack(rises),
+            np.stack([history.attitude_deg for history, _ in places]),
+        )
 
     def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:
         history, baseline = later.histories[bearing], self.stiffness(bearing, direction)
@@ -135,11 +144,12 @@ def _fixed(life: UnitLife, settled: npt.NDArray[np.bool_], n: int) -> dict[Place
 
 
 def _settled(life: UnitLife) -> npt.NDArray[np.bool_]:
+    """When all bearings had."""
     operation = life.operation
     limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
-    return operation_history(
-        operation.time_ns, operation.speed_rpm, operation.power_mw, limits
-    ).is_settled
+    columns = (operation.time_ns, operation.speed_rpm, operation.power_mw, limits)
+    found = [operation_history(*columns, h.oil_temperature_c) for h in life.readings.values()]
+    return np.logical_and.reduce([one.is_settled for one in found])
 
 
 def _n_learning(life: UnitLife) -> int:

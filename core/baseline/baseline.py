@@ -181,6 +181,14 @@ class QuantityBaseline:
             return known
         return known & np.isfinite(conditions.attitude_deg)
 
+    def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
+        """(n,) rise of ln of the quantity with ln of the eccentricity ratio; NaN if not known."""
+        known = self.is_known(conditions)
+        rise = np.full(known.size, np.nan)
+        here = conditions.rows(known)
+        rise[known] = here.eccentricity_ratio * self.surface.slope(here)
+        return rise
+
     def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
         """(n,) between the nodes of the cell; more where the shaft has turned away meanwhile."""
         std = self._between_nodes(conditions, cell)

@@ -28,6 +28,9 @@ MEAN_READINGS = 24
 LEAST_MEANS = 50
 """Averages that must be there to learn from."""
 
+PARTS = 6
+"""Parts of the time of learning that are left out in turn to see how far a response errs."""
+
 ROUNDS = 6
 RIDGE = 1e-6
 LEAST_STD = 1e-4
@@ -46,7 +49,8 @@ class ShaftResponse:
     coefficients
         (n_places, n_terms)
     std
-        What means of `MEAN_READINGS` of each place scatter by, in ln.
+        What means of `MEAN_READINGS` of each place scatter by, in ln, in a time that was not
+        learned.
     """
 
     places: tuple[Place, ...]
@@ -104,13 +108,11 @@ def learn_response(
     centre = np.median(ln_k, axis=1)
     terms = _terms(ln_k - centre[:, np.newaxis])
     shares = ln_shaft - np.mean(ln_shaft, axis=0)
-    fitted = [_fit(terms, share) for share in shares]
-    residual = shares - np.array(fitted) @ terms
     return ShaftResponse(
         places,
         tuple(centre.tolist()),
-        tuple(tuple(row.tolist()) for row in fitted),
-        tuple(max(_mean_std(row), LEAST_STD) for row in residual),
+        tuple(tuple(_fit(terms, share).tolist()) for share in shares),
+        tuple(max(_mean_std(row), LEAST_STD) for row in _held_out(terms, shares)),
     )
 
 
@@ -153,7 +155,17 @@ def _fit(terms: FloatArray, share: FloatArray) -> FloatArray:
     return coefficients
 
 
+def _held_out(terms: FloatArray, shares: FloatArray) -> FloatArray:
+    """(n_places, n) what is left over of each part of the time by a fit to the others."""
+    left = np.empty_like(shares)
+    for part in np.array_split(np.arange(shares.shape[1]), PARTS):
+        others = np.delete(np.arange(shares.shape[1]), part)
+        fitted = np.array([_fit(terms[:, others], share[others]) for share in shares])
+        left[:, part] = shares[:, part] - fitted @ terms[:, part]
+    return left
+
+
 def _mean_std(residual: FloatArray) -> float:
     n = residual.size // MEAN_READINGS
     means = residual[: n * MEAN_READINGS].reshape(n, MEAN_READINGS).mean(axis=1)
-    return robust_std(np.asarray(means))
+    return float(np.sqrt(np.mean(means**2)))

@@ -64,16 +64,17 @@ class Operation:
     at_speed_from_ns: int | None = None
     at_speed_to_ns: int | None = None
 
-    def is_settled(self, limits: OperatingLimits) -> bool:
+    def is_steady(self, limits: OperatingLimits) -> bool:
+        """Whether a steady state has lasted for the settling time."""
+        if self.state not in STEADY or self.since_ns is None or self.last_ns is None:
+            return False
+        return self.last_ns - self.since_ns >= limits.settling_ns
+
+    def is_settled(self, limits: OperatingLimits, has_oil_settled: bool = False) -> bool:
         """Whether a steady state has lasted for the settling time, after the warm-up."""
-        if self.state not in STEADY or self.since_ns is None:
+        if not self.is_steady(limits) or self.last_ns is None or self.at_speed_from_ns is None:
             return False
-        if self.last_ns is None or self.at_speed_from_ns is None:
-            return False
-        return (
-            self.last_ns - self.since_ns >= limits.settling_ns
-            and self.last_ns - self.at_speed_from_ns >= limits.warm_up_ns
-        )
+        return has_oil_settled or self.last_ns - self.at_speed_from_ns >= limits.warm_up_ns
 
 
 NEVER_SEEN = Operation()

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
+from core.condition.oil_settling import oil_settled
 from core.condition.operating_limits import Band, OperatingLimits
 from core.condition.operating_state import STEADY, OperatingState
 from core.stiffness_history import CodeArray, TimeArray
@@ -30,7 +31,11 @@ class OperationHistory:
 
 
 def operation_history(
-    time_ns: TimeArray, speed_rpm: FloatArray, power_mw: FloatArray, limits: OperatingLimits
+    time_ns: TimeArray,
+    speed_rpm: FloatArray,
+    power_mw: FloatArray,
+    limits: OperatingLimits,
+    oil_temperature_c: FloatArray | None = None,
 ) -> OperationHistory:
     """Follow a unit's state over all readings.
 
@@ -38,6 +43,8 @@ def operation_history(
     ----------
     time_ns, speed_rpm, power_mw : (n,)
         Strictly increasing; NaN where there is no number.
+    oil_temperature_c : (n,), optional
+        Of the bearing; without it films warm up for the longest time.
     """
     starts = _starts(time_ns, limits)
     speed = _passed(speed_rpm, limits.speed_bands_rpm, starts)
@@ -52,12 +59,15 @@ def operation_history(
     state[is_known & (speed == 0)] = OperatingState.STANDSTILL
     loaded = is_known & (speed == 2) & ~np.isnan(power_mw)
     state[loaded] = OperatingState.SPEED_NO_LOAD + power[loaded]
-    is_warm = _warm(time_ns, is_known, speed == 2, limits)
+    is_warm = _warm(time_ns, is_known, speed == 2, limits, oil_temperature_c)
     return OperationHistory(state, is_warm & _settled(time_ns, state, starts, limits))
 
 
 def operation_of_states(
-    time_ns: TimeArray, state: CodeArray, limits: OperatingLimits
+    time_ns: TimeArray,
+    state: CodeArray,
+    limits: OperatingLimits,
+    oil_temperature_c: FloatArray | None = None,
 ) -> OperationHistory:
     """Settling where states are told, as in files of readings, and not followed.
 
@@ -65,10 +75,13 @@ def operation_of_states(
     ----------
     state : (n,)
         Members of `OperatingState`.
+    oil_temperature_c : (n,), optional
+        Of the bearing; without it films warm up for the longest time.
     """
     starts = _starts(time_ns, limits)
     is_steady = np.isin(state, [int(s) for s in STEADY])
-    is_warm = _warm(time_ns, state != OperatingState.UNKNOWN, is_steady, limits)
+    is_known = state != OperatingState.UNKNOWN
+    is_warm = _warm(time_ns, is_known, is_steady, limits, oil_temperature_c)
     return OperationHistory(state, is_warm & _settled(time_ns, state, starts, limits))
 
 
@@ -111,14 +124,22 @@ def _settled(
 
 
 def _warm(
-    time_ns: TimeArray, is_known: _Bools, is_at_speed: _Bools, limits: OperatingLimits
+    time_ns: TimeArray,
+    is_known: _Bools,
+    is_at_speed: _Bools,
+    limits: OperatingLimits,
+    oil_temperature_c: FloatArray | None,
 ) -> _Bools:
-    """Whether the unit has been at speed for the time of a warm-up; False where not known."""
+    """Whether the unit has been at speed until the bearing was warm; False where not known."""
     rows = np.flatnonzero(is_known)
     known_ns, at_speed = time_ns[rows], is_at_speed[rows]
     starts = np.ones(rows.size, np.bool_)
     starts[1:] = (np.diff(known_ns) > limits.longest_gap_ns) | ~at_speed[:-1]
     since = _last(starts, np.zeros(rows.size, np.int64))
+    is_warm = known_ns - known_ns[since] >= limits.warm_up_ns
+    if oil_temperature_c is not None:
+        stretch = np.where(at_speed, since, -1)
+        is_warm |= oil_settled(known_ns, oil_temperature_c[rows], stretch, limits)
     warm = np.zeros(time_ns.size, np.bool_)
-    warm[rows] = at_speed & (known_ns - known_ns[since] >= limits.warm_up_ns)
+    warm[rows] = at_speed & is_warm
     return warm

@@ -1,39 +1,47 @@
-"""What changed a stiffness: the film, or bracket and transducers.
+"""What changed a stiffness: the film, the oil of all films, or bracket and transducers.
 
-Stiffness is measured as bracket motion over shaft motion times the bracket's stiffness. A film that
-softens lets the shaft move further, as any film of that stiffness does: by how much, a healthy
-machine has shown (`core.baseline.response`). If a bracket or transducer changes, films are as they
-were, and so is the shaft's motion. Between the two lies the share of a change that is the film's,
-which is fitted to the shaft's motion in all bearings and directions at once. A shaft probe changes
-its own reading alone.
+Stiffness is measured as bracket motion over shaft motion times the bracket's stiffness. Each fault
+that can change it moves the shaft at 1× in its own way, and a healthy machine has shown how the
+shaft moves for any stiffness of its films (`core.baseline.response`):
+
+- a film: as films of the stiffness that is measured;
+- an accelerometer: not at all;
+- shaft probes: each reads more by what its stiffness reads less, less what the shaft seems to run
+  further out by, and the shaft moves as before;
+- a loose bracket: as on films in series with a softer bracket.
+
+A cause is named only if the motion agrees with it and with no other.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.response import Place, ShaftResponse
+from core.baseline.response import MEAN_READINGS, Place, ShaftResponse
 
 
 class Cause(StrEnum):
-    """What a change of stiffness is put down to."""
+    """Cause of a change of stiffness."""
 
     FILM = "film"
+    OIL = "oil"
     BRACKET_OR_TRANSDUCER = "bracket_or_transducer"
-    BOTH = "both"
     UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
 class Attribution:
-    """What a change is put down to, and from what.
+    """Cause of a change, with its evidence.
 
     Parameters
     ----------
     film_share
-        Part of the change that is the film's, 0 to 1 but for its uncertainty; None if not known.
+        Part of the change that is the film's if the rest is a transducer of the bearing's, 0 to 1
+        but for its uncertainty; None if not known, or if the shaft moves as with no such mixture.
     film_share_std
         Its standard uncertainty.
     shaft_change, bearing_change
@@ -48,151 +56,231 @@ class Attribution:
     bearing_change: float | None = None
 
 
-LEAST_FILM, MOST_BRACKET = 0.7, 0.3
-"""Share from which on a change is the film's, and up to which it is not."""
-
-SURE = 2.0
-"""Standard uncertainties by which a share must be beyond a half."""
-
 CHANGED = 0.4
 """Share of the change at the place that alarms from which on another place has changed with it."""
 
-ODDS = 2.0
-"""How many times better a faulty shaft probe must fit than film and bearing transducer."""
+MOST_MISFIT = 30.0
+"""Squared standard uncertainties, summed over all places, up to which a cause agrees with the
+motion of the shaft. In simulated lives 95 % of the healthy means lie below."""
 
-REASONS = {
-    Cause.FILM: "the shaft moves as it does with films of the stiffness that is measured",
-    Cause.BRACKET_OR_TRANSDUCER: "the shaft moves as if the film had not changed",
-    Cause.BOTH: "the shaft moves as if the film had changed by less than is measured",
-    Cause.UNKNOWN: "shaft motion does not tell",
-}
-PROBE_REASON = "one shaft probe reads more or less than films and other probes account for"
+PREDICTED = np.linspace(0.8, 1.6, 9)
+"""Parts of a predicted motion that agree with the prediction: the response was learned where films
+changed together, and is not exact where one changes alone. In simulated lives a film of one bearing
+moved the shaft by 1.0 to 1.35 of what was predicted."""
+
+SPREAD = 0.15
+"""Part of a predicted motion, rms over the places, by which it may miss at each of them."""
+
+SHARE_SPREAD, SURE = 0.3, 2.0
+"""Standard uncertainty of a share from the prediction, relative, and by how many standard
+uncertainties a share may lie outside 0 to 1."""
+
+FILM_REASON = "the shaft moves as it does with films of the stiffness that is measured"
+OIL_REASON = "all films changed alike, and the shaft moves as it does with such films"
+TRANSDUCER_REASON = "the shaft moves as if the film had not changed"
+PROBE_REASON = "shaft probes read more or less than films and other probes account for"
 BRACKET_REASON = "the shaft moves as if the bracket had changed"
-ALIKE_REASON = "all bearings and directions changed alike, and shaft motion does not tell"
+ALIKE_REASON = "all films changed alike; look at oil and cooling first"
+ALONE_REASON = "whether other films changed with it is not known"
+AMBIGUOUS_REASON = "shaft motion agrees with more than one cause"
+NO_FIT_REASON = "shaft motion agrees with no single cause"
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceReadings:
+    """Settled readings at all places of a response, at the same times: all (n_places, n).
+
+    NaN where there is no number.
+
+    Parameters
+    ----------
+    ln_k, ln_shaft
+        Stiffness, and shaft motion at 1×.
+    deviation
+        Of stiffness from its baseline.
+    rise
+        Of the baseline's ln k with ln of the eccentricity ratio.
+    attitude_deg
+        Of the shaft from the bearing's centre.
+    """
+
+    ln_k: FloatArray
+    ln_shaft: FloatArray
+    deviation: FloatArray
+    rise: FloatArray
+    attitude_deg: FloatArray
+
+    def columns(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "PlaceReadings":
+        """Some of the times, by mask or number."""
+        return PlaceReadings(*(getattr(self, f.name)[:, wanted] for f in fields(self)))
 
 
 def attribute(
     place: Place,
     response: ShaftResponse | None,
-    ln_k: FloatArray,
-    ln_shaft: FloatArray,
-    deviation: FloatArray,
+    readings: PlaceReadings,
     bracket_n_per_m: FloatArray | None = None,
 ) -> Attribution:
-    """Say what changed the stiffness at a place.
+    """Name the cause of a change of stiffness at a place.
 
     Parameters
     ----------
+    readings
+        The newest at which the place has a deviation, about `MEAN_READINGS` of them.
     bracket_n_per_m : (n_places,), optional
         Stiffness of the brackets that measured stiffness rests on. Without it a bracket that has
-        come loose is not told from a film that has become stiffer.
-    ln_k, ln_shaft, deviation : (n_places, n)
-        Newest settled readings at all places of the response, about `MEAN_READINGS` of them:
-        stiffness, shaft motion at 1×, and the deviation of stiffness from its baseline; NaN where
-        there is none.
+        come loose cannot be ruled out, and no film that has become stiffer is named.
     """
     if response is None or place not in response.places:
         return Attribution(Cause.UNKNOWN, "the response of the shaft has not been learned")
     row = response.places.index(place)
-    usable = np.all(np.isfinite(ln_k) & np.isfinite(ln_shaft), axis=0) & np.isfinite(deviation[row])
+    usable = np.all(np.isfinite(readings.ln_k) & np.isfinite(readings.ln_shaft), axis=0)
+    usable &= np.isfinite(readings.deviation[row])
     if not usable.any():
         return Attribution(Cause.UNKNOWN, "stiffness or shaft motion is not known everywhere")
-    change = _changed(row, np.nan_to_num(deviation[:, usable]))
-    seen = _Seen(row, response, ln_k[:, usable], ln_shaft[:, usable], change)
-    return _attributed(seen, bracket_n_per_m)
-
-
-def _changed(row: int, deviation: FloatArray) -> FloatArray:
-    """(n_places, n) deviations of the places that have changed together, zero of the others."""
-    mean = np.mean(deviation, axis=1)
-    together = (np.sign(mean) == np.sign(mean[row])) & (np.abs(mean) >= CHANGED * abs(mean[row]))
-    return np.where(together[:, np.newaxis], deviation, 0.0)
+    seen = _Seen(row, response, readings.columns(usable))
+    cause, reason = _cause(seen, bracket_n_per_m)
+    unchanged = seen.if_unchanged
+    shaft = float(unchanged[row] * seen.std[row])
+    bearing = shaft + float(np.mean(seen.change[row]))
+    share, share_std = seen.film_share()
+    return Attribution(cause, reason, share, share_std, shaft, bearing)
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """Readings, and what they leave over under what may have happened."""
+    """Readings, and by how far the motion of the shaft misses what each cause predicts.
+
+    All that is left over is (n_places,), in standard uncertainties.
+    """
 
     row: int
     response: ShaftResponse
-    ln_k: FloatArray
-    ln_shaft: FloatArray
-    change: FloatArray
+    readings: PlaceReadings
 
-    @property
+    @cached_property
     def std(self) -> FloatArray:
-        return np.array(self.response.std)
+        """(n_places,) of means of that many readings."""
+        few = max(1.0, MEAN_READINGS / self.readings.ln_k.shape[1])
+        return np.asarray(np.array(self.response.std) * few**0.5)
 
-    @property
+    @cached_property
+    def change(self) -> FloatArray:
+        """(n_places, n) deviations of the places that changed together, zero of the others."""
+        deviation, known = self.readings.deviation, np.isfinite(self.readings.deviation)
+        mean = np.nansum(deviation, axis=1) / np.maximum(np.sum(known, axis=1), 1)
+        together = np.sign(mean) == np.sign(mean[self.row])
+        together &= np.abs(mean) >= CHANGED * abs(mean[self.row])
+        change = np.where(known, deviation, mean[:, np.newaxis])
+        return np.where(together[:, np.newaxis], change, 0.0)
+
+    @cached_property
     def if_film(self) -> FloatArray:
-        """(n_places,) if films are as they are measured; in standard uncertainties."""
-        return self._left_over(self.ln_k, 0.0)
+        """Left over if films are as they are measured."""
+        return self._left_over(self.readings.ln_k)
 
-    @property
-    def if_not(self) -> FloatArray:
+    @cached_property
+    def if_unchanged(self) -> FloatArray:
+        """Left over if no film has changed, nor any shaft probe."""
+        return self._left_over(self.readings.ln_k - self.change)
+
+    def film_misfit(self) -> float:
+        """If films are as they are measured."""
+        return self._scaled_misfit(self.if_film)
+
+    def transducer_misfit(self) -> float:
         """If no film has changed."""
-        return self._left_over(self.ln_k - self.change, 0.0)
+        return self._misfit(self.if_unchanged)
 
-    def if_bracket(self, bracket_n_per_m: FloatArray) -> FloatArray:
-        """If brackets have changed by all that stiffness seems to have.
+    def probe_misfit(self) -> float:
+        """If the bearing's shaft probes read wrong; NaN if that cannot be told."""
+        gain, ln_k = self._probe_gain(), self.readings.ln_k
+        if not np.all(np.isfinite(gain)):
+            return float("nan")
+        own = np.mean(gain - np.mean(gain, axis=0), axis=1) / self.std
+        left_over = (self._left_over(ln_k + a * gain, a * gain) for a in PREDICTED)
+        return min(self._misfit(x, a * own) for a, x in zip(PREDICTED, left_over, strict=True))
+
+    def bracket_misfit(self, bracket_n_per_m: FloatArray | None) -> float:
+        """If brackets have changed by all that stiffness seems to have; NaN if not known.
 
         To the rest of the machine, film and bracket in series are one spring; of the motion at the
         place itself, the film has a smaller share the softer the bracket is.
         """
-        k = np.exp(self.ln_k - self.change)
-        told = bracket_n_per_m[:, np.newaxis]
-        true = told * np.exp(-self.change)
-        alike = 1.0 / (1.0 / k + 1.0 / true - 1.0 / told)
-        own = np.log((1.0 + alike / told) / (1.0 + k / true))
-        return self._left_over(np.log(alike), own - np.mean(own, axis=0))
+        if bracket_n_per_m is None:
+            return float("nan")
+        k = np.exp(self.readings.ln_k - self.change)
+        stated = bracket_n_per_m[:, np.newaxis]
+        true = stated * np.exp(-self.change)
+        alike = 1.0 / (1.0 / k + 1.0 / true - 1.0 / stated)
+        own = np.log((1.0 + alike / stated) / (1.0 + k / true))
+        return self._scaled_misfit(self._left_over(np.log(alike), own))
 
-    def probe_misfit(self) -> float:
-        """Squares left over if the probe at the place reads wrong, by whatever fits best."""
-        alone = np.where(np.arange(self.std.size) == self.row, 1.0, 0.0)
-        pattern, if_not = (alone - np.mean(alone)) / self.std, self.if_not
-        gain = float(np.sum(pattern * if_not) / np.sum(pattern**2))
-        return float(np.sum((if_not - gain * pattern) ** 2))
+    def film_share(self) -> tuple[float, float] | tuple[None, None]:
+        """Share of the film in a mixture with a bearing transducer, if such a one agrees."""
+        step = self.if_unchanged - self.if_film
+        size = float(np.sum(step**2))
+        if size == 0.0:
+            return None, None
+        share = float(np.sum(self.if_unchanged * step)) / size
+        std = float(np.hypot(size**-0.5, SHARE_SPREAD * share))
+        is_possible = -SURE * std <= share <= 1.0 + SURE * std
+        is_possible &= self._misfit(self.if_unchanged - share * step, share * step) <= MOST_MISFIT
+        return (share, std) if is_possible else (None, None)
 
-    def _left_over(self, ln_k: FloatArray, own: FloatArray | float) -> FloatArray:
-        share = self.ln_shaft - np.mean(self.ln_shaft, axis=0)
-        left = share - self.response.expected(ln_k) - own
+    def bearings(self, rows: npt.NDArray[np.bool_]) -> frozenset[str]:
+        """Bearings of some places."""
+        places = zip(self.response.places, rows.tolist(), strict=True)
+        return frozenset(bearing for (bearing, _), is_wanted in places if is_wanted)
+
+    def _probe_gain(self) -> FloatArray:
+        """(n_places, n) ln of the gain of the bearing's probes that would make the deviations.
+
+        With gains g the film reads softer by g, and the shaft seems to run further out by
+        g_x cos² + g_y sin² of the attitude, where the baseline is stiffer.
+        """
+        bearing = self.response.places[self.row][0]
+        pair = [i for i, (other, _) in enumerate(self.response.places) if other == bearing]
+        angle = np.radians(self.readings.attitude_deg[self.row])
+        outward = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2])[: len(pair)]
+        matrix = np.eye(len(pair)) + np.einsum("in,jn->nij", self.readings.rise[pair], outward)
+        deviation = np.nan_to_num(self.readings.deviation[pair])  # unknown in y: as if not changed
+        gain = np.zeros_like(self.readings.ln_k)
+        gain[pair] = np.linalg.solve(matrix, -deviation.T[:, :, np.newaxis])[:, :, 0].T
+        return gain
+
+    def _left_over(self, ln_k: FloatArray, own: FloatArray | float = 0.0) -> FloatArray:
+        """Of the shares of motion, with films of this stiffness and by `own` more at each place."""
+        motion = self.readings.ln_shaft - own
+        left = motion - np.mean(motion, axis=0) - self.response.expected(ln_k)
         return np.asarray(np.mean(left, axis=1) / self.std)
 
+    def _scaled_misfit(self, left_over: FloatArray) -> float:
+        """Of a predicted motion, by the part of it that fits best."""
+        step = self.if_unchanged - left_over
+        return min(self._misfit(self.if_unchanged - a * step, a * step) for a in PREDICTED)
 
-def _attributed(seen: _Seen, bracket_n_per_m: FloatArray | None) -> Attribution:
-    if_not, change = seen.if_not, seen.change
-    step = if_not - seen.if_film
-    size = float(np.sum(step**2))
-    if size == 0.0:
-        return Attribution(Cause.UNKNOWN, REASONS[Cause.UNKNOWN])
-    share = float(np.sum(if_not * step)) / size
-    misfit = float(np.sum((if_not - share * step) ** 2))
-    spread = max(1.0, misfit / max(1, if_not.size - 2)) ** 0.5
-    cause = _cause(share, spread / size**0.5)
-    reason = REASONS[cause]
-    if cause is not Cause.BRACKET_OR_TRANSDUCER:
-        better = _better(seen, misfit, bracket_n_per_m)
-        cause, reason = (Cause.BRACKET_OR_TRANSDUCER, better) if better else (cause, reason)
-    if cause is Cause.UNKNOWN and np.all(np.any(change != 0.0, axis=1)):
-        cause, reason = Cause.BRACKET_OR_TRANSDUCER, ALIKE_REASON
-    shaft = float(if_not[seen.row] * seen.std[seen.row])
-    bearing = shaft + float(np.mean(change[seen.row]))
-    return Attribution(cause, reason, share, spread / size**0.5, shaft, bearing)
+    def _misfit(self, left_over: FloatArray, predicted: FloatArray | float = 0.0) -> float:
+        """Sum of squares, with the uncertainty of what was predicted; both in std."""
+        spread = SPREAD**2 * np.mean((predicted * self.std) ** 2) / self.std**2
+        return float(np.sum(left_over**2 / (1.0 + spread)))
 
 
-def _better(seen: _Seen, misfit: float, bracket_n_per_m: FloatArray | None) -> str | None:
-    """What fits much better than film and bearing transducer, if anything."""
-    if seen.probe_misfit() < misfit / ODDS:
-        return PROBE_REASON
-    if bracket_n_per_m is None or np.mean(seen.change[seen.row]) < 0.0:
-        return None  # brackets come loose, which looks like stiffer films; they do not stiffen
-    return BRACKET_REASON if np.sum(seen.if_bracket(bracket_n_per_m) ** 2) < misfit else None
-
-
-def _cause(share: float, std: float) -> Cause:
-    if share > LEAST_FILM and share - SURE * std > 0.5:
-        return Cause.FILM
-    if share < MOST_BRACKET and share + SURE * std < 0.5:
-        return Cause.BRACKET_OR_TRANSDUCER
-    is_between = MOST_BRACKET <= share <= LEAST_FILM and SURE * std < LEAST_FILM - 0.5
-    return Cause.BOTH if is_between else Cause.UNKNOWN
+def _cause(seen: _Seen, bracket_n_per_m: FloatArray | None) -> tuple[Cause, str]:
+    misfits = {TRANSDUCER_REASON: seen.transducer_misfit(), PROBE_REASON: seen.probe_misfit()}
+    # brackets come loose, which looks like stiffer films; they do not stiffen
+    if np.mean(seen.change[seen.row]) > 0.0:
+        misfits[BRACKET_REASON] = seen.bracket_misfit(bracket_n_per_m)
+    known = seen.bearings(np.asarray(np.any(np.isfinite(seen.readings.deviation), axis=1)))
+    changed = seen.bearings(np.asarray(np.any(seen.change != 0.0, axis=1)))
+    is_film = seen.film_misfit() <= MOST_MISFIT
+    agreeing = [reason for reason, misfit in misfits.items() if misfit <= MOST_MISFIT]
+    only_film = is_film and all(misfit > MOST_MISFIT for misfit in misfits.values())
+    if changed == known and len(known) > 1:
+        # transducers of all bearings hardly change together
+        return (Cause.OIL, OIL_REASON) if only_film else (Cause.UNKNOWN, ALIKE_REASON)
+    if only_film:
+        return (Cause.FILM, FILM_REASON) if len(known) > 1 else (Cause.UNKNOWN, ALONE_REASON)
+    if agreeing and not is_film:
+        return Cause.BRACKET_OR_TRANSDUCER, min(agreeing, key=misfits.__getitem__)
+    return Cause.UNKNOWN, AMBIGUOUS_REASON if is_film else NO_FIT_REASON

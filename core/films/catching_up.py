@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.baseline.baseline import QuantityBaseline
+from core.condition.oil_settling import NOT_AT_SPEED, OilSettling
 from core.condition.operating_state import NEVER_SEEN, OperatingReading, Operation, advance
 from core.decision.decision import UNDECIDED, Decision
 from core.decision.decision import advance as decide
@@ -12,22 +13,24 @@ from core.films.film_rules import FilmRules
 from core.stiffness_history import DIRECTIONS, Evidence, StiffnessHistory
 
 
-def operation_after(history: StiffnessHistory, rules: FilmRules) -> Operation:
-    """What a unit did at the end of a history, oldest reading first."""
-    operation = NEVER_SEEN
+def operation_after(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
+    """What a unit did at the end of a bearing's history, and whether its oil had settled."""
+    operation, oil = NEVER_SEEN, NOT_AT_SPEED
     if not len(history):
-        return operation
+        return operation, oil
     # readings keep their distances, though time may be made to pass faster from now on
     shift_ns = rules.lapsed_ns(int(history.time_ns[-1])) - int(history.time_ns[-1])
-    for time_ns, speed_rpm, power_mw in zip(
+    for time_ns, speed_rpm, power_mw, oil_c in zip(
         history.time_ns.tolist(),
         history.speed_rpm.tolist(),
         history.power_mw.tolist(),
+        history.oil_temperature_c.tolist(),
         strict=True,
     ):
         reading = OperatingReading(time_ns + shift_ns, speed_rpm, power_mw)
         operation = advance(operation, reading, rules.operating)
-    return operation
+        oil = oil.step(operation, oil_c, rules.operating)
+    return operation, oil
 
 
 def decision_after(

@@ -41,8 +41,8 @@ class FilmFinding:
 
 CHANGED = {
     Cause.FILM: "film_changed",
+    Cause.OIL: "all_films_changed",
     Cause.BRACKET_OR_TRANSDUCER: "bracket_or_transducer_changed",
-    Cause.BOTH: "film_and_bracket_or_transducer_changed",
     Cause.UNKNOWN: "changed_cause_unknown",
 }
 """Reasons of alarms."""

@@ -1,10 +1,11 @@
 """`FilmJudge`: what the readings of a unit's films say, compared with their baselines."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from core.baseline.baseline import BearingBaseline, Watched
 from core.baseline.response import Place, ShaftResponse
+from core.condition.film_conditions import FilmConditions
 from core.decision.decision import UNDECIDED, Decision, advance
 from core.decision.reading import WatchedReading
 from core.films.film_finding import FilmFinding, film_finding
@@ -103,8 +104,20 @@ class FilmJudge:
             for direction in DIRECTIONS
         }
         deviations = {place: finding.deviation for place, finding in found.items()}
-        self._recent.add(readings, deviations)
+        self._recent.add(readings, deviations, dict(self._rises(readings)))
         return [self._news(reading, found) for reading in readings]
+
+    def _rises(self, readings: Sequence[FilmReading]) -> Iterator[tuple[Place, float]]:
+        """Rise of the baseline with eccentricity at each place that has one."""
+        for reading in readings:
+            baseline = self._baselines.get(reading.bearing)
+            here = FilmConditions.one(
+                reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
+            )
+            for learned in baseline.quantities if baseline else ():
+                if learned.quantity is Watched.STIFFNESS:
+                    rise = float(learned.eccentricity_rise(here)[0])
+                    yield (reading.bearing, learned.direction), rise
 
     def _news(self, reading: FilmReading, found: Mapping[Place, FilmFinding]) -> FilmNews:
         places = [(reading.bearing, direction) for direction in DIRECTIONS]

@@ -1,7 +1,9 @@
 """`FilmMemory`: what the watch of a unit's films remembers beside stored readings."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from core.condition.oil_settling import OilSettling
 from core.condition.operating_state import Operation
 from core.decision.decision import Decision
 
@@ -22,10 +24,13 @@ class FilmMemory:
 
     Parameters
     ----------
+    oil
+        By bearing.
     slot
         Number of the interval that had its reading last.
     """
 
     operation: Operation
+    oil: Mapping[str, OilSettling]
     slot: int | None
     decided: tuple[PlaceDecision, ...]

@@ -1,12 +1,13 @@
 """`FilmWatch`: follows a unit's operation, and reads its films once in a while."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
 from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.film_conditions import FilmConditions
+from core.condition.oil_settling import NOT_AT_SPEED, OilSettling
 from core.condition.operating_state import NEVER_SEEN, OperatingReading, Operation, advance
 from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_memory import FilmMemory
@@ -27,6 +28,7 @@ class FilmWatch:
         self.judge = judge
         self._rules = rules
         self._operation = NEVER_SEEN
+        self._oil: dict[str, OilSettling] = {}
         self._slot: int | None = None
 
     @property
@@ -34,18 +36,19 @@ class FilmWatch:
         """What the unit does now."""
         return self._operation
 
-    def go_on(self, operation: Operation) -> None:
-        """Go on from what the unit did when it was seen last."""
-        self._operation = operation
+    def go_on(self, operation: Operation, oil: Mapping[str, OilSettling]) -> None:
+        """Go on from what the unit did, and how warm its bearings were, when it was seen last."""
+        self._operation, self._oil = operation, dict(oil)
 
     @property
     def memory(self) -> FilmMemory:
         """What must be known, beside stored readings, to go on from here elsewhere."""
-        return FilmMemory(self._operation, self._slot, self.judge.decided)
+        return FilmMemory(self._operation, dict(self._oil), self._slot, self.judge.decided)
 
     def resume(self, memory: FilmMemory) -> None:
         """Go on from where another one was; after `go_on` and `FilmJudge.put_in_force`."""
-        self._operation, self._slot = memory.operation, memory.slot
+        self.go_on(memory.operation, memory.oil)
+        self._slot = memory.slot
         self.judge.resume(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
@@ -80,19 +83,21 @@ class FilmWatch:
 
     def _start_again(self) -> None:
         """After a clock was put back: what was said stands, but times are new."""
-        self._operation, self._slot = NEVER_SEEN, None
+        self.go_on(NEVER_SEEN, {})
+        self._slot = None
         self.judge.forget_times()
 
     def _condition(self, assessment: Assessment) -> BearingCondition:
-        readings = assessment.readings
+        readings, limits = assessment.readings, self._rules.operating
+        oil_c = sure(readings["oil_temperature_c"])
         here = FilmConditions.one(
-            sure(readings["eccentricity_ratio"]),
-            sure(readings["oil_temperature_c"]),
-            sure(readings["attitude_angle_deg"]),
+            sure(readings["eccentricity_ratio"]), oil_c, sure(readings["attitude_angle_deg"])
         )
         grid = self._rules.grid
         cell = tuple(grid.cells(here)[:, 0].tolist()) if grid.is_known(here)[0] else None
-        is_settled = self._operation.is_settled(self._rules.operating)
+        oil = self._oil.get(assessment.bearing, NOT_AT_SPEED).step(self._operation, oil_c, limits)
+        self._oil[assessment.bearing] = oil
+        is_settled = self._operation.is_settled(limits, oil.has_settled)
         return BearingCondition(self._operation.state, is_settled, cell)
 
     def _is_time(self, time_ns: int) -> bool:

@@ -1,5 +1,6 @@
 """The newest readings of all films of a unit, to say what changed one of them."""
 
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.response import MEAN_READINGS, Place, ShaftResponse
-from core.decision.attribution import Attribution, attribute
+from core.decision.attribution import Attribution, PlaceReadings, attribute
 from core.films.film_reading import FilmReading
 from core.stiffness_history import DIRECTIONS
 
@@ -37,11 +38,20 @@ class RecentReadings:
         return self._places
 
     def add(
-        self, readings: Sequence[FilmReading], deviations: Mapping[Place, float | None]
+        self,
+        readings: Sequence[FilmReading],
+        deviations: Mapping[Place, float | None],
+        rises: Mapping[Place, float],
     ) -> None:
-        """Take in the readings of one moment, if they are of every bearing and settled."""
+        """Take in the readings of one moment, if they are of every bearing and settled.
+
+        Parameters
+        ----------
+        deviations, rises
+            As `PlaceReadings` has them, where they are known.
+        """
         values = {
-            (reading.bearing, direction): value
+            (reading.bearing, direction): (value, reading.attitude_deg)
             for reading in readings
             for direction, value in zip(DIRECTIONS, reading.values, strict=True)
             if reading.condition.is_settled
@@ -49,23 +59,30 @@ class RecentReadings:
         if set(values) != set(self._places):
             return
         rows = [
-            (value.ln_k, value.shaft_um_pk, _or_nan(deviations.get(place)))
-            for place, value in ((place, values[place]) for place in self._places)
+            (
+                *(value.ln_k, ln_or_nan(value.shaft_um_pk), _or_nan(deviations.get(place))),
+                *(rises.get(place, np.nan), attitude_deg),
+            )
+            for place, (value, attitude_deg) in ((place, values[place]) for place in self._places)
         ]
         self.append(np.array(rows).T)
 
     def append(self, column: FloatArray) -> None:
-        """Take in one moment: (3, n_places) ln stiffness, 1× shaft motion in µm, deviation."""
+        """Take in one moment: (5, n_places), the rows of `PlaceReadings`."""
         self._columns.append(column)
 
     def attribution(self, place: Place, response: ShaftResponse | None) -> Attribution:
         """What a change at a place is put down to now."""
         row = self._places.index(place)
         newest = [column for column in self._columns if np.isfinite(column[2, row])]
-        columns = newest[-MEAN_READINGS:] or [np.full((3, len(self._places)), np.nan)]
-        ln_k, shaft_um_pk, deviation = np.stack(columns, axis=-1)
-        ln_shaft = np.log(np.where(shaft_um_pk > 0.0, shaft_um_pk, np.nan))
-        return attribute(place, response, ln_k, ln_shaft, deviation, self._brackets)
+        columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._places)), np.nan)]
+        readings = PlaceReadings(*np.stack(columns, axis=-1))
+        return attribute(place, response, readings, self._brackets)
+
+
+def ln_or_nan(amplitude: float) -> float:
+    """Logarithm of an amplitude; NaN unless it is above zero."""
+    return math.log(amplitude) if amplitude > 0.0 else math.nan
 
 
 def _or_nan(value: float | None) -> float:

@@ -47,7 +47,8 @@ class BaselineVersionModel(ApiModel):
     """What happened to the machine that made it necessary; empty if nothing did."""
 
     remark: Annotated[str, Field(examples=["-5.1 % from version 1 under like conditions"])]
-    """Why it was not put in force by itself, if anything speaks against it."""
+    """Why it was not put in force by itself, or what was noticed in its readings; empty if nothing
+    was."""
 
     is_frozen: bool
     """Whether it is in force and nothing more is learned until an engineer says so."""
@@ -75,6 +76,26 @@ class BaselineStepModel(ApiModel):
     """For "renewed": when the machine event was; older readings count no longer."""
 
 
+class ReadingCountsModel(ApiModel):
+    """What became of the readings of the last days: why a film is not learned or judged."""
+
+    days: Annotated[float, Field(examples=[7.0])]
+    """How far back."""
+
+    n_at_speed: Annotated[int, Field(examples=[180])]
+    """At rated speed."""
+
+    n_settled: Annotated[int, Field(examples=[0])]
+    """Of these, after the warm-up. None of many: each run ends before the film is warm."""
+
+    n_complete: int
+    """Of these, with stiffness, eccentricity and oil temperature in both directions; the direction
+    that has fewer."""
+
+    n_judged: int
+    """Of these, with a verdict on the film; likewise."""
+
+
 class LearningModel(ApiModel):
     """How far learning has come."""
 
@@ -95,6 +116,9 @@ class LearningModel(ApiModel):
 
     n_days_wanted: Annotated[int, Field(examples=[20])]
     """Days with readings before there is a baseline at all."""
+
+    recent: ReadingCountsModel
+    """The last days."""
 
 
 class BaselinesModel(ApiModel):

@@ -1,5 +1,7 @@
 """Baselines and their steps in the words of the API."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
@@ -14,12 +16,13 @@ from service.api.baseline_models import (
     BaselineStepModel,
     BaselineVersionModel,
     LearningModel,
+    ReadingCountsModel,
     TimeScatterModel,
 )
 from service.api.film_conditions import bounds
 from service.api.models import EstimatorName
 from service.api.times import rfc3339
-from service.films.progress import LearningProgress
+from service.films.progress import RECENT_DAYS, LearningProgress
 from service.films.versions import Versions
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 
@@ -81,6 +84,7 @@ def learning_model(progress: LearningProgress, n_days_wanted: int) -> LearningMo
         n_readings=progress.n_readings,
         n_days=progress.n_days,
         n_days_wanted=n_days_wanted,
+        recent=ReadingCountsModel(days=RECENT_DAYS, **asdict(progress.recent)),
     )
 
 

@@ -18,7 +18,7 @@ VerdictName = Literal[
     "no_reading",
 ]
 
-CauseName = Literal["film", "bracket_or_transducer", "both", "unknown"]
+CauseName = Literal["film", "oil", "bracket_or_transducer", "unknown"]
 
 OperatingStateName = Literal[
     "unknown", "standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down"
@@ -114,13 +114,14 @@ class FilmCauseModel(ApiModel):
     """What a change is put down to, from how the shaft moves."""
 
     cause: CauseName
-    """The film, bracket or transducer, both, or unknown."""
+    """The film of this bearing, the oil of all of them, bracket or transducer, or unknown."""
 
     reason: str
     """In words."""
 
     film_share: float | None
-    """Part of the change that is the film's, 0 to 1 but for its uncertainty; null if not known."""
+    """Part of the change that is the film's if the rest is an accelerometer's, 0 to 1 but for its
+    uncertainty; null if not known, or if the shaft moves as with no such mixture."""
 
     film_share_std: float | None
     """Its standard uncertainty."""

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.far_readings import far_readings
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.condition.operating_limits import OperatingLimits
@@ -65,6 +66,8 @@ class PeriodRun:
         None if there was no reading to learn from.
     doubt
         Why the service would leave the baseline to an engineer; empty if it would accept it.
+    far
+        How many readings are far from what was learned; empty if none are.
     decided
         Rows from `period.learned` on.
     """
@@ -73,6 +76,7 @@ class PeriodRun:
     baseline: BearingBaseline | None
     decided: Mapping[str, DecisionHistory]
     doubt: str = ""
+    far: str = ""
 
     def stiffness(self, direction: str) -> QuantityBaseline | None:
         """What was learned of a film."""
@@ -105,9 +109,9 @@ def run_bearing(place: Place, rows: BearingRows, rules: BackTestRules) -> Bearin
 
 
 def _operation(place: Place, rows: BearingRows, rules: BackTestRules) -> OperationHistory:
-    history = rows.history
+    history, oil_c = rows.history, rows.history.oil_temperature_c
     if rows.state is not None:
-        return operation_of_states(history.time_ns, rows.state, rules.operating)
+        return operation_of_states(history.time_ns, rows.state, rules.operating, oil_c)
     if place[0] not in rules.rated:
         raise ReadingsError(
             f"unit {place[0]}: operating states are not known: give a column state, or columns"
@@ -115,7 +119,7 @@ def _operation(place: Place, rows: BearingRows, rules: BackTestRules) -> Operati
         )
     speed_rpm, power_mw = rules.rated[place[0]]
     limits = replace(rules.operating, rated_speed_rpm=speed_rpm, rated_power_mw=power_mw)
-    return operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits)
+    return operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits, oil_c)
 
 
 def _run(
@@ -126,7 +130,7 @@ def _run(
     rules: BackTestRules,
 ) -> PeriodRun:
     begin, learned, end = period.begin, period.learned, period.end
-    baseline, doubt = None, None
+    baseline, doubt, far = None, None, None
     if learned > begin:
         healthy = history.rows(begin, learned)
         settings = settings_for(history, rules.baseline)
@@ -134,8 +138,9 @@ def _run(
         baseline = learn(healthy, is_settled[begin:learned], origin, settings)
         limit = rules.change.alert_change
         doubt = drifted(healthy, is_settled[begin:learned], baseline, limit)
+        far = far_readings(history.rows(begin, end), is_settled[begin:end], baseline)
     later, settled = history.rows(learned, end), is_settled[learned:end]
-    run = PeriodRun(period, baseline, {}, doubt or "")
+    run = PeriodRun(period, baseline, {}, doubt or "", far or "")
     decided = {
         direction: _decided(later, settled, run.stiffness(direction), direction, rules.change)
         for direction in DIRECTIONS

@@ -16,9 +16,9 @@ from core.baseline.response import (
 )
 from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
-from core.decision.attribution import Attribution, Cause, attribute
+from core.decision.attribution import Attribution, Cause, PlaceReadings, attribute
 from core.stiffness_history import DIRECTIONS, StiffnessHistory, TimeArray
-from service.back_test.bearing_run import BackTestRules, BearingRun, PeriodRun
+from service.back_test.bearing_run import BackTestRules, BearingRun
 from service.back_test.periods import Period, periods_of
 
 NO_AMPLITUDES = Attribution(Cause.UNKNOWN, "the readings have no shaft_um_pk in every bearing")
@@ -49,7 +49,7 @@ class UnitCauses:
         events = [event for event in rules.events if event.unit == unit]
         self._periods = periods_of(self._time_ns, events, rules.learning)
         self.responses = [self._learned(period) for period in self._periods]
-        self._columns: tuple[FloatArray, FloatArray, FloatArray] | None = None
+        self._columns: PlaceReadings | None = None
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
         """Cause of an alarm, judged with readings up to a time."""
@@ -61,12 +61,10 @@ class UnitCauses:
         if response is None or number is None:
             return NOT_LEARNED
         first = self._periods[number].learned
-        columns = [column[:, first:last] for column in self._all_columns()]
-        known = np.isfinite(columns[2][response.places.index((bearing, direction))])
-        newest = np.flatnonzero(known)[-MEAN_READINGS:]
-        ln_k, ln_shaft, deviation = (column[:, newest] for column in columns)
-        place = (bearing, direction)
-        return attribute(place, response, ln_k, ln_shaft, deviation, self._brackets())
+        place, rows = (bearing, direction), np.arange(first, last)
+        known = np.isfinite(self._readings().deviation[response.places.index(place), first:last])
+        newest = self._readings().columns(rows[known][-MEAN_READINGS:])
+        return attribute(place, response, newest, self._brackets())
 
     def _brackets(self) -> FloatArray | None:
         known = [self._rules.bracket_n_per_m.get(run.place) for run in self._runs]
@@ -86,33 +84,34 @@ class UnitCauses:
         pairs = zip(self._runs, self._rows, strict=True)
         return [run.operation.is_settled[rows] for run, rows in pairs]
 
-    def _all_columns(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Ln of stiffness and shaft motion, and deviation: (n_places, n) each."""
+    def _readings(self) -> PlaceReadings:
         if self._columns is None:
-            deviation = [
-                _deviation(run, direction)[rows]
+            compared = [
+                [column[rows] for column in _compared_places(run, direction)]
                 for run, rows in zip(self._runs, self._rows, strict=True)
                 for direction in DIRECTIONS
             ]
-            self._columns = (*place_columns(self._histories), np.stack(deviation))
+            deviation, rise = (np.stack(columns) for columns in zip(*compared, strict=True))
+            attitude = [h.attitude_deg for h in self._histories.values() for _ in DIRECTIONS]
+            columns = (*place_columns(self._histories), deviation, rise, np.stack(attitude))
+            self._columns = PlaceReadings(*columns)
         return self._columns
 
 
-def _deviation(run: BearingRun, direction: str) -> FloatArray:
-    """(n,) from the baseline of each period, of settled readings that are compared."""
-    found = np.full(len(run.rows.history), np.nan)
+def _compared_places(run: BearingRun, direction: str) -> tuple[FloatArray, FloatArray]:
+    """(n,) deviation from the baseline of each period, of settled readings; and its rise."""
+    deviation, rise = np.full((2, len(run.rows.history)), np.nan)
     for period in run.periods:
+        baseline = period.stiffness(direction)
+        if baseline is None:
+            continue
         rows = slice(period.period.learned, period.period.end)
-        found[rows] = _compared(run.rows.history.rows(rows.start, rows.stop), period, direction)
-    return np.where(run.operation.is_settled, found, np.nan)
-
-
-def _compared(history: StiffnessHistory, period: PeriodRun, direction: str) -> FloatArray:
-    baseline = period.stiffness(direction)
-    if baseline is None:
-        return np.full(len(history), np.nan)
-    value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-    return baseline.compare(FilmConditions.of(history), value, u_random).deviation
+        history = run.rows.history.rows(rows.start, rows.stop)
+        value, u_random = watched_values(history, Watched.STIFFNESS, direction)
+        conditions = FilmConditions.of(history)
+        deviation[rows] = baseline.compare(conditions, value, u_random).deviation
+        rise[rows] = baseline.eccentricity_rise(conditions)
+    return np.where(run.operation.is_settled, deviation, np.nan), rise
 
 
 def _taken(history: StiffnessHistory, rows: npt.NDArray[np.int64]) -> StiffnessHistory:

@@ -8,7 +8,9 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline
 from core.baseline.response import ShaftResponse
+from core.condition.operating_state import STEADY
 from core.history_rows import BearingRows, Place
+from core.stiffness_history import Evidence, StiffnessHistory
 from service.back_test.bearing_run import BackTestRules, BearingRun, run_bearing
 from service.back_test.causes import UnitCauses
 from service.back_test.file_columns import ReadingsError
@@ -84,12 +86,28 @@ def _take_unit(found: Found, unit: str, runs: Sequence[BearingRun], rules: BackT
             for p in run.periods
             if p.doubt
         ]
+        found.doubts += [
+            f"{' '.join(run.place)} baseline {p.period.version}: {p.far}"
+            for p in run.periods
+            if p.far
+        ]
+        found.doubts += _unsettled(run)
     found.responses += [
         (unit, number, response)
         for number, response in enumerate(causes.responses, start=1)
         if response is not None
     ]
     found.unit_years += max(_compared_ns(run) for run in runs) / YEAR_NS
+
+
+def _unsettled(run: BearingRun) -> Iterator[str]:
+    """Why nothing was learned or judged, if the bearing was never warm."""
+    n = int(np.isin(run.operation.state, [int(state) for state in STEADY]).sum())
+    if n and not run.operation.is_settled.any():
+        yield (
+            f"{' '.join(run.place)}: none of {n} readings at speed was settled, so that nothing was"
+            " learned or judged: each run ends before the oil temperature has settled"
+        )
 
 
 def _compared_ns(run: BearingRun) -> int:
@@ -121,5 +139,16 @@ def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Ite
                     f"{unit} {bearing}: readings are {60 * apart_h:.3g} min apart and are taken to"
                     f" stand for {60 * told_h:.3g} min each; set reading_period_s"
                 )
+        if n := _without_condition(history):
+            yield (
+                f"{unit} {bearing}: {n} of {len(history)} readings have a good stiffness but no"
+                " eccentricity_ratio or no oil_temperature_c; they were neither learned nor judged"
+            )
         if rules.baseline.uses_attitude and not np.isfinite(history.attitude_deg).any():
             yield f"{unit} {bearing}: no attitude_deg, so that its baseline does without"
+
+
+def _without_condition(history: StiffnessHistory) -> int:
+    is_good = np.any(history.evidence == Evidence.MEASURED, axis=0)
+    is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
+    return int(np.sum(is_good & ~is_known))

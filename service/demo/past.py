@@ -69,10 +69,14 @@ def _fill_unit(
     past: Mapping[str, StiffnessHistory],
     now_ns: int,
 ) -> None:
-    first = next(iter(past.values()))
-    operation = operation_history(first.time_ns, first.speed_rpm, first.power_mw, rules.operating)
+    settled = []
     for bearing, estimator in rules.estimators.items():
         history = past[bearing]
+        operation = operation_history(
+            *(history.time_ns, history.speed_rpm, history.power_mw, rules.operating),
+            history.oil_temperature_c,
+        )
+        settled.append(operation.is_settled)
         origin = Origin(unit.id, bearing, estimator, 1, AUTHOR, now_ns, EVENT)
         learned = learn(
             history, operation.is_settled, origin, settings.baseline.settings(1.0 / 6.0)
@@ -80,7 +84,7 @@ def _fill_unit(
         films = judged(history, operation, learned, rules)
         store.add_past(unit.id, bearing, estimator, films, _trends(history, estimator))
         store.add_baseline(learned, [_step(learned, step) for step in STEPS])
-    response = learn_response(past, operation.is_settled)
+    response = learn_response(past, np.logical_and.reduce(settled))
     if response is not None:
         store.set_response(unit.id, response, now_ns)
 

@@ -130,13 +130,13 @@ class CausePart(EvidencePart):
     """What a change is put down to."""
 
     cause: Annotated[str, Field(examples=["film"])]
-    """film, bracket_or_transducer, both or unknown."""
+    """film, oil, bracket_or_transducer or unknown."""
 
     reason: Annotated[str, Field(examples=["shaft motion does not tell"])]
     """From what."""
 
     film_share: float | None
-    """Part of the change that is the film's."""
+    """Part of the change that is the film's if the rest is an accelerometer's."""
 
     film_share_std: float | None
     """Its standard uncertainty."""

@@ -223,7 +223,7 @@ def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
 
 
 def _go_on(watch: FilmWatch, found: UnitStart) -> None:
-    watch.go_on(found.operation)
+    watch.go_on(found.operation, found.oil)
     for bearing, its in found.bearings.items():
         watch.judge.put_in_force(bearing, its.baseline, its.decisions)
     for column in found.recent:

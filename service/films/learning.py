@@ -9,6 +9,7 @@ import numpy.typing as npt
 from core.baseline.agreement import mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.drift import learning_drift
+from core.baseline.far_readings import far_readings
 from core.baseline.learning import learn
 from core.baseline.response import ShaftResponse, learn_response
 from core.estimators import Estimator
@@ -98,7 +99,8 @@ class Learner:
         limit = self._settings.change.alert_change
         doubt = drifted(found.history, is_healthy, baseline, limit)
         doubt = doubt or self._disagreement(baseline, versions)
-        self._store.add_baseline(baseline, self._steps(baseline, doubt))
+        far = far_readings(found.history, is_healthy, baseline)
+        self._store.add_baseline(baseline, self._steps(baseline, doubt, far))
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
@@ -132,8 +134,11 @@ class Learner:
             place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason
         )
 
-    def _steps(self, baseline: BearingBaseline, doubt: str | None) -> list[StoredStep]:
-        steps = [_step(baseline, BaselineStep.LEARNED, doubt or baseline.origin.event)]
+    def _steps(
+        self, baseline: BearingBaseline, doubt: str | None, far: str | None
+    ) -> list[StoredStep]:
+        noticed = "; ".join(filter(None, (doubt, far))) or baseline.origin.event
+        steps = [_step(baseline, BaselineStep.LEARNED, noticed)]
         if self._settings.acceptance == "automatic" and doubt is None:
             steps.append(_step(baseline, BaselineStep.ACCEPTED, "nothing speaks against it"))
         return steps

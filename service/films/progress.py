@@ -3,13 +3,40 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from core.condition.film_conditions import FilmConditions
+from core.condition.operating_state import STEADY
+from core.decision.verdict import JUDGED
 from core.stiffness_history import Evidence
 from service.films.learning import DAY_NS, FilmPlace
 from service.films.versions import Versions
 from service.settings.film_alarms import FilmAlarmSettings
-from service.store.film_port import BaselineEntry, FilmQuery, FilmStore
+from service.store.film_port import BaselineEntry, FilmHistory, FilmQuery, FilmStore
+
+RECENT_DAYS = 7.0
+
+
+@dataclass(frozen=True)
+class ReadingCounts:
+    """Readings of the last `RECENT_DAYS`: why a film is not learned or judged.
+
+    Parameters
+    ----------
+    n_at_speed
+        At rated speed, in any state.
+    n_settled
+        Of these, after the warm-up.
+    n_complete
+        Of these, with stiffness and condition in the direction that has fewer.
+    n_judged
+        Of these, with a verdict on the film.
+    """
+
+    n_at_speed: int
+    n_settled: int
+    n_complete: int
+    n_judged: int
 
 
 @dataclass(frozen=True)
@@ -23,6 +50,8 @@ class LearningProgress:
     n_readings, n_days
         Readings that count so far, in the direction that has fewer, and days that they are from;
         None once there is a baseline of this period.
+    recent
+        What became of the newest readings.
     """
 
     since_ns: int | None
@@ -30,6 +59,7 @@ class LearningProgress:
     is_over: bool
     n_readings: int | None
     n_days: int | None
+    recent: ReadingCounts
 
 
 def learning_progress(
@@ -47,18 +77,22 @@ def learning_progress(
     entries
         Every baseline of the bearing.
     """
+    recent = _recent(store, place, settings, now_ns)
     since_ns = versions.renewed_ns
     if since_ns is None:
         since_ns = store.first_ns(place.unit, place.bearing, place.estimator)
     if since_ns is None:
-        return LearningProgress(None, None, False, 0, 0)
+        return LearningProgress(None, None, False, 0, 0, recent)
     until_ns = since_ns + round(settings.learning_days * DAY_NS)
     is_learned = any(
         entry.estimator is place.estimator and entry.learned_from_ns >= since_ns
         for entry in entries
     )
-    counts = (None, None) if is_learned else _counts(store, place, since_ns, until_ns, settings)
-    return LearningProgress(since_ns, until_ns, now_ns >= until_ns, *counts)
+    n_readings, n_days = (
+        (None, None) if is_learned else _counts(store, place, since_ns, until_ns, settings)
+    )
+    is_over = now_ns >= until_ns
+    return LearningProgress(since_ns, until_ns, is_over, n_readings, n_days, recent)
 
 
 def _counts(
@@ -70,8 +104,29 @@ def _counts(
     )
     if not len(found):
         return 0, 0
-    history = found.history
-    usable = found.is_settled & settings.baseline.settings().is_known(FilmConditions.of(history))
-    usable &= ~np.any(found.level > 0, axis=0)
-    rows = [usable & (evidence == Evidence.MEASURED) for evidence in history.evidence]
-    return min((int(row.sum()), np.unique(history.time_ns[row] // DAY_NS).size) for row in rows)
+    usable = found.is_settled & ~np.any(found.level > 0, axis=0)
+    rows = [usable & complete for complete in _complete(found, settings)]
+    time_ns = found.history.time_ns
+    return min((int(row.sum()), np.unique(time_ns[row] // DAY_NS).size) for row in rows)
+
+
+def _recent(
+    store: FilmStore, place: FilmPlace, settings: FilmAlarmSettings, now_ns: int
+) -> ReadingCounts:
+    since_ns = now_ns - round(RECENT_DAYS * DAY_NS)
+    found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, since_ns))
+    if not len(found):
+        return ReadingCounts(0, 0, 0, 0)
+    is_judged = np.isin(found.verdict, [int(verdict) for verdict in JUDGED])
+    return ReadingCounts(
+        int(np.isin(found.state, [int(state) for state in STEADY]).sum()),
+        int(found.is_settled.sum()),
+        min(int((found.is_settled & row).sum()) for row in _complete(found, settings)),
+        int(is_judged.sum(axis=1).min()),
+    )
+
+
+def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
+    """(n,) for each direction: whether readings have stiffness and condition."""
+    is_known = settings.baseline.settings().is_known(FilmConditions.of(found.history))
+    return [is_known & (evidence == Evidence.MEASURED) for evidence in found.history.evidence]

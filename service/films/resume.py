@@ -8,12 +8,14 @@ import numpy as np
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Watched
 from core.baseline.response import ShaftResponse
+from core.condition.film_conditions import FilmConditions
+from core.condition.oil_settling import OilSettling
 from core.condition.operating_state import Operation
 from core.decision.decision import UNDECIDED, Decision
 from core.films.catching_up import decision_after, operation_after
 from core.films.film_rules import FilmRules
 from core.films.recent_readings import KEPT
-from core.stiffness_history import DIRECTIONS
+from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.units import NS_PER_S
 from service.films.learning import FilmPlace, common_times
 from service.films.versions import versions_after
@@ -72,13 +74,14 @@ class UnitStart:
 
     Parameters
     ----------
-    bearings
+    oil, bearings
         By bearing.
     recent
         Newest readings, as :meth:`RecentReadings.append` takes them.
     """
 
     operation: Operation
+    oil: dict[str, OilSettling]
     bearings: dict[str, InForce]
     recent: list[FloatArray]
     response: ShaftResponse | None
@@ -96,10 +99,13 @@ def unit_start(
         )
         for place in places
     }
+    seen = {bearing: operation_after(film.history, rules) for bearing, film in found.items()}
+    bearings = {place.bearing: in_force(store, place, rules) for place in places}
     return UnitStart(
-        operation_after(found[places[0].bearing].history, rules),
-        {place.bearing: in_force(store, place, rules) for place in places},
-        _recent(found),
+        seen[places[0].bearing][0],
+        {bearing: oil for bearing, (_, oil) in seen.items()},
+        bearings,
+        _recent(found, bearings),
         response,
     )
 
@@ -109,14 +115,27 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
     return int(newest.history.time_ns[-1]) if len(newest) else 0
 
 
-def _recent(found: Mapping[str, FilmHistory]) -> list[FloatArray]:
-    """Newest settled readings at the same times, (3, n_places) each."""
+def _recent(found: Mapping[str, FilmHistory], bearings: Mapping[str, InForce]) -> list[FloatArray]:
+    """Newest settled readings at the same times, (5, n_places) each."""
     common = common_times([history.history.time_ns for history in found.values()])
-    columns = []
-    for film in found.values():
+    columns, settled = [], np.ones(common.size, np.bool_)
+    for bearing, film in found.items():
         rows = np.isin(film.history.time_ns, common)
-        settled = film.is_settled[rows]
-        rows_of = (film.history.ln_k, film.history.shaft_um_pk, film.deviation)
-        columns.append(np.stack([column[:, rows] for column in rows_of]))
+        settled &= film.is_settled[rows]
+        history, baseline = film.history.where(rows), bearings[bearing].baseline
+        shaft = np.where(history.shaft_um_pk > 0.0, history.shaft_um_pk, np.nan)
+        attitude = np.stack([history.attitude_deg] * 2)
+        rows_of = (history.ln_k, np.log(shaft), film.deviation[:, rows])
+        columns.append(np.stack([*rows_of, _rises(history, baseline), attitude]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
     return [whole[:, :, i] for i in range(max(0, whole.shape[2] - KEPT), whole.shape[2])]
+
+
+def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:
+    """(2, n) rise of the baseline with eccentricity; NaN where there is none."""
+    rises = np.full((len(DIRECTIONS), len(history)), np.nan)
+    for row, direction in enumerate(DIRECTIONS):
+        learned = baseline.of(Watched.STIFFNESS, direction) if baseline else None
+        if learned is not None:
+            rises[row] = learned.eccentricity_rise(FilmConditions.of(history))
+    return rises

@@ -18,10 +18,11 @@ class ChangeLimitSettings(Settings):
     """How large, how sure and how lasting a change of stiffness must be to be an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Change of stiffness, either way, from which on it is an alert: 0.04 is 4 %, in ln."""
+    """Change of stiffness, either way, that is an alert once it is surely exceeded: 0.04 is 4 %, in
+    ln. Surely is by half as many standard uncertainties as `significance` asks for."""
 
     danger_change: Share = ChangeLimits.danger_change
-    """Change from which on it is a danger; must be above alert_change; example: 0.15."""
+    """The same for danger; must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
     """How far below its limit a change must fall for a level to be left; example: 0.01."""
@@ -124,8 +125,17 @@ class OperatingModel(Settings):
     settling_s: Annotated[float, Field(gt=0.0, le=86_400.0)] = OperatingLimits.settling_s
     """Time in one state before films are compared, s."""
 
+    oil_band_c: Annotated[float, Field(gt=0.0, le=50.0)] = OperatingLimits.oil_band_c
+    """After a start, a bearing is warm once its oil has stayed within a band of this width for
+    `oil_settling_s` at speed, K; example: 0.5. Not narrower than what the sensor resolves."""
+
+    oil_settling_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.oil_settling_s
+    """How long it must stay there, s: clearances close for hours after a start, later than the oil
+    warms; example: 7200."""
+
     warm_up_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.warm_up_s
-    """Time at speed before they are, s: clearances close for hours after a start."""
+    """Time at speed after which films are compared even if the oil has not settled, s; example:
+    21600."""
 
     longest_gap_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.longest_gap_s
     """Time without results after which nothing is known of what the unit did, s."""

@@ -37,8 +37,8 @@ const REASONS = {
 
 const CAUSES = {
   film: "film",
+  oil: "oil or cooling of all films",
   bracket_or_transducer: "bracket or transducer",
-  both: "film, and bracket or transducer",
   unknown: "not known",
 };
 
@@ -128,8 +128,24 @@ export function cellWords(cell) {
   return `${eccentricity}, oil ${formatFixed(cell.oil_temperature_low_c, 1)} to ${formatFixed(cell.oil_temperature_high_c, 1)} °C`;
 }
 
-/** How far learning has come: `Learning: 12 of 20 days with readings.` */
-export function learningSentence({ learning, in_force: inForce, is_frozen: isFrozen, versions, acceptance }) {
+/** How far learning has come: `Learning: 12 of 20 days with readings.`, and what became of the newest readings. */
+export function learningSentence(baselines) {
+  const { learning, in_force: inForce } = baselines;
+  return [progressWords(baselines), learning ? recentWords(learning.recent, inForce) : ""].filter(Boolean).join(" ");
+}
+
+/** Why few readings of the last days were learned or judged; nothing if most were. */
+function recentWords({ days, n_at_speed: atSpeed, n_settled: settled, n_complete: complete, n_judged: judged }, inForce) {
+  const readings = `the ${atSpeed} readings at speed in the last ${formatFixed(days, 0)} days`;
+  if (atSpeed === 0) return "";
+  if (settled === 0) return `Not judged: none of ${readings} was settled. Each run ends before the oil temperature has settled, or the load changes too often.`;
+  if (complete === 0) return `Not judged: none of ${readings} has stiffness, eccentricity and oil temperature that are good.`;
+  if (judged === 0 && inForce !== null) return `None of ${readings} was judged: their conditions have not been learned, or they are too few.`;
+  const lost = atSpeed - complete;
+  return 2 * lost > atSpeed ? `Of ${readings}, ${atSpeed - settled} were not settled and ${settled - complete} lack a number or a condition.` : "";
+}
+
+function progressWords({ learning, in_force: inForce, is_frozen: isFrozen, versions, acceptance }) {
   if (learning === null) return "";
   if (isFrozen) return "Frozen: nothing more is learned until it is thawed.";
   if (learning.since === null) return "Learning has not begun: there is no reading yet.";

@@ -14,8 +14,8 @@ SURE_95 = 1.96
 
 CAUSES = {
     "film": "the oil film itself",
+    "oil": "the oil or its cooling, in all films",
     "bracket_or_transducer": "the bracket or a transducer, not the film",
-    "both": "film and bracket or transducer together",
     "unknown": "not told apart",
 }
 

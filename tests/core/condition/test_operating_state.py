@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from core.condition.cells import CellGrid
 from core.condition.film_conditions import FilmConditions
+from core.condition.oil_settling import NOT_AT_SPEED
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operating_state import (
     NEVER_SEEN,
@@ -57,6 +60,24 @@ def test_a_warm_up_lasts_on_through_changes_of_load() -> None:
     assert settled == [False] * 36 + [True] * 12
 
 
+def warm_after_h(run_h: float, is_warm_restart: bool) -> float | None:
+    """Running hours after which readings of a start count; None if the run ends before."""
+    limits = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
+    minutes = np.arange(0, int(run_h * 60), 10)
+    one = np.ones(minutes.size)
+    oil_c = 46.0 - (4.0 if is_warm_restart else 20.0) * np.exp(-minutes / 48.0)
+    found = operation_history(minutes * MINUTE_NS, 92.3 * one, 320.0 * one, limits, oil_c)
+    rows = np.flatnonzero(found.is_settled)
+    return float(minutes[rows[0]] / 60.0) if rows.size else None
+
+
+def test_a_bearing_is_warm_when_its_oil_has_settled_and_not_after_a_number_of_hours() -> None:
+    """Oil of a time constant of 48 min, from cold and after a short stop."""
+    assert warm_after_h(12.0, is_warm_restart=False) == pytest.approx(5.0, abs=0.4)
+    assert warm_after_h(5.0, is_warm_restart=True) == pytest.approx(3.7, abs=0.4)
+    assert warm_after_h(3.0, is_warm_restart=True) is None
+
+
 def test_without_speed_or_power_or_after_a_gap_the_state_is_unknown_and_time_goes_on() -> None:
     before = advance(NEVER_SEEN, OperatingReading(0, 92.3, 200.0), LIMITS)
     after = advance(before, OperatingReading(120 * MINUTE_NS, 50.0, 0.0), LIMITS)
@@ -84,12 +105,18 @@ def test_a_history_has_the_states_that_its_readings_have_one_by_one(seed: int) -
     power_mw[random.random(n) < 0.03] = np.nan
     step_ns = np.where(random.random(n) < 0.05, 90 * MINUTE_NS, 7 * MINUTE_NS)
     time_ns = np.cumsum(step_ns).astype(np.int64)
-    operation, states, settled = NEVER_SEEN, [], []
-    for now_ns, rpm, mw in zip(time_ns, speed_rpm, power_mw, strict=True):
-        operation = advance(operation, OperatingReading(int(now_ns), rpm, mw), LIMITS)
+    oil_c = 40.0 + np.cumsum(random.normal(0.0, 0.2, n))
+    oil_c[random.random(n) < 0.03] = np.nan
+    limits = replace(LIMITS, oil_settling_s=1800.0, settling_s=900.0, warm_up_s=4800.0)
+    operation, oil, states, settled, warm = NEVER_SEEN, NOT_AT_SPEED, [], [], 0
+    for now_ns, rpm, mw, now_c in zip(time_ns, speed_rpm, power_mw, oil_c, strict=True):
+        operation = advance(operation, OperatingReading(int(now_ns), rpm, mw), limits)
+        oil = oil.step(operation, now_c, limits)
         states.append(int(operation.state))
-        settled.append(operation.is_settled(LIMITS))
-    found = operation_history(time_ns, speed_rpm, power_mw, LIMITS)
+        settled.append(operation.is_settled(limits, oil.has_settled))
+        warm += settled[-1] and not operation.is_settled(limits)
+    assert warm > 10  # before the longest time
+    found = operation_history(time_ns, speed_rpm, power_mw, limits, oil_c)
     assert found.state.tolist() == states
     assert found.is_settled.tolist() == settled
     assert len(set(states)) >= len(OperatingState) - 1

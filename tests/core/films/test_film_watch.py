@@ -59,7 +59,8 @@ def test_a_restart_in_the_middle_changes_no_verdict(films: Any, rules: FilmRules
 
     after = films.watch(has_baseline=False)
     after.judge.put_in_force("UJB", films.baseline, first[-1].decisions)
-    after.go_on(operation_after(history.rows(n - 200, n), rules))
+    operation, oil = operation_after(history.rows(n - 200, n), rules)
+    after.go_on(operation, {"UJB": oil})
     second = films.watched(history.rows(n - 1, len(history)), after)
 
     assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]

@@ -18,7 +18,7 @@ from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
-from core.decision.attribution import attribute
+from core.decision.attribution import PlaceReadings, attribute
 from core.decision.back_test import back_test
 from core.decision.limits import ChangeLimits
 from core.history_rows import BearingRows, Place
@@ -65,11 +65,11 @@ def test_csv_and_parquet_are_the_same_histories(two_units: Any, histories: Histo
         assert from_csv[place].n_rows == rows.n_rows == (len(rows.history),) * 2
 
 
-def settled(life: UnitLife) -> npt.NDArray[np.bool_]:
-    operation = life.operation
+def settled(life: UnitLife, bearing: str) -> npt.NDArray[np.bool_]:
+    operation, oil_c = life.operation, life.readings[bearing].oil_temperature_c
     limits = OperatingLimits(operation.rated_speed_rpm, operation.rated_power_mw)
     return operation_history(
-        operation.time_ns, operation.speed_rpm, operation.power_mw, limits
+        operation.time_ns, operation.speed_rpm, operation.power_mw, limits, oil_c
     ).is_settled
 
 
@@ -82,8 +82,9 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
     """Straight from the simulated life, without any file."""
     expected = []
     for unit, life in two_units.lives.items():
-        is_settled, n = settled(life), learned_rows(two_units, life)
+        n = learned_rows(two_units, life)
         for bearing, history in life.readings.items():
+            is_settled = settled(life, bearing)
             origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
             baseline = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
             for direction in DIRECTIONS:
@@ -134,25 +135,40 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
 ) -> None:
     alarm = next(a for a in found.alarms if (a.unit, a.bearing, a.direction) == ("U2", "LJB", "x"))
     life, baselines = two_units.lives["U2"], [b for b in found.baselines if b.origin.unit == "U2"]
-    is_settled, n = settled(life), learned_rows(two_units, life)
-    histories = dict(sorted(life.readings.items()))
+    n, histories = learned_rows(two_units, life), dict(sorted(life.readings.items()))
+    is_settled = {bearing: settled(life, bearing) for bearing in histories}
     places = [(b, d) for b in histories for d in DIRECTIONS]
-    response = learn_response({b: h.rows(0, n) for b, h in histories.items()}, is_settled[:n])
-    deviation = np.stack([_deviation(histories[b], baselines, b, d) for b, d in places])
+    response = learn_response(
+        {b: h.rows(0, n) for b, h in histories.items()},
+        np.logical_and.reduce(list(is_settled.values()))[:n],
+    )
+    films = {place: _film(baselines, *place) for place in places}
+    deviation = np.stack(
+        [
+            np.where(is_settled[b], _deviation(histories[b], films[b, d], d), np.nan)
+            for b, d in places
+        ]
+    )
+    rise = [films[b, d].eccentricity_rise(FilmConditions.of(histories[b])) for b, d in places]
+    attitude = [histories[b].attitude_deg for b, _ in places]
     begins = [rfc3339(int(t)) == alarm.begin for t in life.operation.time_ns]
-    known = np.isfinite(deviation[places.index(("LJB", "x"))]) & is_settled
+    known = np.isfinite(deviation[places.index(("LJB", "x"))])
     newest = np.flatnonzero(known[: int(np.flatnonzero(begins)[0]) + 1])[-24:]
-    columns = [column[:, newest] for column in (*place_columns(histories), deviation)]
+    columns = (*place_columns(histories), deviation, np.stack(rise), np.stack(attitude))
     brackets = np.repeat([BRACKETS["U2", bearing] for bearing in histories], 2)
-    expected = attribute(("LJB", "x"), response, *columns, brackets)
+    readings = PlaceReadings(*columns).columns(newest)
+    expected = attribute(("LJB", "x"), response, readings, brackets)
     assert (alarm.cause.cause, alarm.cause.reason) == (expected.cause, expected.reason)
     assert alarm.cause.film_share == pytest.approx(expected.film_share, rel=1e-6)
     assert alarm.cause.u_film_share == pytest.approx(expected.film_share_std, rel=1e-6)
 
 
-def _deviation(history: Any, baselines: Any, bearing: str, direction: str) -> Any:
+def _film(baselines: Any, bearing: str, direction: str) -> Any:
     (baseline,) = (b for b in baselines if b.origin.bearing == bearing)
-    film = baseline.of(Watched.STIFFNESS, direction)
+    return baseline.of(Watched.STIFFNESS, direction)
+
+
+def _deviation(history: Any, film: Any, direction: str) -> Any:
     value, u_random = watched_values(history, Watched.STIFFNESS, direction)
     return film.compare(FilmConditions.of(history), value, u_random).deviation
 
@@ -254,6 +270,38 @@ def test_too_little_to_learn_from_leaves_everything_without_a_baseline(
             assert film.verdicts["normal"] == film.verdicts["gathering_evidence"] == 0
             assert film.verdicts["transient"] > 0
             assert not film.baselines[0].is_learned
+
+
+def test_readings_in_a_wrong_unit_or_without_a_condition_are_mentioned(
+    histories: Histories, learning: Learning
+) -> None:
+    place = ("U1", "TJB")
+    rows, history = histories[place], histories[place].history
+    ln_k, eccentricity = history.ln_k.copy(), history.eccentricity_ratio.copy()
+    ln_k[0, 2000:2100] += np.log(1000.0)
+    eccentricity[4000:4100] = np.nan
+    changed = replace(history, ln_k=ln_k, eccentricity_ratio=eccentricity)
+    found = run_back_test({place: replace(rows, history=changed)}, BackTestRules(learning))
+    lost, far = found.doubts
+    assert lost.startswith("U1 TJB: ")
+    assert 90 < int(lost.split()[2]) <= 100
+    assert "no eccentricity_ratio" in lost
+    assert far.startswith("U1 TJB baseline 1: ")
+    assert 50 < int(far.split()[4]) <= 100
+    assert far.endswith(
+        "readings in x are at least twice or at most half of the others; a wrong unit?"
+    )
+
+
+def test_a_bearing_that_is_never_warm_is_said_to_be(
+    histories: Histories, learning: Learning
+) -> None:
+    place = ("U1", "TJB")
+    never = OperatingLimits(1.0, 1.0, oil_settling_s=1e7, warm_up_s=1e7)
+    found = run_back_test({place: histories[place]}, BackTestRules(learning, operating=never))
+    (doubt,) = found.doubts
+    assert doubt.startswith("U1 TJB: none of ")
+    assert "each run ends before the oil temperature has settled" in doubt
 
 
 def test_readings_that_are_further_apart_than_told_are_doubted(

@@ -218,3 +218,16 @@ async def test_an_overhaul_begins_everything_again(plant: Plant, film_life: Film
     baseline: BearingBaseline | None = keeper.baseline("U1", "UJB")
     assert baseline is not None
     assert baseline.learned_from_ns >= event_ns
+
+
+async def test_readings_in_a_wrong_unit_are_mentioned_and_change_nothing(
+    plant: Plant, film_life: FilmLife
+) -> None:
+    keeper, history = await plant.start(), film_life(2, days=25)
+    ln_k = history.ln_k.copy()
+    ln_k[0, 500:600] += np.log(1000.0)
+    await plant.live(keeper, replace(history, ln_k=ln_k), (0, 22))
+    assert in_force(keeper) == 1
+    learned = plant.store.films.steps("U1", "UJB")[0]
+    assert learned.step is BaselineStep.LEARNED
+    assert "readings in x are at least twice or at most half of the others" in learned.reason

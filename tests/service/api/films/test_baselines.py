@@ -47,6 +47,13 @@ async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
     assert (found["learning"]["n_days"], found["learning"]["n_readings"]) == (1, 3)
     assert found["learning"]["n_days_wanted"] == 20
     assert found["learning"]["is_over"] is False
+    assert found["learning"]["recent"] == {
+        "days": 7.0,
+        "n_at_speed": 5,
+        "n_settled": 3,
+        "n_complete": 3,
+        "n_judged": 0,
+    }
 
 
 async def test_cells_and_export_are_what_was_learned(learned: Any) -> None:
