@@ -40,10 +40,10 @@ class Program:
     def pid(self) -> int:
         return self.process.pid
 
-    async def wait_for_url(self) -> str:
+    async def wait_for_url(self, patience_s: float = PATIENCE_S) -> str:
         """Read what it prints until the URL comes; of a unix socket it has no host."""
         assert self.process.stdout is not None
-        async with asyncio.timeout(PATIENCE_S):
+        async with asyncio.timeout(patience_s):
             while line := (await self.process.stdout.readline()).decode():
                 self.said.append(line)
                 if line.startswith(("padwatch: http", "padwatch: unix:")):
@@ -66,11 +66,17 @@ class Program:
         assert response.status_code == 200, response.text
         return response.json()
 
-    async def until(self, path: str, condition: Callable[[Any], bool], **parameters: Any) -> Any:
+    async def until(
+        self,
+        path: str,
+        condition: Callable[[Any], bool],
+        patience_s: float = PATIENCE_S,
+        **parameters: Any,
+    ) -> Any:
         """Ask the API until its answer is as wanted."""
         answer = None
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(patience_s):
                 while not condition(answer := await self.get(path, **parameters)):
                     await asyncio.sleep(0.2)
         except TimeoutError:

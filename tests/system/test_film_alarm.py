@@ -1,0 +1,59 @@
+"""A film that softens in the machine is an alarm at the API, through everything in between.
+
+The plant is that of `padwatch demo`: a simulated DAQ, a process of its own, behind Modbus TCP; a
+service that reads it in real time; and a year of readings from which a baseline was learned. Two
+minutes after the start the film of U2's LJB loses 30 % of its stiffness (`deploy/demo-life.toml`).
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .conftest import Start
+
+LOSS = 0.3
+SOFTENED = {"U2:LJB:stiffness_x", "U2:LJB:stiffness_y"}
+PATIENCE_S = 1200.0
+"""The year before the start is simulated within a minute; the alarms come 5 to 6 minutes after it,
+as averages are over two and a half. A busy machine takes several times as long."""
+
+
+def of_films(found: Any) -> set[str]:
+    return {alarm["id"] for alarm in found["alarms"] if alarm["kind"].startswith("stiffness_")}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3000)
+async def test_a_film_that_loses_stiffness_in_the_machine_is_an_alarm_at_the_api_and_no_other_is(
+    start: Start, tmp_path: Path
+) -> None:
+    program = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
+    await program.wait_for_url(PATIENCE_S)
+    before = await program.get("/api/v1/alarms")
+
+    found = await program.until(
+        "/api/v1/alarms", lambda found: of_films(found) >= SOFTENED, PATIENCE_S
+    )
+
+    assert of_films(before) == set()
+    assert of_films(found) == SOFTENED
+    units = await program.get("/api/v1/units")
+    assert [unit["source"]["state"] for unit in units] == ["connected"] * 2
+    for alarm in found["alarms"]:
+        if alarm["id"] in SOFTENED:
+            assert math.log1p(-LOSS) - 0.1 < alarm["value"] < -alarm["limit"] < 0.0
+            assert alarm["raised_at"]["operating_state"] == "full_load"
+            cell = alarm["raised_at"]["cell"]
+            assert cell["eccentricity_low"] <= alarm["raised_at"]["eccentricity_ratio"]
+            assert alarm["raised_at"]["oil_temperature_c"] < cell["oil_temperature_high_c"]
+    film = await program.get("/api/v1/units/U2/bearings/LJB/film")
+    for direction in ("x", "y"):
+        assert film[direction]["deviation"]["percent"] == pytest.approx(-100.0 * LOSS, abs=6.0)
+    chosen = {"kind": "stiffness_x", "unit": "U2", "state": "full_load"}
+    *_, first = (await program.get("/api/v1/alarms/events", **chosen))["events"]
+    assert (first["alarm"], first["change"]) == ("U2:LJB:stiffness_x", "raised")
+    assert (await program.get("/api/v1/alarms/events", **chosen, oil_temperature_max=0.0))[
+        "events"
+    ] == []
