@@ -22,7 +22,7 @@ from fuzz_service import ROLES, Fuzzed, fuzzed_service
 NO_LOGIN, FORGED = "no login", "forged"
 NOT_CHECKED = ("positive_data_acceptance", "ignored_auth")
 """A valid request may be refused for what a schema cannot say (a start after its end); and who is
-on the same computer needs no login, so that leaving it out changes nothing."""
+on the same computer sees the plant without a login, so that leaving it out changes nothing."""
 
 ALWAYS_ALLOWED = {"400", "401", "403", "405", "408", "413", "414", "421", "429", "431"}
 """What the server answers itself before any operation is asked, or instead of one."""

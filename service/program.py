@@ -42,12 +42,15 @@ class Performance:
         What its database holds, and what all its answers say.
     ends
         Whether the service stops by itself when all sources have come to their end.
+    is_demo
+        Whether people and programs on this computer may do everything without a login.
     """
 
     plant: PlantFile
     units: Mapping[str, WatchedUnit]
     origin: Origin = Origin.LIVE
     ends: bool = False
+    is_demo: bool = False
 
 
 async def run_service(
@@ -64,8 +67,8 @@ async def run_service(
     listener
         Where the HTTP server listens.
     announce
-        Called with the URL once the server answers, and before with the token for setting up where
-        everybody must log in and nobody can.
+        Called with the URL once the server answers, and then with the token for setting up where
+        there is no account.
     manager
         Told when the service is ready, alive and stopping.
 
@@ -98,7 +101,7 @@ async def _run(
     manager: ServiceManager,
 ) -> None:
     plant, clock = ground.plant, ground.clock
-    desk = access_desk(plant, ground.store.access, clock)
+    desk = access_desk(plant, ground.store.access, clock, performance.is_demo)
     units = timed(performance.units, ground.timings)
     bus = Bus(BUS_CAPACITY, clock)
     monitors = {unit: watched.monitor for unit, watched in units.items()}

@@ -40,7 +40,7 @@ def demo(
             _give_past(plant)
         with daq_process([str(path)]) as running:
             typer.echo("padwatch: simulated DAQs on loopback, ports " + _listed(running))
-            run_plant(running.attached(plant), port)
+            run_plant(running.attached(plant), port, is_demo=True)
 
 
 def _give_past(plant: PlantFile) -> None:

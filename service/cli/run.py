@@ -38,12 +38,18 @@ def run(
     leave()
 
 
-def run_plant(plant: PlantFile, port: int) -> None:
-    """Run the service on a port; ends the command with one line if it cannot."""
+def run_plant(plant: PlantFile, port: int, is_demo: bool = False) -> None:
+    """Run the service on a port; ends the command with one line if it cannot.
+
+    Parameters
+    ----------
+    is_demo
+        Whether people and programs on this computer may do everything without a login.
+    """
     try:
         with listener_of(plant, port) as listener:
             clock = SystemClock()
-            performance = Performance(plant, live_units(plant, clock))
+            performance = Performance(plant, live_units(plant, clock), is_demo=is_demo)
             manager = ServiceManager(os.environ)
             run_to_its_end(run_service(performance, listener, clock, announce, manager))
     except CLOSED as error:

@@ -37,8 +37,8 @@ class Serving:
     Parameters
     ----------
     announce
-        Called with the URL once the server answers, and before with the token for setting up where
-        everybody must log in and nobody can.
+        Called with the URL once the server answers, and then with the token for setting up where
+        there is no account.
     afterwards
         What need not be there before the server answers; called once, in a thread.
     """
@@ -64,9 +64,9 @@ class Serving:
         while not self.server.started:
             await asyncio.sleep(0.01)
         supervision.ready()
+        self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
         if token := await self.desk.offer_set_up():
             self.announce(f"to make the first account, within one hour and once: {token}")
-        self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
         await asyncio.to_thread(self.afterwards)
         gc.collect()
         gc.freeze()  # what is there from the start stays: to look through it again takes 0.1 s

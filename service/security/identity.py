@@ -13,7 +13,7 @@ class Means(StrEnum):
     KEY = "key"
 
     LOCAL = "local"
-    """By being on this computer, where nobody has to log in."""
+    """By being on this computer."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Identity:
     Parameters
     ----------
     name
-        Of the account or the key, or `LOCAL`'s.
+        Of the account or the key, or `LOCAL`.
     role
         As it is now, not as it was at login.
     units
@@ -60,5 +60,5 @@ class Identity:
         return permission is Permission.READ if unit is None else unit in self.units
 
 
-LOCAL = Identity("local", Role.ADMIN, Means.LOCAL)
-"""Whoever sits at this computer, where nobody has to log in."""
+LOCAL = "local"
+"""Name of a program or browser on this computer that shows nothing."""

@@ -25,8 +25,8 @@ class AccessSettings(Settings):
     """Who must log in, and for how long."""
 
     login: bool = False
-    """Whether people and programs on this computer must log in, too. From anywhere else, and
-    through a proxy, everybody always must."""
+    """Whether people and programs on this computer must log in to see the plant, too. From anywhere
+    else, and through a proxy, everybody always must; to change anything everybody must."""
 
     idle_min: Annotated[float, Field(ge=1.0, le=1440.0)] = 30.0
     """A login ends so many minutes after its last use. A dashboard that is open uses it."""

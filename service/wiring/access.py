@@ -3,6 +3,7 @@
 from acquisition.clock import Clock
 from service.api.access.desk import AccessDesk
 from service.security.addresses import Doorway, is_loopback, why_closed
+from service.security.roles import Role
 from service.security.sessions import SessionLimits
 from service.settings.plant import PlantFile
 from service.store.access_port import AccessStore
@@ -12,8 +13,15 @@ class ClosedError(Exception):
     """The service does not start at this address; the message says why."""
 
 
-def access_desk(plant: PlantFile, store: AccessStore, clock: Clock) -> AccessDesk:
+def access_desk(
+    plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
+) -> AccessDesk:
     """What asks who somebody is.
+
+    Parameters
+    ----------
+    is_demo
+        Whether people and programs on this computer may do everything without a login.
 
     Raises
     ------
@@ -32,6 +40,8 @@ def access_desk(plant: PlantFile, store: AccessStore, clock: Clock) -> AccessDes
     reason = why_closed(doorway)
     if reason is not None:
         raise ClosedError(reason)
-    asks_everybody = access.login or doorway.is_unix_socket or not is_loopback(service.host)
+    local_role: Role | None = Role.ADMIN if is_demo else Role.VIEWER
+    if access.login or doorway.is_unix_socket or not is_loopback(service.host):
+        local_role = None
     limits = SessionLimits(idle_s=60.0 * access.idle_min, absolute_s=3600.0 * access.longest_h)
-    return AccessDesk(store, clock, asks_everybody, limits=limits)
+    return AccessDesk(store, clock, local_role, limits=limits)

@@ -7,9 +7,11 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+
+from rigs.command_line import OPEN
 
 from service.cli.access import access_of
 from service.demo.past import fill
@@ -50,9 +52,6 @@ PASSWORD = "the river is high in may"  # noqa: S105 - of accounts that exist in 
 RECORDED = "U1-20260101T000000.000Z-order1_shaft_x"
 """Name of the one recording of the guarded plant."""
 
-TO_SET_UP = "to make the first account"
-"""In what the service says before its address, where somebody must log in and nobody can."""
-
 
 class Plant(ExitStack):
     """Unit U1 of a demo plant, its DAQ and service: processes that end when it is left."""
@@ -63,8 +62,9 @@ class Plant(ExitStack):
         self._daq: subprocess.Popen[str] | None = None
         self._service: subprocess.Popen[str] | None = None
         self._daq_port = free_port()
-        self.url = self.token = ""
+        self.url = ""
         self.settings = QUICK_ANALYSIS
+        self.is_open = True
 
     def start_daq(self) -> None:
         self._daq = self._start("daq", str(self._plant_file()), "--control")
@@ -73,12 +73,14 @@ class Plant(ExitStack):
     def start_service(self) -> None:
         """The first time on a free port, then on the same one."""
         port = self.url.rstrip("/").rpartition(":")[2] or "0"
-        self._service = self._start("run", str(self._plant_file()), "--port", port)
-        line = read_line(self._service)
-        if TO_SET_UP in line:
-            self.token = line.rpartition(" ")[2].strip()
-            line = read_line(self._service)
-        self.url = line.removeprefix("padwatch: ").strip()
+        program = [sys.executable, "-c", OPEN] if self.is_open else PADWATCH
+        self._service = self._start("run", str(self._plant_file()), "--port", port, by=program)
+        self.url = read_line(self._service).removeprefix("padwatch: ").strip()
+
+    def read_token(self) -> str:
+        """Token for the first account, which the service prints where there is none."""
+        assert self._service is not None
+        return read_line(self._service).rpartition(" ")[2].strip()
 
     def stop_service(self) -> None:
         stop(self._service)
@@ -114,10 +116,10 @@ class Plant(ExitStack):
         service = plant.service.model_copy(update={"data_folder": folder})
         return plant.model_copy(update={"service": service})
 
-    def _start(self, *arguments: str) -> "subprocess.Popen[str]":
+    def _start(self, *arguments: str, by: Sequence[str] = PADWATCH) -> "subprocess.Popen[str]":
         log = self.enter_context((self._folder / f"{arguments[0]}.log").open("a"))
         process = subprocess.Popen(
-            [*PADWATCH, *arguments],
+            [*by, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,

@@ -12,6 +12,7 @@ from typing import Any
 
 import httpx2
 import pytest
+from rigs.command_line import OPEN
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
@@ -59,7 +60,7 @@ def one_unit(folder: Path) -> Path:
 async def address(tmp_path: Path) -> AsyncIterator[str]:
     """A service that has results, an alarm, and its evidence."""
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "service.cli.main", "run", str(one_unit(tmp_path)), "--port", "0"),
+        *(sys.executable, "-c", OPEN, "run", str(one_unit(tmp_path)), "--port", "0"),
         stdout=asyncio.subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
     )

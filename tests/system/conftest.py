@@ -51,6 +51,14 @@ class Program:
                     return self.url
         raise AssertionError(f"ended without a URL: {self.said} {self.errors}")
 
+    async def wait_for_token(self) -> str:
+        """Read the token for the first account, which comes after the URL where there is none."""
+        assert self.process.stdout is not None
+        async with asyncio.timeout(PATIENCE_S):
+            line = (await self.process.stdout.readline()).decode()
+        assert line.startswith("padwatch: to make the first account"), line
+        return line.rpartition(" ")[2].strip()
+
     async def get(self, path: str, **parameters: Any) -> Any:
         """Ask the API, again where it is too busy to answer; the answer must be 200."""
         async with (

@@ -1,6 +1,5 @@
 """The program with logins: over TLS, over a unix socket, and its first account."""
 
-import re
 import shutil
 import ssl
 import subprocess
@@ -16,7 +15,6 @@ from .conftest import PATIENCE_S, Start
 Write = Callable[..., Path]
 
 PASSWORD = "the river is high in may"  # noqa: S105
-TOKEN = re.compile(r"^padwatch: to make the first account.*: (\S{43})$", re.MULTILINE)
 
 
 @pytest.fixture(scope="session")
@@ -45,7 +43,7 @@ async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_wh
     plant = write_plant(tmp_path, tables=f"{tls}[access]\nlogin = true\n")
     service = await start("run", str(plant), "--port", "0")
     url = await service.wait_for_url()
-    [token] = TOKEN.findall("".join(service.said))
+    token = await service.wait_for_token()
     trusted = ssl.create_default_context(cafile=certificate[0])
     async with httpx2.AsyncClient(
         base_url=url, verify=trusted, trust_env=False, timeout=PATIENCE_S
@@ -73,7 +71,7 @@ async def test_on_a_socket_everybody_logs_in_and_the_proxy_says_who_it_speaks_fo
     service = await start("run", str(write_plant(tmp_path, service=f'socket = "{path}"\n')))
     assert await service.wait_for_url() == f"unix:{path}"
     assert path.stat().st_mode & 0o777 == 0o660
-    [token] = TOKEN.findall("".join(service.said))
+    token = await service.wait_for_token()
     transport = httpx2.AsyncHTTPTransport(uds=str(path))
     headers = {"X-Forwarded-For": "127.0.0.1, 192.0.2.7", "X-Forwarded-Proto": "https"}
     async with httpx2.AsyncClient(

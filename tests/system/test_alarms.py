@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx2
 import numpy as np
+from rigs.command_line import padwatch
 
 from acquisition.clock import SystemClock
 from acquisition.daq.ring_device import RingDevice
@@ -116,7 +117,11 @@ async def test_a_lost_probe_outlives_a_lost_link_and_kill_9(
     assert restored[LINK]["is_active"]
     async with httpx2.AsyncClient(base_url=again.url, trust_env=False) as client:
         body = {"actor": "A. Name", "occurrence": 1}
-        answer = await client.post(f"/api/v1/alarms/{PROBE}/acknowledge", json=body)
+        path = f"/api/v1/alarms/{PROBE}/acknowledge"
+        refused = await client.post(path, json=body)
+        key = padwatch("keys", "create", plant, "shift", "--role", "operator").stdout.strip()
+        answer = await client.post(path, json=body, headers={"Authorization": f"Bearer {key}"})
+    assert refused.status_code == 401  # also on this computer
     assert answer.json()["state"] == "acknowledged"
     after = (await again.get("/api/v1/alarms/events"))["events"]
     assert after[-len(before) :] == before  # nothing lost, nothing changed

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import httpx2
 import pytest
-from rigs.command_line import padwatch
+from rigs.command_line import OPEN, padwatch
 
 PATIENCE_S = 90.0
 
@@ -65,7 +65,7 @@ def service(
     plant = write_plant(folder)
     log = folder / "service.log"
     with log.open("w", encoding="utf-8") as errors:
-        command = [sys.executable, "-m", "service.cli.main", "run", str(plant), "--port", "0"]
+        command = [sys.executable, "-c", OPEN, "run", str(plant), "--port", "0"]
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=errors, text=True, cwd=folder
         )

@@ -13,7 +13,7 @@ PATIENCE_S = 280.0
 @pytest.mark.long
 def test_nothing_made_up_is_taken_for_a_valid_request_or_breaks_the_service() -> None:
     short = ["--examples", "1", "--phases", "examples,fuzzing", "--past-years", "0", "--no-daq"]
-    command = [sys.executable, str(FUZZ), *short, "--seed", "7", "--roles", "no login"]
+    command = [sys.executable, str(FUZZ), *short, "--seed", "7", "--roles", "admin"]
 
     fuzzed = subprocess.run(
         command, capture_output=True, text=True, timeout=PATIENCE_S, check=False

@@ -9,7 +9,7 @@ from service.security.identity import LOCAL
 
 def actor_or(given: str | None) -> str:
     """The name of who has shown who he is; else the one that was given, or where he sits."""
-    return acting().actor or given or LOCAL.name
+    return acting().actor or given or LOCAL
 
 
 async def name_whoever_asks(request: Request) -> None:

@@ -7,6 +7,9 @@ from enum import Enum, auto
 COOKIE = "__Host-padwatch"
 """Browsers take it from a secure origin alone (loopback counts), for that host and every path."""
 
+PLAIN_COOKIE = "padwatch"
+"""Over plain HTTP: not all browsers take a secure cookie from loopback."""
+
 BEARER = "bearer"
 
 Headers = Iterable[tuple[bytes, bytes]]
@@ -34,15 +37,18 @@ class Credentials:
 NOTHING, WRONG = Credentials(Kind.NOTHING), Credentials(Kind.WRONG)
 
 
-def credentials_of(headers: Headers) -> Credentials:
-    """Read them out of the headers of a request."""
+def credentials_of(headers: Headers, scheme: str) -> Credentials:
+    """Read them out of the headers of a request that came by a scheme."""
     found = list(headers)
     keys = list(_keys(value.decode("latin-1") for name, value in found if name == b"authorization"))
     if len(keys) > 1:
         return WRONG
     if keys:
         return Credentials(Kind.KEY, keys[0])
-    cookies = _cookies(value.decode("latin-1") for name, value in found if name == b"cookie")
+    values = [value.decode("latin-1") for name, value in found if name == b"cookie"]
+    cookies = _cookies(values, COOKIE)
+    if not cookies and scheme == "http":
+        cookies = _cookies(values, PLAIN_COOKIE)
     if len(cookies) > 1:
         return WRONG
     return Credentials(Kind.SESSION, cookies[0]) if cookies else NOTHING
@@ -56,6 +62,6 @@ def _keys(values: Iterable[str]) -> Iterator[str]:
             yield key.strip()
 
 
-def _cookies(values: Iterable[str]) -> list[str]:
+def _cookies(values: Iterable[str], wanted: str) -> list[str]:
     pairs = (pair.strip().partition("=") for value in values for pair in value.split(";"))
-    return [value for name, _, value in pairs if name.strip() == COOKIE]
+    return [value for name, _, value in pairs if name.strip() == wanted]

@@ -13,9 +13,10 @@ from service.api.access.registry import AccessRegistry
 from service.api.access.work import AccessWork
 from service.security.backoff import Backoff
 from service.security.doors import Doors, LoggedIn, NotLoggedIn, Refusal, tidy_name
-from service.security.identity import LOCAL, Identity
+from service.security.identity import LOCAL, Identity, Means
 from service.security.passwords import Hashing
 from service.security.people import People
+from service.security.roles import Role
 from service.security.sessions import SessionLimits
 from service.store.access_port import AccessStore
 
@@ -44,8 +45,9 @@ class AccessDesk:
 
     Parameters
     ----------
-    asks_everybody
-        Whether also people and programs on this computer must log in.
+    local_role
+        Role of people and programs on this computer that show nothing; None if they must log in,
+        too.
     hashing
         Of passwords; argon2id with the parameters in force unless given.
     """
@@ -54,12 +56,12 @@ class AccessDesk:
         self,
         store: AccessStore,
         clock: Clock,
-        asks_everybody: bool = False,
+        local_role: Role | None = Role.VIEWER,
         hashing: Hashing | None = None,
         limits: SessionLimits | None = None,
     ) -> None:
         self._store, self._clock, self._limits = store, clock, limits
-        self.asks_everybody = asks_everybody
+        self.local_role = local_role
         self._hashing = hashing or Hashing()
         self._people = People(store, self._hashing)
         self._work = AccessWork()
@@ -74,13 +76,14 @@ class AccessDesk:
         StoreError
             If the store cannot be asked.
         """
-        must_log_in = self.asks_everybody or not is_from_here(scope)
-        shown = credentials_of(scope["headers"])
+        local_role = self.local_role if is_from_here(scope) else None
+        shown = credentials_of(scope["headers"], scope["scheme"])
         identity = await self._proven(shown)
         # a key that is wrong is told so; a login that is over is no worse than none
-        if identity is None and not must_log_in and shown.kind in (Kind.NOTHING, Kind.SESSION):
-            identity = LOCAL
-        return Caller(identity, shown, must_log_in)
+        is_nobody = identity is None and shown.kind in (Kind.NOTHING, Kind.SESSION)
+        if is_nobody and local_role is not None:
+            identity = Identity(LOCAL, local_role, Means.LOCAL)
+        return Caller(identity, shown, must_log_in=local_role is None)
 
     async def log_in(self, name: str, password: str, peer: str) -> LoggedIn | NotLoggedIn:
         """Begin a session for whoever knows the password of an account.
@@ -115,7 +118,7 @@ class AccessDesk:
 
     async def offer_set_up(self) -> str | None:
         """Draw the token with which the first account is made; None if nobody needs one."""
-        if not self.asks_everybody:
+        if self.local_role is Role.ADMIN:
             return None
         now_ns = self._clock.now_ns()
         return await self._work.looked_up(lambda: self._people.offer_set_up(now_ns))

@@ -106,7 +106,7 @@ async def require_declared(request: Request) -> None:
     if identity.must_change_password and operation != CHANGE_PASSWORD:
         raise must_change_password()
     if not identity.role.may(needed.permission):
-        raise not_allowed()
+        raise not_allowed() if identity.is_proven else not_logged_in()
     unit = _unit_of(request.path_params)
     if needed.reach is Reach.ASKED:
         unit = _unit_asked(request)

@@ -23,7 +23,8 @@ class SessionModel(ApiModel):
     """Who asks, and what he may do."""
 
     login_required: bool
-    """Whether one must log in from where this is asked."""
+    """Whether one must log in to see the plant from where this is asked; to change anything one
+    must everywhere, but in the demonstration."""
 
     set_up_needed: bool
     """Whether there is no account yet that one could log in to."""
@@ -35,7 +36,8 @@ class SessionModel(ApiModel):
     """Name of the account or key; null for nobody in particular."""
 
     role: Annotated[RoleName | None, Field(examples=["operator"])]
-    """What that is to the plant; null where one must log in first."""
+    """What that is to the plant; null where one must log in first. Who has not logged in on this
+    computer is a viewer."""
 
     permissions: Annotated[list[PermissionName], Field(examples=[["read", "act_on_alarms"]])]
     """What that may do; nothing where one must log in first."""

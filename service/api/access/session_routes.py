@@ -4,7 +4,7 @@ from contextlib import suppress
 
 from fastapi import APIRouter, Request, Response
 
-from service.api.access.credentials import COOKIE, Kind
+from service.api.access.credentials import COOKIE, PLAIN_COOKIE, Kind
 from service.api.access.declared import OPEN, Reach, needs
 from service.api.access.desk import AccessDesk, Caller
 from service.api.access.gate import caller_of, identity_of
@@ -80,6 +80,7 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
         if caller.identity is not None and caller.identity.means is Means.SESSION:
             await tell(context.store.audit, context.clock, ENDED, caller.identity.name)
         response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
+        response.delete_cookie(PLAIN_COOKIE, httponly=True, samesite="strict")
 
     @router.post(
         "/session/password",
@@ -141,9 +142,16 @@ async def _tell_begun(context: Context, desk: AccessDesk, let_in: LoggedIn) -> N
 async def _begun(
     desk: AccessDesk, request: Request, response: Response, let_in: LoggedIn
 ) -> SessionModel:
-    response.set_cookie(COOKIE, let_in.token, secure=True, httponly=True, samesite="strict")
+    is_secure = _is_secure(request)
+    name = COOKIE if is_secure else PLAIN_COOKIE
+    response.set_cookie(name, let_in.token, secure=is_secure, httponly=True, samesite="strict")
     caller = caller_of(request)
     return await session_model(Caller(let_in.identity, caller.shown, caller.must_log_in), desk)
+
+
+def _is_secure(request: Request) -> bool:
+    """Whether the browser is at https; a proxy may pass that on as http."""
+    return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
 
 
 async def _end(desk: AccessDesk, caller: Caller) -> None:

@@ -7,14 +7,15 @@ from service.api.access.desk import AccessDesk, Caller
 from service.api.access.session_models import SessionModel
 from service.api.times import rfc3339
 from service.security.keys import ApiKey
-from service.security.roles import Permission
+from service.security.roles import Permission, Role
 from service.store.access_port import Account
 
 
 async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
     """Who asks, and what he may do."""
     identity = caller.identity
-    needs_set_up = caller.must_log_in and identity is None and not await desk.has_accounts()
+    may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
+    needs_set_up = not may_all and not await desk.has_accounts()
     return SessionModel(
         login_required=caller.must_log_in,
         set_up_needed=needs_set_up,

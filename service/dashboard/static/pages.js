@@ -12,6 +12,7 @@ import { accessPage } from "./pages/access.js";
 import { alarmsPage } from "./pages/alarms.js";
 import { auditPage } from "./pages/audit.js";
 import { bearingPage } from "./pages/bearing.js";
+import { enterPage } from "./pages/enter.js";
 import { explorerPage } from "./pages/explorer.js";
 import { filmPage } from "./pages/film.js";
 import { orbitsPage } from "./pages/orbits.js";
@@ -31,6 +32,7 @@ export const PAGES = [
   { pattern: "#/recordings", title: "recordings and reports", nav: "Recordings", open: recordingsPage },
   { pattern: "#/audit", title: "audit trail", nav: "Audit", permission: "read_audit", open: auditPage },
   { pattern: "#/access", title: "access", nav: "Access", permission: "change_access", open: accessPage },
+  { pattern: "#/login", title: "log in", open: enterPage },
   { pattern: "#/password", title: "your password", open: passwordPage },
   { pattern: "#/units/:unit", title: (unit) => unit, open: unitPage },
   { pattern: "#/units/:unit/bearings/:bearing", title: (unit, bearing) => `${unit} ${bearing}`, open: bearingPage },

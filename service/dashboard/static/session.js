@@ -30,11 +30,15 @@ export const may = (permission) => known === null || known.permissions.includes(
 /** Why something is not permitted, or null if it is. */
 export function limitSentence(permission, what) {
   if (may(permission)) return null;
+  if (known.name === null) return `To ${what}, log in.`;
   return `You are logged in as ${known.name}, ${known.role}: to ${what} takes the role ${ROLES[permission]}.`;
 }
 
 /** Why it is not known which password is valid, or null if it is known. */
 export const passwordDoubt = () => (isPasswordUncertain ? PASSWORD_DOUBT : null);
+
+/** Whether somebody could log in to do more: nobody has, and in the demonstration nobody needs to. */
+export const mayLogIn = () => known !== null && known.name === null && known.role === "viewer";
 
 /** Find out; pages hear `padwatch-session` when it is somebody else or something else than before. */
 export async function askSession(signal) {

@@ -12,6 +12,16 @@ from service.cli.commands import app
 ROOT = Path(__file__).parents[3]
 
 
+OPEN = """
+from functools import partial
+from service.cli import run
+run.run_plant = partial(run.run_plant, is_demo=True)
+from service.cli.main import main
+main()
+"""
+"""The command, whose `run` asks nobody on this computer to log in, as `padwatch demo` does."""
+
+
 class Ended(NamedTuple):
     """A program that has ended; fields as in `Result`."""
 

@@ -24,6 +24,7 @@ from core.blocks import SampleBlock
 from core.monitor import UnitMonitor
 from service.alarms.engine import AlarmEngine
 from service.alarms.start import alarm_engine
+from service.api.access.desk import AccessDesk
 from service.api.context import Context
 from service.api.in_process import InProcess
 from service.capture.file import CaptureFile
@@ -37,6 +38,7 @@ from service.origin import Origin
 from service.parked_rows import FILE, ParkedRows
 from service.recorder import Recorder
 from service.references import ReferencesInForce
+from service.security.roles import Role
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
@@ -195,6 +197,7 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
         max_shelf_s=7200.0,
         evidence=evidence_desk(own, store, evidence, clock),
         loops=lambda: loops,
+        access=AccessDesk(store.access, clock, Role.ADMIN),  # as in the demonstration
     )
     return Service(
         live, store, clock, references, alarms, recorder, evidence, films, loops, context

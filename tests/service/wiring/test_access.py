@@ -33,22 +33,24 @@ def plant_with(login: bool = False, **service: object) -> PlantFile:
 
 
 @pytest.mark.parametrize(
-    ("plant", "everybody"),
+    ("plant", "local_role"),
     [
-        (plant_with(), False),
-        (plant_with(host="::1"), False),
-        (plant_with(host="localhost", tls=TLS), False),
-        (plant_with(login=True), True),
-        (plant_with(socket="/run/padwatch/http.sock"), True),
-        (plant_with(host="0.0.0.0", tls=TLS), True),  # noqa: S104
+        (plant_with(), Role.VIEWER),
+        (plant_with(host="::1"), Role.VIEWER),
+        (plant_with(host="localhost", tls=TLS), Role.VIEWER),
+        (plant_with(login=True), None),
+        (plant_with(socket="/run/padwatch/http.sock"), None),
+        (plant_with(host="0.0.0.0", tls=TLS), None),  # noqa: S104
     ],
 )
-def test_whoever_is_not_surely_on_this_computer_logs_in(
-    store: SqliteStore, plant: PlantFile, everybody: bool
+def test_who_is_on_this_computer_may_read_and_others_log_in(
+    store: SqliteStore, plant: PlantFile, local_role: Role | None
 ) -> None:
     store.access.accounts.add("anna", Role.ADMIN, "$argon2id$", 0)
 
-    assert access_desk(plant, store.access, SystemClock()).asks_everybody is everybody
+    assert access_desk(plant, store.access, SystemClock()).local_role is local_role
+    in_demo = access_desk(plant, store.access, SystemClock(), is_demo=True).local_role
+    assert in_demo is (None if local_role is None else Role.ADMIN)
 
 
 async def test_a_token_for_setting_up_is_drawn_only_where_nobody_could_log_in(
@@ -56,12 +58,15 @@ async def test_a_token_for_setting_up_is_drawn_only_where_nobody_could_log_in(
 ) -> None:
     clock = SystemClock()
     closed = access_desk(plant_with(login=True), store.access, clock)
-    open_ = access_desk(plant_with(), store.access, clock)
+    plain = access_desk(plant_with(), store.access, clock)
+    demo = access_desk(plant_with(), store.access, clock, is_demo=True)
 
-    assert await open_.offer_set_up() is None
-    assert await closed.offer_set_up() is not None
+    assert await demo.offer_set_up() is None
+    for desk in (closed, plain):
+        assert await desk.offer_set_up() is not None
     store.access.accounts.add("anna", Role.ADMIN, "$argon2id$", 0)
-    assert await closed.offer_set_up() is None
+    for desk in (closed, plain):
+        assert await desk.offer_set_up() is None
 
 
 def test_a_replay_is_for_this_computer_and_asks_for_logins_as_the_plant_does(

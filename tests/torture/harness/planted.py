@@ -20,8 +20,8 @@ from core.blocks import SampleBlock
 from core.monitored_unit import MonitoredUnit
 from core.ring import Ring
 from core.units import NS_PER_S
+from harness.open_program import main
 from service.alarms.engine import AlarmEngine
-from service.cli.main import main
 from service.continuous import joining, tape, unit_tape
 from service.continuous.stretch import Stretch
 from service.live import LiveView

@@ -81,7 +81,7 @@ class ServiceRig:
     def __init__(
         self,
         plant_file: Path,
-        program: str = "service.cli.main",
+        program: str = "harness.open_program",
         before: tuple[str, ...] = (),
         environment: dict[str, str] | None = None,
         role: tuple[str, ...] = ("run",),

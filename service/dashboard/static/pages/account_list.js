@@ -11,7 +11,7 @@ import { session } from "../session.js";
 const HEADS = ["Name", "Role", "Added", "Password set", ""];
 const PASSWORD = { type: "password", autocomplete: "new-password", required: "", maxlength: "256" };
 const PASSWORD_HELP = "Password, 12 characters or more";
-const NOBODY = "No account yet: on this computer nobody needs to log in. Others can do so once there is an account.";
+const NOBODY = "No account yet: in the demonstration nobody on this computer needs to log in. Others can do so once there is an account.";
 
 /** Returns `{ node, ask(signal) }`; `again` asks for all of it afresh. */
 export function accountList(again) {

@@ -1,6 +1,6 @@
 """Accounts and keys as admins change them, and what the audit trail says of it."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import httpx2
@@ -51,18 +51,17 @@ async def test_an_account_is_added_changed_and_removed(
 
 
 async def test_a_password_that_somebody_else_has_set_opens_nothing_but_its_change(
-    access: Any, admin: httpx2.AsyncClient
+    access: Any, admin: httpx2.AsyncClient, as_token: Callable[[httpx2.Response], str]
 ) -> None:
     await admin.post(ACCOUNTS, json=BERT)
     for password in (PASSWORD, OTHER):
         async with access.client(Origin="http://padwatch") as client:
             first = await client.post("/api/v1/session", json={**BERT_IN, "password": password})
-            token = first.cookies["__Host-padwatch"]
-            shown = {"Cookie": f"__Host-padwatch={token}"}
+            shown = {"Cookie": f"__Host-padwatch={as_token(first)}"}
             closed = await client.get("/api/v1/units", headers=shown)
             change = {"password": password, "new_password": "the river is gone in winter"}
             done = await client.post("/api/v1/session/password", json=change, headers=shown)
-            shown = {"Cookie": f"__Host-padwatch={done.cookies['__Host-padwatch']}"}
+            shown = {"Cookie": f"__Host-padwatch={as_token(done)}"}
             opened = await client.get("/api/v1/units", headers=shown)
         assert (first.status_code, first.json()["password_change_needed"]) == (201, True)
         assert (closed.status_code, closed.json()["title"]) == (403, "Change your password")

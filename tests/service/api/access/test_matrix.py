@@ -211,6 +211,18 @@ async def test_who_shows_nothing_sees_nothing(access: Any) -> None:
         assert (await client.get("/api/v1/no-such-thing")).status_code == 401
 
 
+@pytest.mark.parametrize("local_role", ["viewer", "admin"])
+async def test_on_this_computer_all_may_see_the_plant_and_only_in_the_demonstration_change_it(
+    access: Any, local_role: str
+) -> None:
+    access.desk.local_role = Role(local_role)
+    for operation, status in (await answers(access, {"peer": "127.0.0.1"})).items():
+        least = TABLE[operation].role
+        expected = least in (OPEN, "viewer") or local_role == "admin"
+        assert let_in(status) == expected, f"{operation}: {status}"
+        assert expected or status == 401, f"{operation}: {status}"
+
+
 @pytest.mark.parametrize(("role", "way"), covering(ROLES, WAYS))
 async def test_each_role_may_what_is_declared_and_nothing_else(
     access: Any, show: Show, way: str, role: str

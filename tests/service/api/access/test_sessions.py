@@ -29,7 +29,38 @@ def cookie(token: str) -> dict[str, str]:
     return {"Cookie": f"{COOKIE}={token}"}
 
 
-async def test_on_this_computer_nobody_has_to_log_in_but_who_comes_through_a_proxy(
+async def test_on_this_computer_one_sees_the_plant_and_is_told_that_an_account_is_missing(
+    access: Any,
+) -> None:
+    access.desk.local_role = Role.VIEWER
+    async with access.client(peer="127.0.0.1") as client:
+        before = (await client.get(SESSION)).json()
+        await access.account("anna", Role.ENGINEER)
+        after = (await client.get(SESSION)).json()
+
+    assert (before["login_required"], before["set_up_needed"]) == (False, True)
+    assert (before["name"], before["permissions"]) == (None, ["read"])
+    assert after == {**before, "set_up_needed": False}
+
+
+async def test_the_cookie_is_for_secure_connections_alone_where_there_is_one(
+    access: Any, anna: str
+) -> None:
+    assert anna
+    for origin, name in (
+        ("http://padwatch", "padwatch"),
+        ("https://padwatch", COOKIE),  # passed on by a proxy as plain HTTP
+    ):
+        async with access.client(Origin=origin) as client:
+            begun = await client.post(SESSION, json=ANNA)
+            token = begun.headers["set-cookie"].partition(";")[0].removeprefix(f"{name}=")
+            seen = await client.get(UNITS, headers={"Cookie": f"{name}={token}"})
+        assert begun.headers["set-cookie"].startswith(f"{name}=")
+        assert ("Secure" in begun.headers["set-cookie"]) == (name == COOKIE)
+        assert seen.status_code == 200
+
+
+async def test_in_the_demonstration_nobody_here_has_to_log_in_but_who_comes_through_a_proxy(
     read_only: Any,
 ) -> None:
     said = await read_only.json(SESSION)

@@ -57,7 +57,9 @@ async def pair(running: Any, plant: PlantFile) -> AsyncIterator[Pair]:
     """Both, and the replica has seen two reports: it knows that somebody is alive."""
     reporter, carrying_out = process_of(running, plant, "one")
     replica = await replica_on(plant, running.store, running.clock)
-    app = described_app(replica_context(replica, None, None, Heartbeats(running.clock)))
+    app = described_app(
+        replica_context(replica, running.context.access, None, Heartbeats(running.clock))
+    )
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         both = Pair(running, replica, client, reporter, carrying_out)
