@@ -5,7 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 from core.assessment import Assessment
+from service.api.alarm_models import AlarmListModel
+from service.api.alarm_views import alarm_list_model
+from service.api.shared import SharedAnswer
+from service.asker import ASKER, Asker
 from service.live import LinkState
+from service.origin import Origin
 
 RANGE = "start=2026-01-01T00:00:00Z&end=2026-02-01T00:00:00Z"
 
@@ -127,3 +132,20 @@ async def test_a_tag_may_be_named_in_every_spelling(read_only: Any) -> None:
     refused = await ask(read_only, "units/U9", "*")
     assert refused.status_code == 404
     assert "etag" not in refused.headers
+
+
+async def test_an_answer_for_all_does_not_end_with_the_client_that_asked_first(
+    service: Any,
+) -> None:
+    alarms, askers = service.context.alarms, []
+
+    def make() -> AlarmListModel:
+        askers.append(ASKER.get())
+        return alarm_list_model(alarms, service.films, Origin.LIVE, 0)
+
+    shared = SharedAnswer(make, lambda: 0, service.clock)
+    before = ASKER.set(Asker())
+    await shared.answer()
+    ASKER.reset(before)
+
+    assert askers == [None]
