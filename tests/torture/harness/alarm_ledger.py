@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from core.alarms.event import AlarmChange, AlarmEvent
-from harness.ledger_plant import ALERT_UM_PK, DEADBAND_UM, RECEIVER, LedgerPlant
+from harness.ledger_plant import RECEIVER, LedgerPlant
 from harness.lives import Rows
 from harness.truth import BEARINGS, Spell, Truth
 from service.store.port import AlarmQuery, Store
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from harness.checker import Case, Findings
 
 PAGE = 5000
-Told = tuple[str, AlarmChange, int]
-"""Alarm, what happened to it, when."""
 
 
 def alarm_faults(case: "Case", rows: Mapping[str, Rows]) -> None:
@@ -79,33 +77,31 @@ def _check_unit(
             alarm = f"{unit}:{bearing}:order1_shaft_{axis}"
             chain = chains.get(alarm, [])
             told = [
-                (alarm, event.change, event.time_ns)
+                (event.change, case.index_of(event.time_ns))
                 for event in chain
                 if event.change in (AlarmChange.RAISED, AlarmChange.RETURNED)
             ]
-            wanted, there = Counter(_expected(alarm, values)), Counter(told)
-            found.alarms += [f"not told: {one}" for one in wanted - there]
-            found.alarms += [f"told for nothing: {one}" for one in there - wanted]
+            found.alarms += [f"{alarm}: {one}" for one in _untrue(told, mine, plant)]
             stops = [case.index_of(time_ns) for time_ns, _ in values]
-            raised = [case.index_of(ns) for _, change, ns in told if change is AlarmChange.RAISED]
+            raised = [at for change, at in told if change is AlarmChange.RAISED]
             for spell in _demanded(mine, stops, plant):
                 found.n_exceedances += 1
                 if not any(spell.start < at for at in raised if at <= spell.stop):
                     found.alarms.append(f"{alarm}: {spell} was not told of")
 
 
-def _expected(alarm: str, values: Sequence[tuple[int, float | None]]) -> Iterator[Told]:
-    """What results amount to, without delays; what is not known changes nothing."""
-    is_active = False
-    for time_ns, value in values:
-        if value is None:
-            continue
-        if not is_active and value > ALERT_UM_PK:
-            is_active = True
-            yield alarm, AlarmChange.RAISED, time_ns
-        elif is_active and value < ALERT_UM_PK - DEADBAND_UM:
-            is_active = False
-            yield alarm, AlarmChange.RETURNED, time_ns
+def _untrue(
+    told: Sequence[tuple[AlarmChange, int]], spells: Sequence[Spell], plant: LedgerPlant
+) -> Iterator[str]:
+    """Alarms without an exceedance, and ends in the middle of one; a segment late is in time."""
+    exceedances = [spell for spell in spells if spell.kind == "exceedance"]
+    for change, at in told:
+        late = at - plant.segment_samples
+        if change is AlarmChange.RAISED:
+            if not any(spell.start < at and late <= spell.stop for spell in exceedances):
+                yield f"told for nothing at {at}"
+        elif any(spell.start < late and at <= spell.stop for spell in exceedances):
+            yield f"returned at {at}, too early"
 
 
 def _demanded(spells: Sequence[Spell], stops: Sequence[int], plant: LedgerPlant) -> Iterator[Spell]:
