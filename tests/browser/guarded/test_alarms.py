@@ -60,7 +60,7 @@ async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
     await expect(done).to_have_text("U1, Link lost: acknowledged.")
     await expect(row.get_by_role("button", name="Acknowledge")).to_be_hidden()
     await expect(row.get_by_role("button", name="Shelve…")).to_be_focused()
-    await expect(head).to_contain_text("1 alarm, 15 not judged")
+    await expect(head).to_contain_text("1 alarm, 16 not judged")
 
     await page.keyboard.press("Enter")
     await expect(page.get_by_label("Why it is shelved")).to_be_focused()

@@ -200,7 +200,13 @@ def test_a_disk_that_does_not_say_leaves_the_others_measured(rig: Any) -> None:
 def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> None:
     keeper = rig.keeper(lambda: rig.caretaker)
     parts: Any = SimpleNamespace(
-        store_error=None, behind_s=0.0, n_unstored=0, depth=0, capacity=1, oldest_wait_s=0.0
+        store_error=None,
+        behind_s=0.0,
+        n_unstored=0,
+        depth=0,
+        capacity=1,
+        oldest_wait_s=0.0,
+        unstored_reason=None,
     )
     parts.trouble = None
     look = health_of([], parts, parts, parts, parts, recordings=keeper)
