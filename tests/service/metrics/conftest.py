@@ -161,10 +161,11 @@ async def told_by_a_service(folder: Path) -> Told:
         )
         for unit in plant.unit
     }
-    url: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+    said: asyncio.Queue[str] = asyncio.Queue()
+    url = asyncio.create_task(said.get())
     with listen("127.0.0.1", 0) as listener:
         performance = Performance(plant, units, ends=True)
-        serving = asyncio.create_task(run_service(performance, listener, clock, url.set_result))
+        serving = asyncio.create_task(run_service(performance, listener, clock, said.put_nowait))
         await asyncio.wait([serving, url], return_when=asyncio.FIRST_COMPLETED)
         if serving.done():
             serving.result()

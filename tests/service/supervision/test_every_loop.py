@@ -40,15 +40,15 @@ async def test_every_task_of_the_program_has_a_pulse(
     text = plant_text.replace("var/demo", str(tmp_path / "data")).replace("port = 0", "port = 1")
     plant.write_text(text, encoding="utf-8")
     settings, clock = load_plant_file(plant), SystemClock()
-    before, said = asyncio.all_tasks(), asyncio.get_running_loop().create_future()
+    before, said = asyncio.all_tasks(), asyncio.Queue()
     stopped = asyncio.Event()
     monkeypatch.setattr("service.program.stop_on_signals", lambda: stopped)
     listener = socket.create_server(("127.0.0.1", 0))
     performance = Performance(settings, live_units(settings, clock))
     service = asyncio.create_task(
-        run_service(performance, listener, clock, said.set_result), name="the service"
+        run_service(performance, listener, clock, said.put_nowait), name="the service"
     )
-    url = await asyncio.wait_for(said, 60)
+    url = await asyncio.wait_for(said.get(), 60)
     async with httpx2.AsyncClient(base_url=url, trust_env=False, timeout=60.0) as client:
         answer = await client.get("/readyz")
     names = await _lasting(asyncio.all_tasks() - before)
