@@ -88,6 +88,9 @@ async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(
     await expect(said).to_contain_text("wrong")
 
     async def refuse(route: Route) -> None:
+        if route.request.method != "POST":
+            await route.continue_()
+            return
         problem = {"title": "Too many attempts", "detail": "wait before the next login"}
         headers = {"Content-Type": "application/problem+json", "Retry-After": "2"}
         await route.fulfill(status=429, headers=headers, body=json.dumps(problem))

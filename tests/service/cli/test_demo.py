@@ -29,7 +29,12 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> Begun:
     found: Begun = []
     daq = RunningDaq({unit: {"port": port} for unit, port in PORTS.items()}, {})
     monkeypatch.setattr(demo, "daq_process", lambda _: nullcontext(daq))
-    monkeypatch.setattr(demo, "run_plant", lambda plant, port: found.append((plant, port)))
+
+    def run(plant: PlantFile, port: int, *, is_demo: bool) -> None:
+        assert is_demo
+        found.append((plant, port))
+
+    monkeypatch.setattr(demo, "run_plant", run)
     past = partial(simulated_history, years=PAST_YEARS)
     monkeypatch.setattr(demo, "simulated_history", past)
     return found
