@@ -12,7 +12,7 @@ from core.condition.film_conditions import FilmConditions
 from core.decision.decision import least_step_ns, readings_of
 from core.decision.finding_history import FindingHistory, finding_history
 from core.decision.level_history import level_history
-from core.decision.limits import ChangeLimits, sure_size
+from core.decision.limits import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits, sure_size
 from core.decision.verdict import OF_EVIDENCE, Verdict
 from core.stiffness_history import DIRECTIONS, CodeArray, StiffnessHistory, TimeArray
 
@@ -103,26 +103,33 @@ def _judged(
 ) -> DecisionHistory:
     """Decision after each counted reading."""
     alert, danger = (
-        _level(findings, limit, baseline, limits)
-        for limit in (limits.alert_change, limits.danger_change)
+        _level(findings, limit, margin, baseline, limits)
+        for limit, margin in (
+            (limits.alert_change, ALERT_MARGIN),
+            (limits.danger_change, DANGER_MARGIN),
+        )
     )
     level = np.where(danger, 2, np.where(alert, 1, 0)).astype(np.int8)
     seen_h = np.arange(1, level.size + 1) * baseline.reading_h
     is_enough = findings.is_found & (seen_h >= limits.min_evidence_h)
-    is_enough &= ~_is_passed(findings, limits.alert_change, limits)
+    is_enough &= ~_is_passed(findings, limits.alert_change, ALERT_MARGIN, limits)
     quiet = np.where(is_enough, Verdict.NORMAL, Verdict.GATHERING_EVIDENCE)
     verdict = np.where(level > 0, level, quiet).astype(np.int8)
     return DecisionHistory(verdict, level, *findings.strongest())
 
 
 def _level(
-    findings: FindingHistory, limit: float, baseline: QuantityBaseline, limits: ChangeLimits
+    findings: FindingHistory,
+    limit: float,
+    margin: float,
+    baseline: QuantityBaseline,
+    limits: ChangeLimits,
 ) -> _Bools:
     size, significance = np.abs(findings.change), findings.significance
     sure = _sure(findings, limits)
     is_held = (size > limit - limits.deadband) & (significance > sure * limits.holding_share)
     return level_history(
-        _is_passed(findings, limit, limits),
+        _is_passed(findings, limit, margin, limits),
         np.asarray(is_held.any(axis=0)),
         readings_of(limits.on_delay_h, baseline.reading_h),
         readings_of(limits.off_delay_h, baseline.reading_h),
@@ -130,10 +137,12 @@ def _level(
     )
 
 
-def _is_passed(findings: FindingHistory, limit: float, limits: ChangeLimits) -> _Bools:
+def _is_passed(
+    findings: FindingHistory, limit: float, margin: float, limits: ChangeLimits
+) -> _Bools:
     """(n,) whether a change is sure, and surely beyond the limit, on any time scale."""
     sure = _sure(findings, limits)
-    is_beyond = sure_size(findings.change, findings.significance, sure) >= limit
+    is_beyond = sure_size(findings.change, findings.significance, margin) >= limit
     return np.asarray(np.any((findings.significance >= sure) & is_beyond, axis=0))
 
 

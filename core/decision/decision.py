@@ -10,7 +10,7 @@ from core.baseline.baseline import QuantityBaseline
 from core.condition.film_conditions import FilmConditions
 from core.decision.gathered import NOTHING_GATHERED, Counted, Finding, GatheredEvidence
 from core.decision.level_timer import REST, LevelTimer
-from core.decision.limits import ChangeLimits, sure_size
+from core.decision.limits import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits, sure_size
 from core.decision.reading import WatchedReading
 from core.decision.verdict import OF_EVIDENCE, Verdict, counted_verdict
 from core.units import NS_PER_S
@@ -159,15 +159,15 @@ def _judged(
     n_off = readings_of(limits.off_delay_h, baseline.reading_h)
     alert, danger = (
         timer.step(
-            any(_is_passed(finding, change, limits) for finding in findings),
+            any(_is_passed(finding, change, margin, limits) for finding in findings),
             any(_is_held(finding, change, limits) for finding in findings),
             n_on,
             n_off,
             limits.is_latching,
         )
-        for timer, change in (
-            (decision.alert, limits.alert_change),
-            (decision.danger, limits.danger_change),
+        for timer, change, margin in (
+            (decision.alert, limits.alert_change, ALERT_MARGIN),
+            (decision.danger, limits.danger_change, DANGER_MARGIN),
         )
     )
     strongest = max(findings, key=lambda finding: finding.significance, default=None)
@@ -175,10 +175,10 @@ def _judged(
     return replace(decision, verdict=_verdict(decision, baseline, limits))
 
 
-def _is_passed(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
+def _is_passed(finding: Finding, limit: float, margin: float, limits: ChangeLimits) -> bool:
     """Whether a change is sure, and surely beyond the limit."""
     significance, sure = finding.significance, limits.sure_from(finding.time_scale_h)
-    is_beyond = sure_size(finding.change, significance, sure) >= limit
+    is_beyond = sure_size(finding.change, significance, margin) >= limit
     return significance >= sure and bool(is_beyond)
 
 

@@ -11,9 +11,10 @@ REFERENCE_H = 4.0
 LEAST_SIGNIFICANCE = 3.0
 """However long the time scale."""
 
-BEYOND = 0.5
-"""Share of the significance by which a change must be beyond a limit to have reached it. Healthy
-films must never be called changed; films that are near their limit are few."""
+ALERT_MARGIN, DANGER_MARGIN = 1.0, 3.0
+"""Standard uncertainties by which a change must be beyond its limit. A loss of 5 % must still be
+found within two weeks at a limit of 4 %, where means are known to 0.7 %: with one, 87 % of 108 were
+in simulated lives, and 90 % with none. What becomes a danger has long been an alert."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class ChangeLimits:
 
 
 def sure_size(
-    change: FloatArray | float, significance: FloatArray | float, sure: FloatArray | float
+    change: FloatArray | float, significance: FloatArray | float, margin: float
 ) -> FloatArray:
     """Size that a mean deviation surely has: by how much its uncertainty leaves it away from zero.
 
@@ -91,7 +92,7 @@ def sure_size(
     ----------
     significance
         Standard uncertainties away from zero; nothing is sure of one that is not above zero.
-    sure
-        Standard uncertainties from which a change is sure (`ChangeLimits.sure_from`).
+    margin
+        Standard uncertainties that it may be smaller by.
     """
-    return np.asarray(np.abs(change) * (1.0 - BEYOND * sure / np.maximum(significance, 1e-9)))
+    return np.asarray(np.abs(change) * (1.0 - margin / np.maximum(significance, 1e-9)))

@@ -19,10 +19,10 @@ class ChangeLimitSettings(Settings):
 
     alert_change: Share = ChangeLimits.alert_change
     """Change of stiffness, either way, that is an alert once it is surely exceeded: 0.04 is 4 %, in
-    ln. Surely is by half as many standard uncertainties as `significance` asks for."""
+    ln: by one standard uncertainty of the change."""
 
     danger_change: Share = ChangeLimits.danger_change
-    """The same for danger; must be above alert_change; example: 0.15."""
+    """The same for danger, by three; must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
     """How far below its limit a change must fall for a level to be left; example: 0.01."""
