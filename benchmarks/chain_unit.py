@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.delivery import Delivery
 from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
+from acquisition.simulated.life.measured import RUNOUT_UM_PK
 from acquisition.simulated.plant import CHUNK_SAMPLES
 from acquisition.simulated.scenario import Scenario
 from acquisition.simulated.unit import SimulatedUnit
@@ -67,6 +68,7 @@ def _bearing(life: LifeBearing, bracket_n_per_m: float, bracket_kg: float) -> Be
         opposite_y=far_y,
         opposite_reference_um=REFERENCE_UM,
         bracket_mass_kg=bracket_kg,
+        runout_um_pk=RUNOUT_UM_PK,
     )
 
 

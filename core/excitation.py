@@ -6,6 +6,23 @@ from core.cross_spectrum import CrossSpectrum
 from core.quality import Reason
 
 
+CHANCE = 1e-6
+"""Probability with which noise alone may be as coherent as what a stiffness is read from."""
+
+
+def chance_coherence(n_segments: float) -> float:
+    """Squared coherence that two independent noises exceed once in a million averages.
+
+    Carter, Knapp and Nuttall (1973): without overlap, P(γ² > c) = (1 - c)^(n - 1).
+
+    Parameters
+    ----------
+    n_segments
+        Independent segments that are averaged, more than 1.
+    """
+    return float(1.0 - CHANCE ** (1.0 / (n_segments - 1.0)))
+
+
 @dataclass(frozen=True)
 class LineLimits:
     """What counts as excitation at one line.

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from core.arrays import ComplexArray, FloatArray
 from core.channel_budget import amplitude_budget, amplitude_lines, with_budgets
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
-from core.excitation import LineLimits, line_excitation
+from core.excitation import LineLimits, chance_coherence, line_excitation
 from core.machine import Bearing
 from core.quality import Quality, Reading, Reason, missing, worst
 from core.ratio import effective_stiffness_n_per_m
@@ -142,10 +142,10 @@ class OrderLine:
         few = n_segments < self.settings.min_segments
         coherence = float(self.orders.coherence(shaft, bearing)[self.line])
         shown = missing(Reason.FEW_SEGMENTS) if few else Reading(coherence, quality)
-        reason = self._why_silent(shaft, bearing, few)
+        independent = independent_segments(n_segments, self.settings.overlap)
+        reason = self._why_silent(shaft, bearing, independent, few)
         if reason is not Reason.OK:
             return (shown, *[missing(reason)] * 3)
-        independent = independent_segments(n_segments, self.settings.overlap)
         k_eff = self._ratio(axes, shaft, bearing, quality, independent, budgets)
         found = line_transfer(
             self.orders, self.line, shaft, bearing, self.bearing.bracket, independent
@@ -185,7 +185,7 @@ class OrderLine:
         budgets[f"k_eff_{axes}_n_per_m"] = budget
         return reading_of(budget, quality)
 
-    def _why_silent(self, shaft: int, bearing: int, few: bool) -> Reason:
+    def _why_silent(self, shaft: int, bearing: int, n_segments: float, few: bool) -> Reason:
         """Why nothing may be read from the line; OK if something may."""
         quiet = Reason.INSUFFICIENT_EXCITATION
         if self.orders.power[self.line, shaft, bearing] <= 0.0:
@@ -196,8 +196,8 @@ class OrderLine:
         if (few or self.line == VORTEX) and not self._stands_out(shaft):
             return quiet
         # few segments are coherent with anything
-        runout_um_pk = self.runout_um_pk(shaft)
-        limits = LineLimits(0.0 if few else self.settings.min_coherence, runout_um_pk)
+        least = 0.0 if few else max(self.settings.min_coherence, chance_coherence(n_segments))
+        limits = LineLimits(least, self.runout_um_pk(shaft))
         if few and not self._stands_out(bearing):
             return quiet
         reason = line_excitation(self.orders, self.line, shaft, bearing, limits)

@@ -282,7 +282,7 @@ def test_readings_in_a_wrong_unit_or_without_a_condition_are_mentioned(
     eccentricity[4000:4100] = np.nan
     changed = replace(history, ln_k=ln_k, eccentricity_ratio=eccentricity)
     found = run_back_test({place: replace(rows, history=changed)}, BackTestRules(learning))
-    lost, far = found.doubts
+    lost, *_drift, far = found.doubts
     assert lost.startswith("U1 TJB: ")
     assert 90 < int(lost.split()[2]) <= 100
     assert "no eccentricity_ratio" in lost
