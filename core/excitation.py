@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from core.cross_spectrum import CrossSpectrum
 from core.quality import Reason
 
-
 CHANCE = 1e-6
 """Probability with which noise alone may be as coherent as what a stiffness is read from."""
 

@@ -13,13 +13,13 @@ LEAST_SIGNIFICANCE = 3.0
 
 ALERT_MARGIN, DANGER_MARGIN = 1.0, 3.0
 """Standard uncertainties by which a change must be beyond its limit. A loss of 5 % must still be
-found within two weeks at a limit of 4 %, where means are known to 0.7 %: with one, 87 % of 108 were
-in simulated lives, and 90 % with none. What becomes a danger has long been an alert."""
+found within two weeks, where means are known to 0.7 %. What becomes a danger has long been an
+alert."""
 
 
 @dataclass(frozen=True)
 class ChangeLimits:
-    """Limits of the change of a film, in ln (0.04 is 4 %), either way.
+    """Limits of the change of a film, in ln (0.035 is 3.5 %), either way.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class ChangeLimits:
         deadband is not below the alert limit.
     """
 
-    alert_change: float = 0.04
+    alert_change: float = 0.035
     danger_change: float = 0.15
     deadband: float = 0.01
     significance: float = 6.0

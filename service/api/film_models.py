@@ -160,7 +160,7 @@ class FilmDirectionModel(ApiModel):
 class FilmLimitsModel(ApiModel):
     """From which change on a film is an alert or danger."""
 
-    alert: Annotated[float, Field(examples=[0.04])]
+    alert: Annotated[float, Field(examples=[0.035])]
     """Of ln of stiffness, either way: 0.04 is 4 %."""
 
     danger: Annotated[float, Field(examples=[0.15])]

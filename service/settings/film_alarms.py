@@ -18,8 +18,8 @@ class ChangeLimitSettings(Settings):
     """How large, how sure and how lasting a change of stiffness must be to be an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Change of stiffness, either way, that is an alert once it is surely exceeded: 0.04 is 4 %, in
-    ln: by one standard uncertainty of the change."""
+    """Change of stiffness, either way, that is an alert once it is surely exceeded, by one standard
+    uncertainty of the change; in ln: 0.035 is 3.5 %."""
 
     danger_change: Share = ChangeLimits.danger_change
     """The same for danger, by three; must be above alert_change; example: 0.15."""

@@ -108,7 +108,7 @@ async def require_a_document_of_what_the_film_was_compared_with(service: Any) ->
     finding = found["bearings"][0]["film"]["findings"][0]
     assert finding["level"] in ("alert", "danger")
     assert finding["change"] < -0.1
-    assert found["limits"]["films"]["change"]["alert_change"] == 0.04
+    assert found["limits"]["films"]["change"]["alert_change"] == 0.035
 
 
 async def require_a_report_of_everything_without_a_script(service: Any) -> None:

@@ -23,7 +23,7 @@ async def test_a_film_as_it_was_learned_is_normal_and_tells_its_condition(
     change = found["x"]["change"]
     assert change["low_95"] < change["percent"] < change["high_95"]
     assert abs(change["percent"]) < 4.0
-    assert found["limits"] == {"alert": 0.04, "danger": 0.15}
+    assert found["limits"] == {"alert": 0.035, "danger": 0.15}
 
     machine.run(2, eccentricity_ratio=0.37, oil_temperature_c=46.1)
     found = await service.json(FILM)
