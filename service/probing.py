@@ -90,10 +90,9 @@ class RingLook:
     start_ns
         Time of its first sample by the device, UTC nanoseconds since 1970.
     slow
-        Slow values behind the header; None where there is none.
+        Its slow values; None where there is none.
     """
 
-    version: int
     n_channels: int
     rate_hz: float
     samples_per_slot: int
@@ -107,14 +106,13 @@ class RingLook:
     channels: tuple[RingChannelLook, ...]
 
 
-def ring_look(header: RingHeader, slow: tuple[float, ...], slot: Slot) -> RingLook:
+def ring_look(header: RingHeader, slot: Slot) -> RingLook:
     """Show a block ring by its header and its newest slot."""
     ring = header.layout
     state = (
         "blank" if slot.blank else "torn" if slot.torn else "damaged" if slot.damage else "whole"
     )
     return RingLook(
-        version=ring.version,
         n_channels=ring.n_channels,
         rate_hz=ring.rate_mhz / 1000.0,
         samples_per_slot=ring.samples_per_slot,
@@ -124,7 +122,7 @@ def ring_look(header: RingHeader, slow: tuple[float, ...], slot: Slot) -> RingLo
         state=state,
         first_index=slot.first_index,
         start_ns=slot.start_ns,
-        slow=tuple(value if math.isfinite(value) else None for value in slow),
+        slow=tuple(value if math.isfinite(value) else None for value in slot.slow),
         channels=tuple(
             RingChannelLook(
                 channel=number,

@@ -23,7 +23,7 @@ def torn(slot: Slot) -> Slot:
 
 
 def damaged(slot: Slot) -> Slot:
-    """Write a checksum that does not fit; in version 1, where there is none, nothing happens."""
+    """Write a checksum that does not fit."""
     return dataclasses.replace(slot, damage=slot.damage ^ 0x5A5A5A5A)
 
 

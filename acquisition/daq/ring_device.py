@@ -219,13 +219,10 @@ class RingDevice:
         """Whether a slot would come before its reader can take it."""
         if not self._watch.anything_read:
             return True
-        # a reader of version 1 looks once more behind the slots, and leaves out what may be gone
-        checked = self.layout.checked
         if ahead.epoch != self._feed_epoch:
-            return self._watch.n_unread > 0 if checked else not self._watch.waiting
-        n_safe = self.layout.n_slots - 2 if checked else (self.layout.n_slots - 3) // 2
+            return self._watch.n_unread > 0
         n_ahead = self._slots.number(ahead) - self._number
-        return self._watch.n_unread > max(0, n_safe - n_ahead)
+        return self._watch.n_unread > max(0, self.layout.n_slots - 2 - n_ahead)
 
     def _take(self, fault: SlotFault | None) -> None:
         raw = self._slots.take()
@@ -259,7 +256,7 @@ class RingDevice:
         self._repetition.note(right)
         if slot is not None:
             address = self.layout.slot_address(self._newest)
-            self.memory.write(address, encode_slot(slot, self.layout))
+            self.memory.write(address, encode_slot(slot))
         header = encode_header(RingHeader(self.layout, self.epoch, self._newest))
         self.memory.write(self._settings.base_address, header + encode_slow(raw.slow))
         self.ledger.offer(self._unit, self.epoch, n_slots * self.layout.samples_per_slot)
@@ -271,7 +268,6 @@ class RingDevice:
 
     def _slot(self, raw: RawBlock) -> Slot:
         seconds, microseconds = divmod(raw.start_ns // 1000, 1_000_000)
-        checked = self.layout.checked
         return Slot(
             sequence=self._newest,
             first_index=(raw.first_index + self._index_offset) % U32,
@@ -280,6 +276,6 @@ class RingDevice:
             ok_bits=sum(1 << c for c, ok in enumerate(raw.ok) if ok),
             counts=raw.counts.astype(np.int16, copy=False),
             trailer=self._newest & 0xFFFF,
-            epoch=self.epoch if checked else None,
-            slow=raw.slow if checked else (),
+            epoch=self.epoch,
+            slow=raw.slow,
         )

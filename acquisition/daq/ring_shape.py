@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.errors import ConfigError
 from acquisition.modbus.profile import HEADER_REGISTERS
-from acquisition.modbus.ring_layout import VERSION_2, RingLayout
+from acquisition.modbus.ring_layout import RingLayout
 from acquisition.raw import RawBlock
 
 
@@ -21,8 +21,6 @@ class RingDeviceSettings:
     samples_per_slot, n_slots
         Ring and header must fit into 65536 registers: 12 channels, 50 samples, 10 slow values and
         64 slots take 40,612.
-    version
-        1 or 2 of the profile.
     first_sequence
         Counter at power-up, 0 to 2**32 - 1; near the end it wraps soon.
     first_index
@@ -34,7 +32,6 @@ class RingDeviceSettings:
     base_address: int = 0
     samples_per_slot: int = 50
     n_slots: int = 64
-    version: int = VERSION_2
     first_sequence: int = 0
     first_index: int | None = None
     slot_padding: int = 0
@@ -61,7 +58,6 @@ def layout_of(first: RawBlock, settings: RingDeviceSettings) -> RingLayout:
         n_slow=n_slow,
         ring_address=settings.base_address + HEADER_REGISTERS + 2 * n_slow,
         slot_stride=0,
-        version=settings.version,
     )
     layout = replace(layout, slot_stride=layout.slot_registers + settings.slot_padding)
     layout.require_possible()

@@ -42,7 +42,6 @@ class RingFollower:
             "rate in mHz": round(rate_hz * 1000.0),
             "n_slow": n_slow,
         }
-        self._n_slow = n_slow
         self._header: RingHeader | None = None
         self._timeline: Timeline
         self._n_resets = 0
@@ -89,21 +88,13 @@ class RingFollower:
             As the reader does; nothing is forgotten then.
         """
         header = await self.header(reader)
-        layout = header.layout
-        slow = () if layout.checked else await reader.slow_values(self._n_slow)
         await self._enter(reader, header)
         wanted = self._unread(header)
         if not wanted:
             return []
-        found = list(zip(wanted, await self._read(reader, layout, wanted), strict=True))
-        if not layout.checked:
-            epoch, newest = await reader.progress()
-            if epoch != header.epoch or ahead(newest, header.newest) < 0:
-                return []
-            oldest = newest - (layout.n_slots - 2)
-            found = [(sequence, slot) for sequence, slot in found if ahead(sequence, oldest) >= 0]
+        found = await self._read(reader, header.layout, wanted)
         self._handled = wanted[-1]
-        return self._placed(found, header, slow)
+        return self._placed(list(zip(wanted, found, strict=True)), header)
 
     async def _enter(self, reader: RingReader, header: RingHeader) -> None:
         """Find the place to read from, when this is not simply the one after the last."""
@@ -143,9 +134,9 @@ class RingFollower:
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:
         """Stand before the first slot of a new epoch, if the ring still holds it.
 
-        Where slots name their epoch, all can be looked at when the newest is of no help.
+        Slots name their epoch, so that all can be looked at when the newest is of no help.
         """
-        n_before = header.layout.n_slots if header.layout.checked else 0
+        n_before = header.layout.n_slots
         if newest is not None:
             n_before = newest.first_index // header.layout.samples_per_slot
         self._handled = header.newest - 1 - min(n_before, header.layout.n_slots - 2)
@@ -158,7 +149,7 @@ class RingFollower:
 
     async def _newest_slot(self, reader: RingReader, header: RingHeader) -> Slot | None:
         [slot] = await self._read(reader, header.layout, [header.newest])
-        known = slot.epoch in (None, header.epoch) and slot.sequence == header.newest
+        known = slot.epoch == header.epoch and slot.sequence == header.newest
         return slot if known and slot.whole and not slot.blank else None
 
     async def _read(
@@ -173,16 +164,14 @@ class RingFollower:
                 [slots[i]] = await reader.slots(layout, [sequence])
         return slots
 
-    def _placed(
-        self, found: Sequence[tuple[int, Slot]], header: RingHeader, slow: tuple[float, ...]
-    ) -> list[RawBlock]:
+    def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[RawBlock]:
         blocks = []
         for sequence, slot in found:
             index = self._judge(sequence, slot, header)
             if isinstance(index, Refusal):
                 self._rejected[index] += header.layout.samples_per_slot
             elif index is not None:
-                blocks.append(self._raw_block(slot, index, header, slow))
+                blocks.append(self._raw_block(slot, index, header))
         return blocks
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
@@ -193,15 +182,13 @@ class RingFollower:
             return Refusal.DAMAGED
         if slot.sequence != sequence:
             return Refusal.WRONG_SEQUENCE
-        if slot.epoch not in (None, header.epoch):
+        if slot.epoch != header.epoch:
             return None
         if slot.torn:
             return Refusal.TORN
         return self._timeline.place(slot)
 
-    def _raw_block(
-        self, slot: Slot, index: int, header: RingHeader, slow: tuple[float, ...]
-    ) -> RawBlock:
+    def _raw_block(self, slot: Slot, index: int, header: RingHeader) -> RawBlock:
         rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
         if self._timeline.n_resets != self._n_resets:  # the counters went back, and nobody told
@@ -214,7 +201,7 @@ class RingFollower:
             rate_hz=header.layout.rate_mhz / 1000.0,
             counts=slot.counts,
             ok=tuple(bool(slot.ok_bits >> c & 1) for c in range(header.layout.n_channels)),
-            slow=slot.slow if header.layout.checked else slow,
+            slow=slot.slow,
             rejected=rejected,
         )
 

@@ -11,10 +11,8 @@ Register addresses are counted from the header's base, everything is big-endian:
           int16 samples channel by channel, low word of the sequence again,
           CRC-32 of all before it
 
-Version 1 has no checksums (+14..15 are zero), and in its slots neither epoch nor slow values; its
-slow values are those behind the header. In version 2 these are there for simple clients, and not
-used here. The CRC-32 is that of IEEE 802.3, as `zlib.crc32` has it, over the registers as bytes on
-the wire.
+The version is 2. The slow values behind the header are there for simple clients, and not used here.
+The CRC-32 is that of IEEE 802.3, as `zlib.crc32` has it, over the registers as bytes on the wire.
 """
 
 import struct
@@ -22,15 +20,13 @@ import zlib
 from dataclasses import dataclass
 
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.ring_layout import VERSION_1, VERSION_2, RingLayout
+from acquisition.modbus.ring_layout import RingLayout
 
 MAGIC = 0x5057
+VERSION = 2
 HEADER_REGISTERS = 16
-PROGRESS_OFFSET = 7
-PROGRESS_REGISTERS = 4
 
 _HEADER = struct.Struct(">5H3I3H")
-_PROGRESS = struct.Struct(">II")
 
 
 @dataclass(frozen=True)
@@ -46,11 +42,11 @@ def encode_header(header: RingHeader) -> bytes:
     """Header registers, without the slow values."""
     ring = header.layout
     data = _HEADER.pack(
-        *(MAGIC, ring.version, ring.n_channels, ring.samples_per_slot, ring.n_slots),
+        *(MAGIC, VERSION, ring.n_channels, ring.samples_per_slot, ring.n_slots),
         *(ring.rate_mhz, header.epoch, header.newest),
         *(ring.n_slow, ring.ring_address, ring.slot_stride),
     )
-    return data + (zlib.crc32(data) if ring.checked else 0).to_bytes(4, "big")
+    return data + zlib.crc32(data).to_bytes(4, "big")
 
 
 def decode_header(data: bytes) -> RingHeader:
@@ -59,7 +55,7 @@ def decode_header(data: bytes) -> RingHeader:
     Raises
     ------
     ConfigError
-        If this is not a block ring of a known version, or one that cannot exist.
+        If this is not a block ring of this version, or one that cannot exist.
     FrameError
         If its checksum says that it was changed on the way or while it was written.
     """
@@ -69,23 +65,14 @@ def decode_header(data: bytes) -> RingHeader:
     epoch, newest, n_slow, ring_address, slot_stride = rest
     if magic != MAGIC:
         raise ConfigError(f"block ring: magic is {magic:#06x}, expected {MAGIC:#06x}")
-    if version not in (VERSION_1, VERSION_2):
-        raise ConfigError(
-            f"block ring: profile version is {version}, known are {VERSION_1} and {VERSION_2}"
-        )
-    # version 1 has zeros here; anything else is a version 2 whose version was changed on the way
+    if version != VERSION:
+        raise ConfigError(f"block ring: profile version is {version}, known is {VERSION}")
     found = int.from_bytes(data[_HEADER.size : 2 * HEADER_REGISTERS], "big")
-    expected = 0 if version == VERSION_1 else zlib.crc32(data[: _HEADER.size])
+    expected = zlib.crc32(data[: _HEADER.size])
     if found != expected:
         raise FrameError(f"block ring: checksum of the header is {found:#x}, not {expected:#x}")
     layout = RingLayout(
-        n_channels, samples_per_slot, n_slots, rate_mhz, n_slow, ring_address, slot_stride, version
+        n_channels, samples_per_slot, n_slots, rate_mhz, n_slow, ring_address, slot_stride
     )
     layout.require_possible()
     return RingHeader(layout, epoch, newest)
-
-
-def decode_progress(data: bytes) -> tuple[int, int]:
-    """Epoch and newest sequence from the four registers at ``PROGRESS_OFFSET``."""
-    epoch, newest = _PROGRESS.unpack(data)
-    return epoch, newest

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from acquisition.errors import ConfigError
 from acquisition.modbus.transport import ADDRESS_SPACE
 
-VERSION_1 = 1
-VERSION_2 = 2
 MAX_CHANNELS = 32
 U32 = 1 << 32
 
-_HEAD_REGISTERS = 10
+_HEAD_REGISTERS = 12
 _TRAILER_REGISTERS = 1
-_EPOCH_AND_CRC_REGISTERS = 4
+_CRC_REGISTERS = 2
 
 
 @dataclass(frozen=True)
@@ -27,8 +25,6 @@ class RingLayout:
         Register address of the first slot.
     slot_stride
         Registers from the start of one slot to the start of the next.
-    version
-        1, or 2 with epoch, slow values and checksum in every slot.
     """
 
     n_channels: int
@@ -38,19 +34,12 @@ class RingLayout:
     n_slow: int
     ring_address: int
     slot_stride: int
-    version: int = VERSION_2
-
-    @property
-    def checked(self) -> bool:
-        """Whether header and slots carry checksums, and slots their slow values."""
-        return self.version >= VERSION_2
 
     @property
     def slot_registers(self) -> int:
         """Registers that one slot fills."""
         n_counts = self.n_channels * self.samples_per_slot
-        n_checked = 2 * self.n_slow + _EPOCH_AND_CRC_REGISTERS if self.checked else 0
-        return _HEAD_REGISTERS + n_counts + _TRAILER_REGISTERS + n_checked
+        return _HEAD_REGISTERS + 2 * self.n_slow + n_counts + _TRAILER_REGISTERS + _CRC_REGISTERS
 
     @property
     def end_address(self) -> int:
@@ -75,7 +64,6 @@ class RingLayout:
             Naming the field, what was found and what is allowed.
         """
         for name, value, lowest, highest in (
-            ("profile version", self.version, VERSION_1, VERSION_2),
             ("n_channels", self.n_channels, 1, MAX_CHANNELS),
             ("samples_per_slot", self.samples_per_slot, 1, ADDRESS_SPACE - 1),
             ("n_slots", self.n_slots, 2, ADDRESS_SPACE - 1),

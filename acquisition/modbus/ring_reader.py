@@ -1,19 +1,12 @@
-"""Reading a block ring over an open link: header, progress and runs of slots."""
+"""Reading a block ring over an open link: its header and runs of slots."""
 
 from collections.abc import Iterator, Sequence
 
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.link import ModbusLink
-from acquisition.modbus.profile import (
-    HEADER_REGISTERS,
-    PROGRESS_OFFSET,
-    PROGRESS_REGISTERS,
-    RingHeader,
-    decode_header,
-    decode_progress,
-)
+from acquisition.modbus.profile import HEADER_REGISTERS, RingHeader, decode_header
 from acquisition.modbus.ring_layout import RingLayout
-from acquisition.modbus.slot import Slot, decode_slot, decode_slow
+from acquisition.modbus.slot import Slot, decode_slot
 
 _N_TRIES = 4
 """A header is short and quickly written; still wrong after this many reads, it is wrong."""
@@ -53,18 +46,6 @@ class RingReader:
             except (ConfigError, FrameError) as error:
                 if n_tries == _N_TRIES:
                     raise type(error)(f"{self.where}: {error}") from error
-
-    async def slow_values(self, n_slow: int) -> tuple[float, ...]:
-        """Read the slow values behind the header."""
-        if not n_slow:
-            return ()
-        return decode_slow(await self._registers(self._base + HEADER_REGISTERS, 2 * n_slow))
-
-    async def progress(self) -> tuple[int, int]:
-        """Read epoch and newest sequence, in one request so that they belong together."""
-        return decode_progress(
-            await self._registers(self._base + PROGRESS_OFFSET, PROGRESS_REGISTERS)
-        )
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
         """Read the places where these sequence numbers belong, whatever lies there.

@@ -11,8 +11,7 @@ from acquisition.modbus.ring_layout import RingLayout
 from core.arrays import CountArray
 from core.units import NS_PER_S
 
-_HEAD = struct.Struct(">5I")
-_EPOCH = struct.Struct(">I")
+_HEAD = struct.Struct(">6I")
 _CRC_BYTES = 4
 
 
@@ -29,11 +28,11 @@ class Slot:
     trailer
         Low word of the sequence, once more, behind the samples.
     epoch
-        The device's epoch when it wrote the slot; None in version 1.
+        The device's epoch when it wrote the slot.
     slow
-        Slow values of this slot, NaN where there is none; empty in version 1.
+        Slow values of this slot, NaN where there is none.
     damage
-        Found checksum exclusive-or the right one: 0 if they are equal, and in version 1.
+        Found checksum exclusive-or the right one: 0 if they are equal.
     blank
         Whether nothing has been written here since the device started.
     """
@@ -45,7 +44,7 @@ class Slot:
     ok_bits: int
     counts: CountArray
     trailer: int
-    epoch: int | None = None
+    epoch: int
     slow: tuple[float, ...] = ()
     damage: int = 0
     blank: bool = field(default=False, compare=False)
@@ -66,23 +65,22 @@ class Slot:
         return not self.torn and not self.damage
 
 
-def encode_slot(slot: Slot, layout: RingLayout) -> bytes:
+def encode_slot(slot: Slot) -> bytes:
     """Registers of one slot."""
     head = _HEAD.pack(
-        slot.sequence, slot.first_index, slot.seconds, slot.microseconds, slot.ok_bits
+        *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),
+        *(slot.ok_bits, slot.epoch),
     )
     samples = slot.counts.astype(">i2").tobytes() + slot.trailer.to_bytes(2, "big")
-    if not layout.checked:
-        return head + samples
-    data = head + _EPOCH.pack(slot.epoch) + encode_slow(slot.slow) + samples
+    data = head + encode_slow(slot.slow) + samples
     return data + (zlib.crc32(data) ^ slot.damage).to_bytes(_CRC_BYTES, "big")
 
 
 def decode_slot(data: bytes | memoryview, layout: RingLayout) -> Slot:
     """Read one slot; what lies behind it is left alone."""
     data = data[: 2 * layout.slot_registers]
-    sequence, first_index, seconds, microseconds, ok_bits = _HEAD.unpack_from(data)
-    epoch, slow, at = _checked_part(data, layout)
+    sequence, first_index, seconds, microseconds, ok_bits, epoch = _HEAD.unpack_from(data)
+    at = _HEAD.size + 4 * layout.n_slow
     n_counts = layout.n_channels * layout.samples_per_slot
     counts = np.frombuffer(data, ">i2", n_counts, at).astype(np.int16)
     end = at + 2 * n_counts
@@ -95,8 +93,8 @@ def decode_slot(data: bytes | memoryview, layout: RingLayout) -> Slot:
         counts=counts.reshape(layout.n_channels, layout.samples_per_slot),
         trailer=int.from_bytes(data[end : end + 2], "big"),
         epoch=epoch,
-        slow=slow,
-        damage=_damage(data) if layout.checked else 0,
+        slow=decode_slow(data[_HEAD.size : at]),
+        damage=_damage(data),
         blank=not any(data),
     )
 
@@ -109,17 +107,6 @@ def encode_slow(values: Sequence[float]) -> bytes:
 def decode_slow(data: bytes | memoryview) -> tuple[float, ...]:
     """Slow values from their registers."""
     return tuple(np.frombuffer(data, dtype=">f4").tolist())
-
-
-def _checked_part(
-    data: bytes | memoryview, layout: RingLayout
-) -> tuple[int | None, tuple[float, ...], int]:
-    """Epoch and slow values of a slot, and where its samples begin."""
-    if not layout.checked:
-        return None, (), _HEAD.size
-    start = _HEAD.size + _EPOCH.size
-    stop = start + 4 * layout.n_slow
-    return _EPOCH.unpack_from(data, _HEAD.size)[0], decode_slow(data[start:stop]), stop
 
 
 def _damage(data: bytes | memoryview) -> int:

@@ -126,7 +126,7 @@ def ring(
     parity: ParityOption = "even",
     json_output: JsonOption = False,
 ) -> None:
-    """Print a block ring's layout, its slow values, and the counts in its newest slot."""
+    """Print a block ring's layout, and slow values and counts of its newest slot."""
     place = _place(device, unit_id, timeout_s, baudrate, parity)
     look = ring_look(*_done(read_ring_once(place, base_address, function)))
     typer.echo(json.dumps(asdict(look), indent=1) if json_output else "\n".join(_ring_lines(look)))
@@ -227,7 +227,7 @@ def _pair(look: RegisterLook, order: str) -> str:
 
 def _ring_lines(look: RingLook) -> Iterator[str]:
     ring_s = look.n_slots * look.samples_per_slot / look.rate_hz
-    yield f"block ring, profile version {look.version}, epoch {look.epoch}"
+    yield f"block ring, epoch {look.epoch}"
     yield (
         f"{look.n_channels} channels at {look.rate_hz:g} Hz; {look.n_slots} slots of"
         f" {look.samples_per_slot} samples: {ring_s:.1f} s"

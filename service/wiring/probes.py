@@ -64,8 +64,8 @@ async def read_map_once(
 
 async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
-) -> tuple[RingHeader, tuple[float, ...], Slot]:
-    """Read a block ring's header, the slow values behind it, and its newest slot.
+) -> tuple[RingHeader, Slot]:
+    """Read a block ring's header and its newest slot.
 
     Raises
     ------
@@ -79,7 +79,7 @@ async def read_ring_once(
             reader = RingReader(link, base_address, function)
             header = await reader.header()
             [slot] = await reader.slots(header.layout, [header.newest])
-            return header, await reader.slow_values(header.layout.n_slow), slot
+            return header, slot
     finally:
         link.close()
 

@@ -72,9 +72,7 @@ async def replayed(server, calibration: UnitCalibration) -> list[SampleBlock]:
     return blocks
 
 
-@pytest.fixture(params=[1, 2], ids=["v1", "v2"])
-def settings(request) -> RingDeviceSettings:
-    return RingDeviceSettings(n_slots=8, version=request.param)
+SETTINGS = RingDeviceSettings(n_slots=8)
 
 
 @pytest.fixture(params=[ModbusRingServer, RtuRingServer], ids=["tcp", "rtu"])
@@ -87,9 +85,7 @@ FOUND = {(1, 0): 2, (1, 300): 14, (1, 9000): 400, (2, 50): 7, (9, 5000): 6}
 """First slots and their number: 100 to 130, 275 to 300 and 20 to 50 of epoch 2 fill none."""
 
 
-def assert_recorded(
-    blocks: list[SampleBlock], found: dict[tuple[int, int], int], version: int
-) -> None:
+def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]) -> None:
     """Blocks are these slots, with the samples and times of the recording."""
     slots = [
         (epoch, first + 50 * n) for (epoch, first), n_slots in found.items() for n in range(n_slots)
@@ -101,22 +97,19 @@ def assert_recorded(
         passed_us = round(block.first_index * 1e9 / 600) // 1000
         assert block.start_ns == START_NS + block.epoch * 10**12 + passed_us * 1000
         assert (block.rejected, block.stamp_fault) == ((), None)
-        if version == 2:  # in version 1 slow values are those of the newest slot
-            assert block.slow["slow0"].value == block.first_index // 50
+        assert block.slow["slow0"].value == block.first_index // 50
 
 
-async def test_a_replay_on_demand_loses_nothing_however_small_the_ring(
-    settings, serve, counts_calibration
-):
+async def test_a_replay_on_demand_loses_nothing_however_small_the_ring(serve, counts_calibration):
     """Gaps are as long behind the wire, and epochs are those of the recording."""
-    device = RingDevice(PiecewiseFeed(*PIECES), settings=settings)
+    device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
     async with serve(device) as server:
         blocks = await replayed(server, counts_calibration())
-    assert_recorded(blocks, FOUND, settings.version)
+    assert_recorded(blocks, FOUND)
 
 
-async def test_a_paced_gap_takes_the_time_it_took(settings):
-    device = RingDevice(PiecewiseFeed((1, 0, 100), (1, 500, 600)), settings=settings)
+async def test_a_paced_gap_takes_the_time_it_took():
+    device = RingDevice(PiecewiseFeed((1, 0, 100), (1, 500, 600)), settings=SETTINGS)
     newest = []
     for _ in range(11):
         device.produce(1)
@@ -128,16 +121,16 @@ async def test_a_paced_gap_takes_the_time_it_took(settings):
     assert device.ledger.n_samples("U1") == 600
 
 
-def test_a_restart_of_the_recording_takes_no_time(settings):
-    device = RingDevice(PiecewiseFeed((1, 0, 100), (2, 7000, 7100)), settings=settings)
+def test_a_restart_of_the_recording_takes_no_time():
+    device = RingDevice(PiecewiseFeed((1, 0, 100), (2, 7000, 7100)), settings=SETTINGS)
     device.produce(2)
     assert (device.epoch, device.newest) == (2, 0)
     device.produce(1)
     assert (device.epoch, device.newest) == (2, 1)
 
 
-async def test_a_paced_server_ends_with_its_recording_when_nobody_reads(stepped_clock, settings):
-    device = RingDevice(PiecewiseFeed((1, 0, 500)), settings=settings)
+async def test_a_paced_server_ends_with_its_recording_when_nobody_reads(stepped_clock):
+    device = RingDevice(PiecewiseFeed((1, 0, 500)), settings=SETTINGS)
     async with ModbusRingServer(device, stepped_clock) as server:
         await server.run()
     assert device.ended
@@ -181,26 +174,26 @@ def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read() -> No
     assert (device.epoch, device.newest) == (8, 0)
 
 
-async def test_a_patient_server_loses_nothing_however_fast_its_clock(settings, counts_calibration):
-    device = RingDevice(PiecewiseFeed(*PIECES), settings=settings)
+async def test_a_patient_server_loses_nothing_however_fast_its_clock(counts_calibration):
+    device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
     async with ModbusRingServer(device, Hurry(), patient=True) as server:
         blocks = await replayed(server, counts_calibration())
-    assert_recorded(blocks, FOUND, settings.version)
+    assert_recorded(blocks, FOUND)
 
 
-async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(settings, counts_calibration):
-    device = RingDevice(PiecewiseFeed((1, 0, 20_000)), settings=settings)
+async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(counts_calibration):
+    device = RingDevice(PiecewiseFeed((1, 0, 20_000)), settings=SETTINGS)
     async with ModbusRingServer(device, Hurry(), patient=True) as server:
         async with source_of(server, counts_calibration()).connect() as stream:
             before = await anext(stream)
         after = await replayed(server, counts_calibration())
     start = after[0].first_index
     assert before.stop_index <= start
-    assert_recorded(after, {(1, start): (20_000 - start) // 50}, settings.version)
+    assert_recorded(after, {(1, start): (20_000 - start) // 50})
 
 
-async def test_a_device_whose_recording_has_ended_stands_still(settings, counts_calibration):
-    device = RingDevice(PiecewiseFeed((1, 0, 100)), settings=settings)
+async def test_a_device_whose_recording_has_ended_stands_still(counts_calibration):
+    device = RingDevice(PiecewiseFeed((1, 0, 100)), settings=SETTINGS)
     device.produce(10)
     device.restart()
     assert (device.newest, device.ended) == (1, True)

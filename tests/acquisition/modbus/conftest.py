@@ -37,18 +37,10 @@ def read_until() -> Callable[..., Awaitable[list[SampleBlock]]]:
     return take
 
 
-@pytest.fixture(params=[1, 2], ids=["v1", "v2"])
-def version(request) -> int:
-    """Both versions of the block-ring profile."""
-    return request.param
-
-
 @pytest.fixture
-def device(counting_feed, version) -> RingDevice:
+def device(counting_feed) -> RingDevice:
     """Three channels of 50 samples: a slot takes two reads."""
-    return RingDevice(
-        counting_feed(n_channels=3), settings=RingDeviceSettings(n_slots=8, version=version)
-    )
+    return RingDevice(counting_feed(n_channels=3), settings=RingDeviceSettings(n_slots=8))
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ HARMLESS = {"delay": 0.3, "slice": 0.5, "coalesce": 0.5}
 HARMFUL = {"duplicate": 0.1, "half_close": 0.05, "reset": 0.05, "swallow": 0.05}
 MISCHIEF = HARMLESS | HARMFUL
 CHANGED = {"corrupt": 0.2, "corrupt_request": 0.15}
-"""Only a ring of version 2 carries checksums that tell."""
+"""Only a ring carries checksums that tell."""
 
 N_BLOCKS = {PolledTcpRig: 40, VectorTcpRig: 200, FifoTcpRig: 80, ChannelFifoTcpRig: 80}
 """A block takes ten replies of polled registers, two of a rack, four or more of queues."""

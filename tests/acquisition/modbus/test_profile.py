@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.profile import RingHeader, decode_header, decode_progress, encode_header
+from acquisition.modbus.profile import RingHeader, decode_header, encode_header
 from acquisition.modbus.ring_layout import RingLayout
 from acquisition.modbus.slot import Slot, decode_slot, encode_slot
 
 u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)
-V1 = RingLayout(
+LAYOUT = RingLayout(
     n_channels=3,
     samples_per_slot=4,
     n_slots=8,
@@ -24,9 +24,7 @@ V1 = RingLayout(
     n_slow=2,
     ring_address=20,
     slot_stride=31,
-    version=1,
 )
-V2 = dataclasses.replace(V1, version=2)
 
 
 @st.composite
@@ -39,7 +37,6 @@ def layouts(draw: st.DrawFn) -> RingLayout:
         n_slow=draw(st.integers(0, 100)),
         ring_address=draw(st.integers(16, 500)),
         slot_stride=0,
-        version=draw(st.integers(1, 2)),
     )
     stride = layout.slot_registers + draw(st.integers(0, 9))
     return dataclasses.replace(layout, slot_stride=stride)
@@ -48,14 +45,12 @@ def layouts(draw: st.DrawFn) -> RingLayout:
 @given(layout=layouts(), epoch=u32, newest=u32)
 def test_a_header_reads_back_as_it_was_written(layout, epoch, newest):
     header = RingHeader(layout, epoch, newest)
-    data = encode_header(header)
-    assert decode_header(data) == header
-    assert decode_progress(data[14:22]) == (epoch, newest)
+    assert decode_header(encode_header(header)) == header
 
 
 @given(epoch=u32, newest=u32, position=st.integers(0, 31), flip=st.integers(1, 255))
-def test_no_header_of_version_2_with_a_changed_byte_is_believed(epoch, newest, position, flip):
-    data = bytearray(encode_header(RingHeader(V2, epoch, newest)))
+def test_no_header_with_a_changed_byte_is_believed(epoch, newest, position, flip):
+    data = bytearray(encode_header(RingHeader(LAYOUT, epoch, newest)))
     data[position] ^= flip
     with pytest.raises((ConfigError, FrameError)):
         decode_header(bytes(data))
@@ -75,13 +70,13 @@ def equal_slots(a: Slot, b: Slot) -> bool:
     slow=st.tuples(*[st.floats(width=32, allow_nan=False)] * 2),
     damage=u32,
 )
-def test_a_slot_of_version_2_reads_back_with_epoch_slow_values_and_damage(
+def test_a_slot_reads_back_with_epoch_slow_values_and_damage(
     numbers, trailer, counts, epoch, slow, damage
 ):
     slot = Slot(*numbers, counts=counts, trailer=trailer, epoch=epoch, slow=slow, damage=damage)
-    data = encode_slot(slot, V2)
-    assert len(data) == 2 * V2.slot_registers
-    read = decode_slot(data + b"next", V2)
+    data = encode_slot(slot)
+    assert len(data) == 2 * LAYOUT.slot_registers
+    read = decode_slot(data + b"next", LAYOUT)
     np.testing.assert_array_equal(read.counts, counts)
     assert equal_slots(read, slot)
 
@@ -89,33 +84,29 @@ def test_a_slot_of_version_2_reads_back_with_epoch_slow_values_and_damage(
 @given(
     counts=arrays(np.int16, (3, 4)),
     flips=st.dictionaries(
-        st.integers(0, 2 * V2.slot_registers - 1), st.integers(1, 255), min_size=1
+        st.integers(0, 2 * LAYOUT.slot_registers - 1), st.integers(1, 255), min_size=1
     ),
 )
-def test_a_slot_of_version_2_with_changed_bytes_is_not_whole(counts, flips):
-    data = bytearray(encode_slot(Slot(3, 12, 5, 6, 7, counts, 3, epoch=1, slow=(1.0, 2.0)), V2))
-    assert decode_slot(bytes(data), V2).whole
+def test_a_slot_with_changed_bytes_is_not_whole(counts, flips):
+    data = bytearray(encode_slot(Slot(3, 12, 5, 6, 7, counts, 3, epoch=1, slow=(1.0, 2.0))))
+    assert decode_slot(bytes(data), LAYOUT).whole
     for position, flip in flips.items():
         data[position] ^= flip
-    assert not decode_slot(bytes(data), V2).whole
+    assert not decode_slot(bytes(data), LAYOUT).whole
 
 
 def test_a_slot_of_zeros_is_blank_and_a_written_one_is_not():
-    for layout in (V1, V2):
-        assert decode_slot(bytes(2 * layout.slot_registers), layout).blank
-        first = Slot(0, 0, 0, 0, 0, np.ones((3, 4), np.int16), 0, epoch=0, slow=(0.0, 0.0))
-        assert not decode_slot(encode_slot(first, layout), layout).blank
+    assert decode_slot(bytes(2 * LAYOUT.slot_registers), LAYOUT).blank
+    first = Slot(0, 0, 0, 0, 0, np.ones((3, 4), np.int16), 0, epoch=0, slow=(0.0, 0.0))
+    assert not decode_slot(encode_slot(first), LAYOUT).blank
 
 
-def test_samples_lie_behind_ten_registers_or_epoch_and_slow_values_and_before_a_checksum():
-    """Channel by channel; only version 2 has epoch, slow values and checksum in its slots."""
+def test_samples_lie_channel_by_channel_behind_slow_values_and_before_a_checksum():
     counts = np.arange(12, dtype=np.int16).reshape(3, 4)
     slot = Slot(
         0x0001_0002, 0x0003_0004, 5, 6, 0b101, counts, 2, epoch=0x0007_0008, slow=(1.0, 2.0)
     )
-    words = np.frombuffer(encode_slot(slot, V1), ">u2")
-    assert words.tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, *range(12), 2]
-    data = encode_slot(slot, V2)
+    data = encode_slot(slot)
     words = np.frombuffer(data, ">u2")
     assert words[:12].tolist() == [1, 2, 3, 4, 0, 5, 0, 6, 0, 5, 7, 8]
     assert words[12:16].tolist() == [0x3F80, 0, 0x4000, 0]
@@ -123,12 +114,11 @@ def test_samples_lie_behind_ten_registers_or_epoch_and_slow_values_and_before_a_
     assert int.from_bytes(data[-4:], "big") == zlib.crc32(data[:-4])
 
 
-@pytest.mark.parametrize("layout", [V1, V2], ids=["v1", "v2"])
 @pytest.mark.parametrize(
     ("register", "value", "complaint"),
     [
         (0, 0x5058, "magic is 0x5058, expected 0x5057"),
-        (1, 3, "version is 3, known are 1 and 2"),
+        (1, 3, "version is 3, known is 2"),
         (2, 0, "n_channels is 0"),
         (2, 33, "n_channels is 33"),
         (3, 0, "samples_per_slot is 0"),
@@ -137,10 +127,9 @@ def test_samples_lie_behind_ten_registers_or_epoch_and_slow_values_and_before_a_
         (13, 22, "slot stride is 22, allowed is"),
     ],
 )
-def test_a_header_that_cannot_be_is_refused_with_what_was_found(layout, register, value, complaint):
-    words = np.frombuffer(encode_header(RingHeader(layout, 1, 1)), ">u2").copy()
+def test_a_header_that_cannot_be_is_refused_with_what_was_found(register, value, complaint):
+    words = np.frombuffer(encode_header(RingHeader(LAYOUT, 1, 1)), ">u2").copy()
     words[register] = value
     data = words.tobytes()[:28]
-    checksum = zlib.crc32(data) if layout.checked else 0
     with pytest.raises(ConfigError, match=complaint):
-        decode_header(data + checksum.to_bytes(4, "big"))
+        decode_header(data + zlib.crc32(data).to_bytes(4, "big"))

@@ -63,7 +63,7 @@ async def test_a_slot_that_is_being_written_is_read_again(device, server, source
             if read_address == address and len(written) == 1:
                 written.append(None)
             elif read_address == address:
-                device.memory.write(address, encode_slot(written[0], device.layout))
+                device.memory.write(address, encode_slot(written[0]))
 
         device.memory.before_read = finish_writing
         block = await anext(stream)
@@ -87,8 +87,7 @@ async def test_slots_overwritten_while_they_are_read_are_a_gap_and_never_a_mixtu
 
         device.memory.before_read = run_on
         blocks = await read_until(stream, 550)
-    # version 1 leaves the slot alone that may just be overwritten; version 2 sees whether it was
-    assert blocks[0].first_index == (200 if device.layout.version == 1 else 150)
+    assert blocks[0].first_index == 150
     np.testing.assert_array_equal(samples_of(blocks), np.arange(blocks[0].first_index, 550))
 
 
@@ -117,10 +116,10 @@ async def test_a_sequence_that_goes_back_for_a_moment_repeats_nothing(
     "shape", [{"slot_padding": 5}, {"first_sequence": U32 - 3, "first_index": U32 - 146}]
 )
 async def test_wrapping_counters_and_padding_between_slots_leave_no_trace(
-    counting_feed, source_at, read_until, version, shape
+    counting_feed, source_at, read_until, shape
 ):
     start = shape.get("first_index", 0)
-    settings = RingDeviceSettings(n_slots=8, version=version, **shape)
+    settings = RingDeviceSettings(n_slots=8, **shape)
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         blocks = [await anext(stream)]
@@ -131,11 +130,9 @@ async def test_wrapping_counters_and_padding_between_slots_leave_no_trace(
     np.testing.assert_array_equal(samples_of(blocks), np.arange(650))
 
 
-async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(
-    counting_feed, source_at, version
-):
+async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(counting_feed, source_at):
     feed = counting_feed(n_channels=3)
-    device = RingDevice(feed, settings=RingDeviceSettings(version=version))
+    device = RingDevice(feed)
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(1)
@@ -148,10 +145,10 @@ async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(
 
 
 async def test_more_slow_values_than_fit_one_read_arrive_in_order(
-    counting_feed, counts_calibration, source_at, version
+    counting_feed, counts_calibration, source_at
 ):
     feed = counting_feed(n_channels=3, slow=tuple(float(i) for i in range(80)))
-    device = RingDevice(feed, settings=RingDeviceSettings(version=version))
+    device = RingDevice(feed)
     async with ModbusRingServer(device) as server:
         source = source_at(server.port, calibration=counts_calibration(n_channels=3, n_slow=80))
         async with source.connect() as stream:
@@ -184,7 +181,6 @@ async def test_a_restarted_device_starts_a_new_epoch_from_its_first_sample(
     np.testing.assert_array_equal(samples_of(after), np.arange(150, 300))
 
 
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
 async def test_a_new_epoch_is_read_from_its_start_though_its_newest_slot_is_lost(
     device, server, source_at, read_until
 ):
@@ -202,7 +198,6 @@ async def test_a_new_epoch_is_read_from_its_start_though_its_newest_slot_is_lost
     assert (block.first_index, block.epoch) == (200, first.epoch)
 
 
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
 async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
     device, server, source_at
 ):
@@ -222,9 +217,9 @@ async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
 
 
 async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
-    counting_feed, source_at, read_until, version
+    counting_feed, source_at, read_until
 ):
-    settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000, version=version)
+    settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000)
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
     async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
         before = await anext(stream)
@@ -236,7 +231,6 @@ async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
     assert (after[0].first_index, after[0].rejected) == (50, (Rejection("inconsistent_index", 50),))
 
 
-@pytest.mark.parametrize("version", [2], indirect=True, ids=["v2"])
 async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_new(
     device, server, source_at
 ):

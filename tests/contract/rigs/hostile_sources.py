@@ -2,7 +2,7 @@
 
 Wrong replies of `FORMS` differ from a right reply in their form, and have to be refused by every
 source. Those of `CONTENTS` are right replies with other registers: only data that carry a checksum
-of their own, as a block ring of version 2 does, can tell.
+of their own, as a block ring does, can tell.
 """
 
 import asyncio
@@ -242,16 +242,16 @@ def _kind(rig: type, **more: object) -> type:
     return type(f"Lying{rig.__name__}", (_Lying, rig), {"link": link} | more)
 
 
-def _ring(rig: type, version: int) -> type:
+def _ring(rig: type) -> type:
     """A ring of which a slot takes more than one read."""
-    return _kind(rig, shape=RingDeviceSettings(samples_per_slot=100, version=version))
+    return _kind(rig, shape=RingDeviceSettings(samples_per_slot=100))
 
 
 _REGISTERS = ["polled", "polled", "vector", "vector", "queue", "queue", "queue for each channel"]
 KINDS = {
     (kind.link, source): kind
     for source, kind in [
-        *((f"ring {n}", _ring(rig, n)) for n in (1, 2) for rig in (ModbusRig, ModbusRtuRig)),
+        *(("ring", _ring(rig)) for rig in (ModbusRig, ModbusRtuRig)),
         *zip(_REGISTERS, map(_kind, REGISTER_RIGS), strict=True),
     ]
 }
@@ -261,7 +261,7 @@ KINDS = {
 def lies_to(link: str, source: str) -> dict[str, Callable]:
     """Kinds of wrong replies that a source must not believe."""
     lies = FORMS[link] | (OF_QUEUES if source.startswith("queue") else OF_REGISTERS)
-    return lies | CONTENTS[link] if source == "ring 2" else lies
+    return lies | CONTENTS[link] if source == "ring" else lies
 
 
 class Trial:
