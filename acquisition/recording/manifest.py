@@ -28,13 +28,6 @@ from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"
 VERSION = 3
-READABLE = (1, 2, 3)
-"""Version 1 had no float32, and did not say on which grid its blocks were; before version 3 the
-manifest had no checksum of its own."""
-
-CHECKED = 3
-"""First version whose manifest has a checksum."""
-
 MANIFEST = "manifest.json"
 SAMPLES = "samples.parquet"
 BLOCKS = "blocks.parquet"
@@ -141,19 +134,13 @@ class Manifest(RecordedUnit):
     """
 
     format: Literal["padwatch-recording"]
-    version: Literal[1, 2, 3]
+    version: Literal[3]
     made_by: Annotated[str, StringConstraints(max_length=200)]
     start: Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{9}Z$")]
     n_blocks: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     n_samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     files: Annotated[dict[FileName, RecordedFile], Field(min_length=2)]
     checksum: Sha256 | None = None
-
-    @validated(mode="after")
-    def _check_version(self) -> Self:
-        if self.version == 1 and self.sample_type != "int16":
-            raise ValueError(f"version 1 has no sample_type {self.sample_type!r}")
-        return self
 
 
 class _Head(BaseModel):
@@ -175,10 +162,10 @@ def read_manifest(folder: Path) -> Manifest:
     text = _read(path)
     try:
         head = _Head.model_validate_json(text, strict=True)
-        if head.format != FORMAT or head.version not in READABLE:
+        if head.format != FORMAT or head.version != VERSION:
             raise ConfigError(
                 f"{path}: {head.format[:40]!r} version {head.version},"
-                f" this padwatch reads {FORMAT!r} version {' and '.join(map(str, READABLE))}"
+                f" this padwatch reads {FORMAT!r} version {VERSION}"
             )
         found = Manifest.model_validate_json(text, strict=True)
     except ValidationError as error:
@@ -186,8 +173,7 @@ def read_manifest(folder: Path) -> Manifest:
         place = "".join(f".{part}"[:60] for part in first["loc"]).lstrip(".")
         words = f"{place}: {first['msg']}" if place else first["msg"]
         raise ConfigError(f"{path}: {words}") from error
-    is_checked = found.version >= CHECKED or found.checksum is not None
-    if is_checked and found.checksum != checksum_of(json.loads(text)):
+    if found.checksum != checksum_of(json.loads(text)):
         raise ConfigError(f"{path}: damaged, or edited by hand: not what its checksum says")
     return found
 
@@ -196,8 +182,8 @@ def manifest_text(manifest: Manifest) -> str:
     """The manifest as its file has it: what it is comes first, its checksum last."""
     values = manifest.model_dump(mode="json", exclude={"checksum"})
     first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
-    checksum = {"checksum": checksum_of(first | values)} if manifest.version >= CHECKED else {}
-    return json.dumps(first | values | checksum, indent=1) + "\n"
+    checksum = checksum_of(first | values)
+    return json.dumps(first | values | {"checksum": checksum}, indent=1) + "\n"
 
 
 def start_text(start_ns: int) -> str:

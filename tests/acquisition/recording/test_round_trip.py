@@ -1,6 +1,5 @@
 """What was written comes back: every count, every bit of every number, every gap."""
 
-import json
 import math
 import resource
 import struct
@@ -228,22 +227,13 @@ def test_what_the_reader_would_refuse_is_not_written(
     assert recorder.finish().n_blocks == 2
 
 
-def test_a_manifest_says_when_it_began_and_who_made_it_and_version_1_is_still_read(
+def test_a_manifest_says_when_it_began_and_who_made_it(
     record: Callable[..., Path], numbered: Numbered
 ) -> None:
     first = numbered(0, 50, start_ns=1_767_225_600_008_333_333)
-    blocks = [first, numbered(50, 50), numbered(100, 50)]
-    folder = record(blocks)
-    manifest = open_recording(folder).manifest
+    manifest = open_recording(record([first, numbered(50, 50)])).manifest
     assert manifest.start == "2026-01-01T00:00:00.008333333Z"
     assert manifest.made_by == "padwatch in a test"
-    path = folder / "manifest.json"
-    document = json.loads(path.read_text()) | {"version": 1}
-    del document["block_samples"], document["checksum"]
-    path.write_text(json.dumps(document))
-    opened = open_recording(folder)
-    assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
-    assert opened.manifest.calibration.block_samples == 50
 
 
 @pytest.mark.parametrize("is_calibrated", [True, False])
