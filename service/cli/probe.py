@@ -15,7 +15,6 @@ from acquisition.registers.cells import ByteOrder
 from core.machine import Measurand
 from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
-from service.cli.probe_can import can
 from service.cli.units import UnitOption, one_unit
 from service.probing import RegisterLook, RingLook, ValueLook, looks, ring_look, value_looks
 from service.settings.map_file import load_map_file
@@ -30,7 +29,6 @@ app = typer.Typer(
     no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."
 )
 
-app.command("can")(can)
 
 MAX_COUNT = 1000
 BIT_FUNCTIONS = (1, 2)

@@ -1,15 +1,12 @@
 """The compiled layout reads what cantools reads, in any place and in multiplexed messages."""
 
-from pathlib import Path
 
-import can
 import cantools
 import numpy as np
 import pytest
 
-from acquisition.can.dbc import load_dbc, parse_dbc
+from acquisition.can.dbc import load_dbc
 from acquisition.can.layout import FrameLayout, byte_offset, scalar_reader
-from acquisition.can.survey import Survey
 from acquisition.errors import ConfigError, FrameError
 from core.blocks import Rejection
 
@@ -161,21 +158,3 @@ def test_a_lost_part_drops_the_instant(assembler_with):
 def test_a_channel_has_samples_of_one_part(signals, words, settings_of, assembler_by):
     with pytest.raises(ConfigError, match=words):
         assembler_by(settings_of(DBC, {"a": signals}))
-
-
-@pytest.mark.parametrize("inner", ["", "m0M"], ids=["once", "twice over"])
-def test_a_probe_shows_a_multiplexed_message_though_the_dbc_lacks_some_of_its_values(inner):
-    text = (
-        'VERSION ""\nBU_: N\nBO_ 200 X: 2 N\n SG_ outer M : 0|4@1+ (1,0) [0|0] "" N\n'
-        f' SG_ inner {inner or "m0"} : 4|4@1+ (1,0) [0|0] "" N\n'
-        ' SG_ y m1 : 8|8@1+ (1,0) [0|0] "" N\n'
-    )
-    if inner:
-        text += "SG_MUL_VAL_ 200 y inner 1-1;\nSG_MUL_VAL_ 200 inner outer 0-0;\n"
-    survey = Survey(parse_dbc(text, Path("x.dbc")))
-    for first in (0x10, 0x20, 0x01, 0x0F):
-        survey.add(can.Message(arbitration_id=200, is_extended_id=False, data=bytes([first, 7])))
-    [look] = survey.look(1.0).messages
-    spans = {span.name: (span.minimum, span.maximum) for span in look.signals}
-    assert spans["y"] == (7.0, 7.0)
-    assert spans["outer"] == ((0.0, 0.0) if inner else (0.0, 1.0))
