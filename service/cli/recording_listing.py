@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from acquisition.recording.export.rows import UNITS
+from acquisition.recording.export import UNITS
 from acquisition.recording.reader import Recording
 from acquisition.recording.summary import RecordingSummary
 from service.api.times import rfc3339

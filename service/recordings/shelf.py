@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import ConfigError
-from acquisition.recording.export.arrow import CsvExporter
-from acquisition.recording.export.rows import export_rows
+from acquisition.recording.export import csv_tables
 from acquisition.recording.manifest import Manifest, checksum_of, read_manifest
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.summary import RecordingSummary, summary_of
@@ -130,12 +129,8 @@ class Shelf:
             If it is damaged, or not there.
         """
         recording, sink = self.opened(name), Sink()
-        exporter = CsvExporter(sink, recording.manifest)
-        for rows in export_rows(recording):
-            exporter.write(rows)
+        for _ in csv_tables(recording, sink):
             yield from sink.taken()
-        exporter.close()
-        yield from sink.taken()
 
     def _folder(self, name: str) -> Path | None:
         """By looking through what is there, so that no name leads out of the folder."""

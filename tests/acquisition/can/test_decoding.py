@@ -1,6 +1,5 @@
 """The compiled layout reads what cantools reads, in any place and in multiplexed messages."""
 
-
 import cantools
 import numpy as np
 import pytest

@@ -1,1 +1,0 @@
-"""Recordings as files for other tools: engineering units, UTC, gaps in sight."""
