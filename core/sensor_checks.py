@@ -60,9 +60,6 @@ class SensorLimits:
     max_power_change: float = 0.05
 
 
-DEFAULT_LIMITS = SensorLimits()
-
-
 def quietest_rms(samples: FloatArray) -> FloatArray:
     """Least standard deviation of each channel over pieces of a segment.
 

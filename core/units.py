@@ -21,11 +21,6 @@ def rad_s_from_rpm(speed_rpm: float) -> float:
     return speed_rpm * 2.0 * math.pi / 60.0
 
 
-def m_from_um(length_um: float) -> float:
-    """Micrometres to metres."""
-    return length_um * 1e-6
-
-
 def um_from_m(length_m: float) -> float:
     """Metres to micrometres."""
     return length_m * 1e6

@@ -4,8 +4,6 @@ import dataclasses
 from collections.abc import Callable
 from typing import TypeAlias
 
-import numpy as np
-
 from acquisition.modbus.ring_layout import U32
 from acquisition.modbus.slot import Slot
 
@@ -63,15 +61,3 @@ class Repetition:
         if self._before is None:
             return slot
         return dataclasses.replace(self._before, sequence=slot.sequence, trailer=slot.trailer)
-
-
-class RandomLoss:
-    """Drop slots at random, the same ones for the same seed."""
-
-    def __init__(self, probability: float, seed: int) -> None:
-        self._probability = probability
-        self._random = np.random.default_rng(seed)
-
-    def __call__(self, slot: Slot) -> Slot | None:
-        """Let a slot through, or not."""
-        return None if self._random.random() < self._probability else slot

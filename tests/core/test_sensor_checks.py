@@ -9,7 +9,7 @@ import pytest
 
 from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
 from core.sensor_checks import (
-    DEFAULT_LIMITS,
+    SensorLimits,
     axes_quality,
     backward_share,
     checked_speed,
@@ -20,6 +20,7 @@ from core.sensor_checks import (
     stationarity,
 )
 
+LIMITS = SensorLimits()
 RANDOM = np.random.default_rng(5)
 MM_S_PER_COUNT = 10.0 / 32768
 N_SAMPLES = 8192
@@ -28,7 +29,7 @@ N_SAMPLES = 8192
 def judged(samples: npt.NDArray[np.floating], turning: bool = True) -> Quality:
     counts = np.rint(samples / MM_S_PER_COUNT) * MM_S_PER_COUNT
     rms = float(quietest_rms(counts[np.newaxis])[0])
-    return signal_quality(rms, float(counts.mean()), MM_S_PER_COUNT, turning, DEFAULT_LIMITS)
+    return signal_quality(rms, float(counts.mean()), MM_S_PER_COUNT, turning, LIMITS)
 
 
 def test_of_eight_samples_or_more_a_healthy_channel_moves_by_more_than_a_count() -> None:
@@ -64,7 +65,7 @@ def test_a_channel_that_stops_within_a_segment_is_seen_in_that_segment(from_samp
 def test_a_resolution_may_be_unknown_or_negative(
     rms: float, mean: float, per_count: float, quality: Quality
 ) -> None:
-    assert signal_quality(rms, mean, per_count, True, DEFAULT_LIMITS) == quality
+    assert signal_quality(rms, mean, per_count, True, LIMITS) == quality
 
 
 TURNS = np.arange(N_SAMPLES) / 390.0
@@ -110,26 +111,26 @@ def test_the_share_of_an_orbit_that_turns_backward(x: complex, y: complex, expec
 
 def test_swapped_axes_turn_an_orbit_against_the_shaft() -> None:
     forward, swapped = share(2, -1j), share(-1j, 2)
-    assert axes_quality(forward, 1, DEFAULT_LIMITS) == GOOD
-    assert axes_quality(swapped, 1, DEFAULT_LIMITS) == uncertain(Reason.SWAPPED_AXES)
-    assert axes_quality(swapped, -1, DEFAULT_LIMITS) == GOOD
-    assert axes_quality(forward, -1, DEFAULT_LIMITS) == uncertain(Reason.SWAPPED_AXES)
-    assert axes_quality(share(1, 0.2), 1, DEFAULT_LIMITS) == GOOD
+    assert axes_quality(forward, 1, LIMITS) == GOOD
+    assert axes_quality(swapped, 1, LIMITS) == uncertain(Reason.SWAPPED_AXES)
+    assert axes_quality(swapped, -1, LIMITS) == GOOD
+    assert axes_quality(forward, -1, LIMITS) == uncertain(Reason.SWAPPED_AXES)
+    assert axes_quality(share(1, 0.2), 1, LIMITS) == GOOD
 
 
 def test_a_speed_no_turbine_reaches_is_none_and_one_that_the_1x_line_contradicts_in_doubt() -> None:
     for speed_rpm in (-5.0, 300.0, 65535.0):
-        checked = checked_speed(Reading(speed_rpm), None, 92.3, DEFAULT_LIMITS)
+        checked = checked_speed(Reading(speed_rpm), None, 92.3, LIMITS)
         assert checked == missing(Reason.SPEED_IMPLAUSIBLE)
     told = Reading(92.3)
-    assert checked_speed(told, 92.2, 92.3, DEFAULT_LIMITS) == told
-    assert checked_speed(told, 92.0, 92.3, DEFAULT_LIMITS) != told
-    assert checked_speed(told, 92.0, 92.3, DEFAULT_LIMITS, u_line=0.001) == told
-    assert checked_speed(told, None, 92.3, DEFAULT_LIMITS) == told
-    doubted = checked_speed(told, 88.0, 92.3, DEFAULT_LIMITS)
+    assert checked_speed(told, 92.2, 92.3, LIMITS) == told
+    assert checked_speed(told, 92.0, 92.3, LIMITS) != told
+    assert checked_speed(told, 92.0, 92.3, LIMITS, u_line=0.001) == told
+    assert checked_speed(told, None, 92.3, LIMITS) == told
+    doubted = checked_speed(told, 88.0, 92.3, LIMITS)
     assert doubted == Reading(92.3, uncertain(Reason.SPEED_IMPLAUSIBLE))
     nothing = missing(Reason.NOT_MEASURED)
-    assert checked_speed(nothing, 92.3, 92.3, DEFAULT_LIMITS) == nothing
+    assert checked_speed(nothing, 92.3, 92.3, LIMITS) == nothing
 
 
 STILL = np.full(24, 92.3)
@@ -138,25 +139,25 @@ FULL = np.full(24, 700.0)
 
 def test_ordinary_wander_is_stationary_and_a_load_change_or_a_run_down_is_not() -> None:
     swing = np.sin(np.arange(24.0))
-    assert stationarity(92.3 * (1 + 0.003 * swing), FULL + 8 * swing, DEFAULT_LIMITS) == GOOD
-    assert stationarity(STILL, 2.0 * swing, DEFAULT_LIMITS, 700.0) == GOOD
-    assert stationarity(np.array([]), np.array([]), DEFAULT_LIMITS) == GOOD
+    assert stationarity(92.3 * (1 + 0.003 * swing), FULL + 8 * swing, LIMITS) == GOOD
+    assert stationarity(STILL, 2.0 * swing, LIMITS, 700.0) == GOOD
+    assert stationarity(np.array([]), np.array([]), LIMITS) == GOOD
     moved = uncertain(Reason.NON_STATIONARY)
-    assert stationarity(STILL, np.linspace(320.0, 400.0, 24), DEFAULT_LIMITS) == moved
-    assert stationarity(np.linspace(92.3, 80.0, 24), FULL, DEFAULT_LIMITS) == moved
+    assert stationarity(STILL, np.linspace(320.0, 400.0, 24), LIMITS) == moved
+    assert stationarity(np.linspace(92.3, 80.0, 24), FULL, LIMITS) == moved
     some = np.array([math.nan, 700.0, 500.0])
-    assert stationarity(STILL, some, DEFAULT_LIMITS) == moved
+    assert stationarity(STILL, some, LIMITS) == moved
 
 
 def test_a_load_change_is_a_share_of_the_rated_power_and_an_unknown_load_is_not_steady() -> None:
     """Two thirds of a 15 MW unit's power are 10 MW."""
     moved, unknown = uncertain(Reason.NON_STATIONARY), uncertain(Reason.POWER_UNKNOWN)
     small = np.linspace(15.0, 5.0, 24)
-    assert stationarity(STILL, small, DEFAULT_LIMITS, 15.0) == moved
-    assert stationarity(STILL, small / 20.0, DEFAULT_LIMITS, 15.0) == GOOD
-    stricter = replace(DEFAULT_LIMITS, max_power_change=0.03)
+    assert stationarity(STILL, small, LIMITS, 15.0) == moved
+    assert stationarity(STILL, small / 20.0, LIMITS, 15.0) == GOOD
+    stricter = replace(LIMITS, max_power_change=0.03)
     assert stationarity(STILL, small / 20.0, stricter, 15.0) == moved
     lost = np.where(np.arange(24) < 20, 700.0, math.nan)
-    assert stationarity(STILL, lost, DEFAULT_LIMITS, 700.0) == unknown
-    assert stationarity(STILL, np.full(24, math.nan), DEFAULT_LIMITS, 700.0) == unknown
-    assert stationarity(STILL, lost[::-1], DEFAULT_LIMITS, 700.0) == GOOD
+    assert stationarity(STILL, lost, LIMITS, 700.0) == unknown
+    assert stationarity(STILL, np.full(24, math.nan), LIMITS, 700.0) == unknown
+    assert stationarity(STILL, lost[::-1], LIMITS, 700.0) == GOOD

@@ -9,7 +9,7 @@ from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 
 from .conftest import WIRE, Start
 
@@ -51,10 +51,10 @@ async def tcp_server(reply: bytes) -> AsyncIterator[int]:
         await server.wait_closed()
 
 
-def ring(counting_feed: Feed, n_channels: int = N_CHANNELS, **server: Any) -> ModbusRingServer:
+def ring(counting_feed: Feed, n_channels: int = N_CHANNELS, **server: Any) -> ModbusTcpServer:
     """A device that stands still: its header stays as a test leaves it."""
     device = RingDevice(counting_feed(n_channels, RATE_HZ, slow=(45.0,) * N_SLOW))
-    return ModbusRingServer(device, **server)
+    return ModbusTcpServer(device, **server)
 
 
 async def test_each_wrong_daq_is_named_and_shows_no_number_and_one_that_comes_up_is_found(

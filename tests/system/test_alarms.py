@@ -13,7 +13,7 @@ from rigs.command_line import padwatch
 
 from acquisition.clock import SystemClock
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.raw import RawBlock, RawFeed
 from acquisition.recording.reader import open_recording
 from service.settings.loading import load_plant_file
@@ -65,7 +65,7 @@ class BreakableFeed:
 @asynccontextmanager
 async def plugged_in(feed: RawFeed) -> AsyncIterator[int]:
     """A DAQ with this machine behind it, at its own pace; the port it listens on."""
-    async with ModbusRingServer(RingDevice(feed), SystemClock()) as server:
+    async with ModbusTcpServer(RingDevice(feed), SystemClock()) as server:
         running = asyncio.create_task(server.run())
         try:
             yield server.port

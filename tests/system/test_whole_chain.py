@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.scenario import (
@@ -91,7 +91,7 @@ async def read_over_modbus(
     n_hops = duration_s * 600 // AnalysisSettings().hop_samples
     monitor = UnitMonitor(machine, AnalysisSettings(n_segments=n_hops))
     newest: dict[str, Assessment] = {}
-    async with ModbusRingServer(device) as server:
+    async with ModbusTcpServer(device) as server:
         settings = ModbusRingSettings(transport=TcpTransport(host="127.0.0.1", port=server.port))
         source = ModbusRingSource(settings, calibration, UnpacedClock(device))
         async with source.connect() as blocks:

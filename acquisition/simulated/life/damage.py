@@ -22,14 +22,6 @@ class DamageKind(StrEnum):
     ACCELEROMETER_GAIN = "accelerometer_gain"
 
 
-FILM_DAMAGE = frozenset(
-    {
-        DamageKind.STIFFNESS_LOSS,
-        DamageKind.CLEARANCE_GROWTH,
-        DamageKind.PIVOT_WEAR,
-        DamageKind.OIL_DEGRADATION,
-    }
-)
 GAINS = frozenset({DamageKind.PROBE_GAIN, DamageKind.ACCELEROMETER_GAIN})
 
 

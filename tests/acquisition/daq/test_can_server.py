@@ -18,7 +18,7 @@ from acquisition.daq.can_device import CanDevice
 from acquisition.daq.can_shape import CanShape, DaqSignal, dbc_name
 from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import RtuRingServer
+from acquisition.daq.rtu_server import ModbusRtuServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.raw import FeedEndedError
 
@@ -212,7 +212,7 @@ def test_every_number_of_channels_fits(numbers, n_slow, fd, floats):
 def serve(request, counting_feed, counts_calibration):
     def served(link: Path):
         if request.param == "modbus":
-            return RtuRingServer(RingDevice(counting_feed()), link=link)
+            return ModbusRtuServer(RingDevice(counting_feed()), link=link)
         shape = shape_of(counts_calibration(), fd=False)
         return SlcanPtyServer(CanDevice(counting_feed(), shape), link=link)
 

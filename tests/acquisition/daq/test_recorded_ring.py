@@ -10,8 +10,9 @@ from acquisition.calibration import UnitCalibration
 from acquisition.clock import SystemClock
 from acquisition.daq.reading_watch import ReadingWatch
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer, RtuRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.rtu_server import ModbusRtuServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_layout import RingLayout
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
@@ -75,9 +76,13 @@ async def replayed(server, calibration: UnitCalibration) -> list[SampleBlock]:
 SETTINGS = RingDeviceSettings(n_slots=8)
 
 
-@pytest.fixture(params=[ModbusRingServer, RtuRingServer], ids=["tcp", "rtu"])
+@pytest.fixture(params=[ModbusTcpServer, ModbusRtuServer], ids=["tcp", "rtu"])
 def serve(request):
-    return lambda device: request.param(device, on_demand=True)
+    def server(device: RingDevice):
+        device.on_demand = True
+        return request.param(device)
+
+    return server
 
 
 PIECES = ((1, 0, 130), (1, 275, 1000), (1, 9000, 29_000), (2, 20, 400), (9, 5000, 5300))
@@ -131,7 +136,7 @@ def test_a_restart_of_the_recording_takes_no_time():
 
 async def test_a_paced_server_ends_with_its_recording_when_nobody_reads(stepped_clock):
     device = RingDevice(PiecewiseFeed((1, 0, 500)), settings=SETTINGS)
-    async with ModbusRingServer(device, stepped_clock) as server:
+    async with ModbusTcpServer(device, stepped_clock) as server:
         await server.run()
     assert device.ended
     assert device.ledger.n_samples("U1") == 500
@@ -176,14 +181,16 @@ def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read() -> No
 
 async def test_a_patient_server_loses_nothing_however_fast_its_clock(counts_calibration):
     device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
-    async with ModbusRingServer(device, Hurry(), patient=True) as server:
+    device.patient = True
+    async with ModbusTcpServer(device, Hurry(), patient=True) as server:
         blocks = await replayed(server, counts_calibration())
     assert_recorded(blocks, FOUND)
 
 
 async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(counts_calibration):
     device = RingDevice(PiecewiseFeed((1, 0, 20_000)), settings=SETTINGS)
-    async with ModbusRingServer(device, Hurry(), patient=True) as server:
+    device.patient = True
+    async with ModbusTcpServer(device, Hurry(), patient=True) as server:
         async with source_of(server, counts_calibration()).connect() as stream:
             before = await anext(stream)
         after = await replayed(server, counts_calibration())
@@ -198,7 +205,7 @@ async def test_a_device_whose_recording_has_ended_stands_still(counts_calibratio
     device.restart()
     assert (device.newest, device.ended) == (1, True)
     assert device.ledger.n_samples("U1") == 100
-    async with ModbusRingServer(device) as server:
+    async with ModbusTcpServer(device) as server:
         source = source_of(server, counts_calibration(), poll_period_s=0.001, stale_after_s=0.05)
         async with source.connect() as stream:
             await anext(stream)

@@ -12,8 +12,9 @@ from acquisition.daq import faults
 from acquisition.daq.ledger import Ledger
 from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer, RtuRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.rtu_server import ModbusRtuServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.profile import decode_header
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
@@ -63,7 +64,7 @@ class Turnstile:
 async def test_a_paced_device_keeps_to_the_clock_however_late_it_wakes(device):
     clock = Turnstile()
     slot_s = device.layout.slot_duration_s
-    async with ModbusRingServer(device, clock):
+    async with ModbusTcpServer(device, clock):
         await clock.first_sleep()
         for n_slots in (1.25, 0.9, 7.3, 30.05, 0.7):
             await clock.turn(n_slots * slot_s)
@@ -73,7 +74,7 @@ async def test_a_paced_device_keeps_to_the_clock_however_late_it_wakes(device):
 
 async def test_a_device_samples_on_while_nobody_serves_it(device):
     clock = Turnstile()
-    server = ModbusRingServer(device, clock)
+    server = ModbusTcpServer(device, clock)
     async with server:
         await clock.first_sleep()
     port = server.port
@@ -86,9 +87,9 @@ async def test_a_device_samples_on_while_nobody_serves_it(device):
 
 
 async def test_a_port_in_use_is_an_error_that_names_it(counting_feed):
-    async with ModbusRingServer(RingDevice(counting_feed())) as first:
+    async with ModbusTcpServer(RingDevice(counting_feed())) as first:
         with pytest.raises(LinkError, match=f"cannot listen on 127.0.0.1:{first.port}"):
-            async with ModbusRingServer(RingDevice(counting_feed()), port=first.port):
+            async with ModbusTcpServer(RingDevice(counting_feed()), port=first.port):
                 pass
 
 
@@ -101,7 +102,7 @@ async def test_what_stops_the_feed_reaches_whoever_runs_the_server(counting_feed
 
     feed.advance = ends
     clock = Turnstile()
-    async with ModbusRingServer(device, clock) as server:
+    async with ModbusTcpServer(device, clock) as server:
         await clock.first_sleep()
         await clock.step(9.0)
         with pytest.raises(EOFError, match="recording has ended"):
@@ -113,7 +114,7 @@ async def plain_client(counting_feed):
     """Connect pymodbus' own client to a served device: an independent reader."""
     device = RingDevice(counting_feed(), settings=RingDeviceSettings(n_slots=4))
     async with (
-        ModbusRingServer(device) as server,
+        ModbusTcpServer(device) as server,
         AsyncModbusTcpClient("127.0.0.1", port=server.port, retries=0) as client,
     ):
         yield client, device, server
@@ -172,17 +173,6 @@ def test_a_restarted_device_has_an_empty_ring_and_counts_from_zero(device):
     assert slot_in(device, 1).blank
 
 
-def test_random_loss_is_the_same_for_the_same_seed(counting_feed):
-    def lost(seed: int) -> list[int]:
-        device = RingDevice(counting_feed())
-        device.fault = faults.RandomLoss(0.3, seed)
-        device.produce(40)
-        return [s for s in range(1, 41) if slot_in(device, s).blank]
-
-    assert lost(1) == lost(1) != lost(2)
-    assert 2 < len(lost(1)) < 30
-
-
 def test_a_ring_that_does_not_fit_into_the_address_space_is_refused(counting_feed):
     with pytest.raises(ConfigError, match="end of the ring is"):
         RingDevice(counting_feed(n_channels=12), settings=RingDeviceSettings(n_slots=200))
@@ -202,9 +192,9 @@ def device(counting_feed) -> RingDevice:
     return RingDevice(counting_feed())
 
 
-@pytest.fixture(params=[ModbusRingServer, RtuRingServer], ids=["tcp", "rtu"])
+@pytest.fixture(params=[ModbusTcpServer, ModbusRtuServer], ids=["tcp", "rtu"])
 async def server(request, device, tmp_path):
-    extra = {"link": tmp_path / "line"} if request.param is RtuRingServer else {}
+    extra = {"link": tmp_path / "line"} if request.param is ModbusRtuServer else {}
     async with request.param(device, **extra) as server:
         yield server
 

@@ -12,7 +12,6 @@ from acquisition.clock import SystemClock
 from acquisition.daq.map_device import MapDevice
 from acquisition.daq.register_memory import RegisterMemory
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.daq.rtu_server import ModbusRtuServer
 from acquisition.daq.tcp_server import ModbusTcpServer
@@ -44,8 +43,8 @@ def device(counting_feed) -> RingDevice:
 
 
 @pytest.fixture
-async def server(device) -> AsyncIterator[ModbusRingServer]:
-    async with ModbusRingServer(device) as server:
+async def server(device) -> AsyncIterator[ModbusTcpServer]:
+    async with ModbusTcpServer(device) as server:
         yield server
 
 

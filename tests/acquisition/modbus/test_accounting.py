@@ -9,8 +9,8 @@ from rigs.tiers import fast_and_long
 
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.tcp_server import ModbusTcpServer
 from core.blocks import SampleBlock
 
 N_SLOTS = 16
@@ -89,7 +89,7 @@ async def test_every_injected_gap_is_found_and_counted_exactly(
     device = RingDevice(counting_feed(n_channels=1), settings=settings)
     plant = LossyPlant(device, seed=20261121)
     blocks: list[SampleBlock] = []
-    async with ModbusRingServer(device) as server:
+    async with ModbusTcpServer(device) as server:
         source = source_at(server.port, calibration=counts_calibration(n_channels=1))
         while plant.n_gaps < n_gaps:
             async with source.connect() as stream:

@@ -12,7 +12,7 @@ from rigs.hostile_modbus import HostileServer
 from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.link import ModbusLink
@@ -87,7 +87,7 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
 
 @pytest.mark.parametrize("done", ["a reply", "a connection"])
 async def test_what_is_done_with_the_stop_does_not_undo_it(done, counting_feed, link_to):
-    async with ModbusRingServer(RingDevice(counting_feed())) as server:
+    async with ModbusTcpServer(RingDevice(counting_feed())) as server:
         link = link_to(server.port)
         if done == "a reply":
             await link.open()

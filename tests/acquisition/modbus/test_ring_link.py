@@ -7,8 +7,8 @@ from acquisition.arrival import Arrival
 from acquisition.clock_estimate import ClockEstimate
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_pace import out_of_step_s
 from core.alarms.conditions import drift_reading
@@ -108,7 +108,7 @@ async def test_samples_that_a_ring_has_kept_come_bit_by_bit(counting_feed, sourc
         asked.append(address)
         return read(address, count)
 
-    async with ModbusRingServer(device) as server:
+    async with ModbusTcpServer(device) as server:
         source = source_at(server.port)
         async with source.connect() as stream:
             await anext(stream)

@@ -6,8 +6,8 @@ import pytest
 from acquisition.clock import SystemClock
 from acquisition.daq import faults
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import LinkError
 from acquisition.modbus.profile import RingHeader, encode_header
 from acquisition.modbus.slot import encode_slot
@@ -41,7 +41,7 @@ async def test_a_slot_with_a_wrong_stamp_keeps_its_samples_and_says_so(
 async def test_a_device_clock_that_was_set_costs_no_sample(counting_feed, source_at, read_until):
     feed = counting_feed(n_channels=3)
     device = RingDevice(feed)
-    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
+    async with ModbusTcpServer(device) as server, source_at(server.port).connect() as stream:
         first = await anext(stream)
         feed._start_ns += 3600 * 10**9
         device.produce(3)
@@ -121,7 +121,7 @@ async def test_wrapping_counters_and_padding_between_slots_leave_no_trace(
     start = shape.get("first_index", 0)
     settings = RingDeviceSettings(n_slots=8, **shape)
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
-    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
+    async with ModbusTcpServer(device) as server, source_at(server.port).connect() as stream:
         blocks = [await anext(stream)]
         for n in range(1, 5):
             device.produce(3)
@@ -133,7 +133,7 @@ async def test_wrapping_counters_and_padding_between_slots_leave_no_trace(
 async def test_a_channel_the_device_calls_broken_is_bad_from_that_slot_on(counting_feed, source_at):
     feed = counting_feed(n_channels=3)
     device = RingDevice(feed)
-    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
+    async with ModbusTcpServer(device) as server, source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(1)
         feed.ok = (True, False, True)
@@ -149,7 +149,7 @@ async def test_more_slow_values_than_fit_one_read_arrive_in_order(
 ):
     feed = counting_feed(n_channels=3, slow=tuple(float(i) for i in range(80)))
     device = RingDevice(feed)
-    async with ModbusRingServer(device) as server:
+    async with ModbusTcpServer(device) as server:
         source = source_at(server.port, calibration=counts_calibration(n_channels=3, n_slow=80))
         async with source.connect() as stream:
             block = await anext(stream)
@@ -221,7 +221,7 @@ async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
 ):
     settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000)
     device = RingDevice(counting_feed(n_channels=3), settings=settings)
-    async with ModbusRingServer(device) as server, source_at(server.port).connect() as stream:
+    async with ModbusTcpServer(device) as server, source_at(server.port).connect() as stream:
         before = await anext(stream)
         device.first_sequence = 0
         device.restart(next_epoch=False)

@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 from acquisition.calibration import SlowCalibration, UnitCalibration
 from acquisition.daq.map_device import MapDevice
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.raw import RawBlock
 from service.cli.probe import app
@@ -126,7 +125,7 @@ async def test_a_flagged_value_is_shown_with_its_word(probe, server, gateway) ->
 async def test_a_block_ring_is_decoded_by_its_own_header(probe, counting_feed) -> None:
     device = RingDevice(counting_feed(n_channels=3, slow=(92.25, float("nan"))))
     device.produce(4)
-    async with ModbusRingServer(device) as server:
+    async with ModbusTcpServer(device) as server:
         table, rows = await probe("ring", at(server)), await probe("ring", at(server), "--json")
         other = await probe("ring", at(server), "--base-address", "1")
 

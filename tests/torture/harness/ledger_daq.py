@@ -24,8 +24,8 @@ import uvloop
 from acquisition.clock import FastClock, SystemClock
 from acquisition.daq.ledger import Ledger
 from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_server import ModbusRingServer
 from acquisition.daq.ring_shape import RingDeviceSettings
+from acquisition.daq.tcp_server import ModbusTcpServer
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.tape import environment, python
 from service.daq_program import run_daq
@@ -62,7 +62,7 @@ def main() -> None:
             )
             device = RingDevice(LedgerFeed(plant, number, t0_ns), unit, settings, ledger)
             device.identification = {0: b"Ledger", 1: unit.encode("ascii"), 2: b"1"}
-            servers[unit] = ModbusRingServer(device, clock)
+            servers[unit] = ModbusTcpServer(device, clock)
         uvloop.run(run_daq(servers, lambda line: print(line, flush=True), controlled=True))
 
 
