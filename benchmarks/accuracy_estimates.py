@@ -9,11 +9,12 @@ from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.dynamic import dynamic_stiffness
 from core.dynamic_settings import DynamicSettings
 from core.excitation import LineLimits, line_excitation
+from core.machine import BearingAccuracy
 from core.quality import Reason
 from core.segments import ORDER1, VORTEX
 from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
 from core.transfer import line_transfer
-from core.uncertainty import BearingAccuracy, Budget
+from core.uncertainty import Budget
 
 LINES = {"1×": ORDER1, "vortex": VORTEX}
 AXES = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}

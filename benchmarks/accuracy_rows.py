@@ -8,11 +8,10 @@ from acquisition.simulated.scenario import BearingScenario, HydraulicNoise, Scen
 from benchmarks.accuracy_plant import IDEAL, REALISTIC, Run, Transducers
 from core.excitation import LineLimits
 from core.film import DAMPING_OVER_STIFFNESS_S, Film
-from core.machine import Measurand
+from core.machine import BearingAccuracy, Measurand
 from core.rotor import bearing_response, forward_force, rotor_matrices
 from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
 from core.transducer_response import HighPass, Response
-from core.uncertainty import BearingAccuracy
 from service.validation import paper
 
 MINUTE_S = 60.0

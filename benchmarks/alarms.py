@@ -15,11 +15,11 @@ import numpy as np
 
 from acquisition.calibration import calibrate
 from acquisition.clock import SystemClock
-from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
 from core.device_clock import DeviceClock
+from core.limits import Limits
 from core.quality import GOOD, Reading, Reason, bad
 from service.conversion import calibration_of, machine_of
 from service.origin import Origin

@@ -32,13 +32,12 @@ from core.cross_spectrum import (
 )
 from core.dynamic import DynamicStiffness, dynamic_stiffness
 from core.dynamic_settings import DynamicSettings
-from core.machine import Measurand, Unit
+from core.machine import BearingAccuracy, Measurand, Unit
 from core.quality import GOOD, Reading
 from core.segments import ORDER1, VORTEX, SegmentTransform
 from core.settings import AnalysisSettings
 from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
 from core.transfer import line_transfer
-from core.uncertainty import BearingAccuracy
 from core.whirl import whirl
 
 REQUIRED_RATIO = 300.0

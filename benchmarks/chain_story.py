@@ -29,10 +29,10 @@ from core.condition.operating_state import (
     Operation,
     advance,
 )
-from core.estimators import Estimator
 from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_reading import FilmReading, FilmValue
 from core.films.film_rules import FilmRules
+from core.machine import Estimator
 from core.quality import Reason
 from core.stiffness_history import Evidence
 from core.units import ns_from_s

@@ -17,9 +17,8 @@ from acquisition.simulated.unit import SimulatedUnit
 from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.estimators import Estimator
 from core.films.film_reading import FilmReading, film_reading
-from core.machine import Bearing, Channel, Measurand, Unit
+from core.machine import Bearing, Channel, Estimator, Measurand, Unit
 from core.monitor import UnitMonitor
 from core.rotor_parameters import RotorParameters
 from core.settings import AnalysisSettings

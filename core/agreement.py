@@ -14,15 +14,9 @@ import numpy as np
 from core.arrays import FloatArray
 from core.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.dynamic import DynamicStiffness
-from core.stiffness_budget import (
-    BEARING_GAIN,
-    BRACKET,
-    CROSS_COUPLING,
-    SHAFT_GAIN,
-    STATISTICS,
-)
+from core.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, STATISTICS
 from core.transfer import motion_across
-from core.uncertainty import Budget, Kind, coverage_factor, random_line
+from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line
 
 FALSE_ALARM = 1e-6
 """Probability that chance alone makes two estimates differ. A bearing has some 100,000 independent

@@ -19,3 +19,7 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 """Phasors and transforms."""
+
+
+TimeArray: TypeAlias = npt.NDArray[np.int64]
+"""Nanoseconds since 1970, UTC."""

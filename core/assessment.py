@@ -7,7 +7,7 @@ from enum import StrEnum
 from core.arrays import SampleArray
 from core.condition.bearing_condition import BearingCondition
 from core.cross_spectrum import CrossSpectrum
-from core.estimators import Estimator
+from core.machine import Estimator
 from core.quality import Quality, Reading
 from core.recent import RecentReadings
 from core.runout import RunoutVerdict

@@ -18,10 +18,10 @@ from core.cross_spectrum import (
     average,
 )
 from core.dynamic import DynamicStiffness
-from core.estimators import Estimator, preferred_stiffness
+from core.estimators import preferred_stiffness
 from core.film_results import film_results
 from core.line_results import OrderLine, other_line_hz
-from core.machine import Bearing, Unit
+from core.machine import Bearing, Estimator, Unit
 from core.overall_results import overall_results, phase_results
 from core.polarity import signs_checked
 from core.position_results import position_results, slow_channels, slow_results

@@ -4,68 +4,20 @@ The random part comes from how far segments or polls differ among themselves.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import ComplexArray
 from core.cross_spectrum import BEARING_X, BEARING_Y
 from core.machine import Bearing
-from core.quality import Reading
-from core.stiffness_budget import BEARING_GAIN, RUNOUT, SHAFT_GAIN
-from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
-
-SCATTER = "scatter"
-
-MIN_EFFECTIVE = 2.0
-
-
-def effective_number(values: FloatArray) -> float:
-    """How many independent values would say as much as these (n,), at least 2 of 2 or more.
-
-    Segments overlap, and what they show wanders: neighbours share much. For a first-order process
-    ``n (1 - r) / (1 + r)`` are left, r the correlation of neighbours (Bayley and Hammersley 1946);
-    negative ones are taken for chance.
-    """
-    if values.size <= MIN_EFFECTIVE:
-        return float(values.size)
-    rest = values - values.mean()
-    power = float(rest @ rest)
-    r = max(float(rest[1:] @ rest[:-1]) / power, 0.0) if power > 0.0 else 0.0
-    return max(MIN_EFFECTIVE, values.size * (1.0 - r) / (1.0 + r))
-
-
-def mean_budget(
-    value: float,
-    values: Sequence[float] | FloatArray,
-    systematic: tuple[BudgetLine, ...] = (),
-    sensitivity: float = 1.0,
-) -> Budget | None:
-    """Uncertainty of a mean, or of what is calculated from one.
-
-    Parameters
-    ----------
-    value
-        The result.
-    values : (n,)
-        What the mean is of, oldest first.
-    systematic
-        What stays from one averaging time to the next.
-    sensitivity
-        Change of the result per change of the mean.
-
-    Returns
-    -------
-    None where fewer than two values are known, or where they never differ: a transmitter that
-    repeats itself says nothing of how well it measures.
-    """
-    known = np.asarray(values, dtype=np.float64)
-    if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
-        return None
-    n_effective = effective_number(known)
-    standard = abs(sensitivity) * float(np.std(known, ddof=1)) / math.sqrt(n_effective)
-    return Budget(value, (random_line(SCATTER, standard, n_effective - 1.0), *systematic))
+from core.stiffness_budget import BEARING_GAIN, RUNOUT
+from core.uncertainty import (
+    SHAFT_GAIN,
+    Budget,
+    BudgetLine,
+    mean_budget,
+    systematic_line,
+)
 
 
 def amplitude_budget(
@@ -111,33 +63,3 @@ def phase_lines(runout_um_pk: float, amplitude_um_pk: float) -> tuple[BudgetLine
     """What stays the same in a phase, deg: runout turns a vector by so much at most."""
     turned = math.asin(min(1.0, runout_um_pk / amplitude_um_pk))
     return (systematic_line(RUNOUT, math.degrees(turned), 1.0),)
-
-
-def numbers(readings: Sequence[Reading]) -> FloatArray:
-    """Of those that have one."""
-    return np.array([r.value for r in readings if r.value is not None], np.float64)
-
-
-def with_budgets(
-    readings: Mapping[str, Reading], found: Mapping[str, Budget | None]
-) -> tuple[dict[str, Reading], dict[str, Budget]]:
-    """Readings that have a number with their uncertainty, and the budgets that say so."""
-    budgets = {
-        name: budget
-        for name, budget in found.items()
-        if budget is not None and readings[name].value is not None
-    }
-    told = {name: stated(reading, budgets.get(name)) for name, reading in readings.items()}
-    return told, budgets
-
-
-def stated(reading: Reading, budget: Budget | None) -> Reading:
-    """The reading with the uncertainty of a budget, where there is one."""
-    if budget is None:
-        return reading
-    return replace(
-        reading,
-        u_random=budget.random,
-        u_systematic=budget.systematic,
-        interval_95=budget.interval,
-    )

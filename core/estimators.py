@@ -3,30 +3,9 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from enum import StrEnum
 
+from core.machine import Estimator
 from core.quality import Reading, Reason, missing, worst
-
-
-class Estimator(StrEnum):
-    """Where a stiffness may come from. The names appear in settings, API and store."""
-
-    DYNAMIC = "dynamic"
-    TRANSFER_ORDER1 = "transfer_order1"
-    TRANSFER_VORTEX = "transfer_vortex"
-    RATIO_ORDER1 = "ratio_order1"
-    RATIO_VORTEX = "ratio_vortex"
-
-
-PREFERENCE = (
-    Estimator.DYNAMIC,
-    Estimator.TRANSFER_VORTEX,
-    Estimator.TRANSFER_ORDER1,
-    Estimator.RATIO_VORTEX,
-    Estimator.RATIO_ORDER1,
-)
-"""`dynamic` needs no line and is blind to runout; the vortex is off the harmonics, where runout is;
-equation (5) includes damping and grows with bearing noise."""
 
 STIFFNESS_OF = {
     Estimator.DYNAMIC: "dynamic_k_{axes}_n_per_m",

@@ -8,15 +8,13 @@ from core.agreement import FALSE_ALARM
 from core.cross_spectrum import CrossSpectrum
 from core.dynamic import DynamicStiffness, dynamic_stiffness
 from core.dynamic_settings import DynamicSettings
-from core.line_results import reading_of
 from core.machine import Bearing
-from core.quality import GOOD, Quality, Reading, Reason, missing, uncertain, worst
-from core.quantities import AXES
+from core.quality import AXES, GOOD, Quality, Reading, Reason, missing, uncertain, worst
 from core.stiffness_budget import (
     damping_half_width_n_s_per_m,
     dynamic_budgets,
 )
-from core.uncertainty import Budget, coverage_factor
+from core.uncertainty import Budget, coverage_factor, reading_of
 
 MAX_LACK_OF_FIT = 3.0
 """Beyond it the film is not constant over the band, or something shakes the bracket directly."""

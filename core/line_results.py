@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.channel_budget import amplitude_budget, amplitude_lines, with_budgets
+from core.channel_budget import amplitude_budget, amplitude_lines
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.excitation import LineLimits, chance_coherence, line_excitation
 from core.machine import Bearing
@@ -19,7 +19,7 @@ from core.settings import AnalysisSettings
 from core.spectral_statistics import independent_segments
 from core.stiffness_budget import ratio_budget, transfer_budgets
 from core.transfer import line_transfer
-from core.uncertainty import Budget
+from core.uncertainty import Budget, reading_of, with_budgets
 from core.whirl import roundness, vortex_frequency_hz
 
 FLOOR_REACH = 12
@@ -36,11 +36,6 @@ AMPLITUDES = {
     "bearing_x": BEARING_X,
     "bearing_y": BEARING_Y,
 }
-
-
-def reading_of(budget: Budget, quality: Quality) -> Reading:
-    """The result of a budget with its standard uncertainties."""
-    return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
 
 
 @dataclass(frozen=True)

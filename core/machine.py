@@ -5,11 +5,54 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from core.bracket import BracketDynamics
-from core.estimators import PREFERENCE, Estimator
-from core.probe_axes import GapAccuracy
-from core.runout import SlowRollVector
 from core.transducer_response import Response
-from core.uncertainty import BearingAccuracy
+
+
+class Estimator(StrEnum):
+    """Where a stiffness may come from. The names appear in settings, API and store."""
+
+    DYNAMIC = "dynamic"
+    TRANSFER_ORDER1 = "transfer_order1"
+    TRANSFER_VORTEX = "transfer_vortex"
+    RATIO_ORDER1 = "ratio_order1"
+    RATIO_VORTEX = "ratio_vortex"
+
+
+PREFERENCE = (
+    Estimator.DYNAMIC,
+    Estimator.TRANSFER_VORTEX,
+    Estimator.TRANSFER_ORDER1,
+    Estimator.RATIO_VORTEX,
+    Estimator.RATIO_ORDER1,
+)
+"""`dynamic` needs no line and is blind to runout; the vortex is off the harmonics, where runout is;
+equation (5) includes damping and grows with bearing noise."""
+
+
+MAX_SLOW_ROLL_FRACTION = 0.25
+"""Share of the rated speed up to which unbalance forces (under 1/16) leave the surface alone."""
+
+
+@dataclass(frozen=True)
+class SlowRollVector:
+    """What one probe read at 1× at slow roll.
+
+    Parameters
+    ----------
+    probe
+        Serial number or mark of the probe; another probe, or this one moved, sees another surface.
+    phasor_um_pk
+        Displacement along the axis, relative to the mark on the shaft: its phase is that of the
+        reading when the mark passes the key-phase pick-up.
+    taken_ns
+        UTC.
+    """
+
+    channel: str
+    probe: str
+    phasor_um_pk: complex
+    speed_rpm: float
+    taken_ns: int
 
 
 class Measurand(StrEnum):
@@ -63,6 +106,81 @@ class Channel:
     ok_limits: tuple[float, float] = (-math.inf, math.inf)
     probe: str = ""
     slow_roll: SlowRollVector | None = None
+
+
+@dataclass(frozen=True)
+class GapAccuracy:
+    """How well gaps are known: half-widths of uniform distributions (GUM, 4.3.7).
+
+    Parameters
+    ----------
+    gain
+        Relative, of the change of a gap since its reference was read.
+    reference_um
+        Of a reference gap.
+    growth_um
+        Of thermal growth that was never measured.
+    growth_change_um
+        By which growth may have changed since it was last measured.
+    growth_asymmetry_um
+        By which growth along one axis may differ from that along the other.
+    clearance
+        Relative, of the radial clearance.
+    """
+
+    gain: float = 0.05
+    reference_um: float = 5.0
+    growth_um: float = 50.0
+    growth_change_um: float = 20.0
+    growth_asymmetry_um: float = 10.0
+    clearance: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 <= value < math.inf:
+                raise ValueError(f"{name} must be a half-width of zero or more, got {value}")
+
+
+@dataclass(frozen=True)
+class BearingAccuracy:
+    """How well a bearing's transducers and bracket are known: half-widths, uniform, as shares.
+
+    Parameters
+    ----------
+    shaft_gain
+        Class of the proximity probes, target material and mounting included.
+    bearing_gain
+        Class of the accelerometers or velocity transducers.
+    bracket_stiffness
+        Of the k_b that was measured or calculated.
+    bracket_mass
+        Of the mass, where one is given.
+    bracket_damping
+        Of the bracket, as a share of critical damping. Bolted and welded steel at working stress
+        has 0.02 to 0.03 (Newmark and Hall 1982, table 1).
+    delay_s
+        Of the delay between shaft and bearing channels, in s. Converters that sample together and
+        have the same filters stay within a tenth of a sample at 600 Hz.
+    cross_coupling
+        Cross-coupled over direct dynamic stiffness of the film, where it is not known: 0.33 to 1.11
+        in Brito et al., Table 4.
+    probe_noise
+        Of the noise density that is taken off the shaft spectra.
+    """
+
+    shaft_gain: float = 0.05
+    bearing_gain: float = 0.05
+    bracket_stiffness: float = 0.10
+    bracket_mass: float = 0.2
+    bracket_damping: float = 0.02
+    delay_s: float = 2e-4
+    cross_coupling: float = 0.3
+    probe_noise: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 <= value < 1.0:
+                raise ValueError(f"{name} must be a half-width from 0 to below 1, got {value}")
 
 
 @dataclass(frozen=True)

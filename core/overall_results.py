@@ -8,21 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import ComplexArray
-from core.channel_budget import (
-    amplitude_lines,
-    mean_budget,
-    numbers,
-    phase_budget,
-    phase_lines,
-    with_budgets,
-)
+from core.channel_budget import amplitude_lines, phase_budget, phase_lines
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.line_results import AMPLITUDES
 from core.machine import Bearing
 from core.quality import Quality, Reading, Reason, current_mean, missing, worst
 from core.recent import RecentReadings
 from core.segments import ORDER1, Segment
-from core.uncertainty import Budget
+from core.uncertainty import Budget, mean_budget, numbers, with_budgets
 from core.units import ns_from_s
 
 SHAFT_SPANS = {

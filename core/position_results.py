@@ -5,14 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from core.arrays import FloatArray
-from core.channel_budget import mean_budget, numbers, with_budgets
-from core.machine import Bearing, Measurand, Unit
-from core.probe_axes import GapAccuracy, Growth, ProbeAxis
+from core.machine import Bearing, GapAccuracy, Measurand, Unit
+from core.probe_axes import Growth, ProbeAxis
 from core.quality import NOT_TOLD, Reading, Reason, current_mean, missing
 from core.segments import Segment
 from core.shaft_centre import locate_shaft
-from core.stiffness_budget import SHAFT_GAIN
-from core.uncertainty import Budget, systematic_line
+from core.uncertainty import SHAFT_GAIN, Budget, mean_budget, numbers, systematic_line, with_budgets
 
 
 def position_results(

@@ -4,13 +4,13 @@ A gap that differs from its reference by d holds the shaft's displacement u and 
 housing grew together, g: d_near = g − u on the positive axis, d_far = g + u across the shaft.
 """
 
-import math
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 
 from core.arrays import FloatArray
+from core.machine import GapAccuracy
 from core.quality import Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
@@ -75,39 +75,6 @@ class Growth:
 
     value_um: float
     half_width_um: float
-
-
-@dataclass(frozen=True)
-class GapAccuracy:
-    """How well gaps are known: half-widths of uniform distributions (GUM, 4.3.7).
-
-    Parameters
-    ----------
-    gain
-        Relative, of the change of a gap since its reference was read.
-    reference_um
-        Of a reference gap.
-    growth_um
-        Of thermal growth that was never measured.
-    growth_change_um
-        By which growth may have changed since it was last measured.
-    growth_asymmetry_um
-        By which growth along one axis may differ from that along the other.
-    clearance
-        Relative, of the radial clearance.
-    """
-
-    gain: float = 0.05
-    reference_um: float = 5.0
-    growth_um: float = 50.0
-    growth_change_um: float = 20.0
-    growth_asymmetry_um: float = 10.0
-    clearance: float = 0.05
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"{name} must be a half-width of zero or more, got {value}")
 
 
 class ProbeAxes:

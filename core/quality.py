@@ -152,3 +152,6 @@ def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Rea
         return newest
     mean = mean_reading(usable)
     return replace(mean, quality=worst((mean.quality, uncertain(Reason.CLIPPED))))
+
+
+AXES = ("xx", "xy", "yx", "yy")

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from core.quality import AXES
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -30,8 +32,6 @@ class Quantity:
 
 LIVE = (True, False)
 STORED = (True, True)
-
-AXES = ("xx", "xy", "yx", "yy")
 
 
 def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:

@@ -8,30 +8,7 @@ import cmath
 from dataclasses import dataclass
 from enum import StrEnum
 
-MAX_SLOW_ROLL_FRACTION = 0.25
-"""Share of the rated speed up to which unbalance forces (under 1/16) leave the surface alone."""
-
-
-@dataclass(frozen=True)
-class SlowRollVector:
-    """What one probe read at 1× at slow roll.
-
-    Parameters
-    ----------
-    probe
-        Serial number or mark of the probe; another probe, or this one moved, sees another surface.
-    phasor_um_pk
-        Displacement along the axis, relative to the mark on the shaft: its phase is that of the
-        reading when the mark passes the key-phase pick-up.
-    taken_ns
-        UTC.
-    """
-
-    channel: str
-    probe: str
-    phasor_um_pk: complex
-    speed_rpm: float
-    taken_ns: int
+from core.machine import MAX_SLOW_ROLL_FRACTION, SlowRollVector
 
 
 class RunoutVerdict(StrEnum):

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from core.arrays import FloatArray
-from core.probe_axes import GapAccuracy, Growth, ProbeAxes, ProbeAxis
+from core.machine import GapAccuracy
+from core.probe_axes import Growth, ProbeAxes, ProbeAxis
 from core.quality import Level, Quality, Reading, Reason, missing, worst
 from core.uncertainty import Budget, systematic_line
 

@@ -8,11 +8,11 @@ import numpy as np
 from core.bracket import BracketDynamics
 from core.cross_spectrum import CrossSpectrum
 from core.dynamic import DynamicStiffness
+from core.machine import BearingAccuracy
 from core.transfer import LineTransfer, motion_across
-from core.uncertainty import BearingAccuracy, Budget, BudgetLine, random_line, systematic_line
+from core.uncertainty import SHAFT_GAIN, Budget, BudgetLine, random_line, systematic_line
 
 STATISTICS = "spectral statistics"
-SHAFT_GAIN = "gain of shaft probe"
 BEARING_GAIN = "gain of bearing transducer"
 BRACKET = "bracket stiffness"
 MASS = "bracket mass"

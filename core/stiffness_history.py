@@ -7,10 +7,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
-
-TimeArray: TypeAlias = npt.NDArray[np.int64]
-"""Nanoseconds since 1970, UTC."""
+from core.arrays import FloatArray, TimeArray
 
 CodeArray: TypeAlias = npt.NDArray[np.int8]
 """Members of an IntEnum, one byte each."""

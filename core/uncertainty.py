@@ -5,11 +5,15 @@ in a channel's own trend. A budget lists both and combines them.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import numpy as np
 from scipy.special import ndtri, stdtrit
+
+from core.arrays import FloatArray
+from core.quality import Quality, Reading
 
 CONFIDENCE = 0.95
 
@@ -95,48 +99,6 @@ class Budget:
         return _interval(self.value, [line for line in self.lines if line.kind is Kind.RANDOM])
 
 
-@dataclass(frozen=True)
-class BearingAccuracy:
-    """How well a bearing's transducers and bracket are known: half-widths, uniform, as shares.
-
-    Parameters
-    ----------
-    shaft_gain
-        Class of the proximity probes, target material and mounting included.
-    bearing_gain
-        Class of the accelerometers or velocity transducers.
-    bracket_stiffness
-        Of the k_b that was measured or calculated.
-    bracket_mass
-        Of the mass, where one is given.
-    bracket_damping
-        Of the bracket, as a share of critical damping. Bolted and welded steel at working stress
-        has 0.02 to 0.03 (Newmark and Hall 1982, table 1).
-    delay_s
-        Of the delay between shaft and bearing channels, in s. Converters that sample together and
-        have the same filters stay within a tenth of a sample at 600 Hz.
-    cross_coupling
-        Cross-coupled over direct dynamic stiffness of the film, where it is not known: 0.33 to 1.11
-        in Brito et al., Table 4.
-    probe_noise
-        Of the noise density that is taken off the shaft spectra.
-    """
-
-    shaft_gain: float = 0.05
-    bearing_gain: float = 0.05
-    bracket_stiffness: float = 0.10
-    bracket_mass: float = 0.2
-    bracket_damping: float = 0.02
-    delay_s: float = 2e-4
-    cross_coupling: float = 0.3
-    probe_noise: float = 0.2
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0.0 <= value < 1.0:
-                raise ValueError(f"{name} must be a half-width from 0 to below 1, got {value}")
-
-
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
     """Contribution of spectral statistics, in the unit of the result."""
     return BudgetLine(name, Kind.RANDOM, Distribution.NORMAL, standard, 1.0, freedoms)
@@ -166,3 +128,94 @@ def _interval(value: float, lines: Sequence[BudgetLine]) -> tuple[float, float]:
 
 def _root_sum(lines: Iterable[BudgetLine]) -> float:
     return math.sqrt(sum(line.contribution**2 for line in lines))
+
+
+SCATTER = "scatter"
+
+
+MIN_EFFECTIVE = 2.0
+
+
+def effective_number(values: FloatArray) -> float:
+    """How many independent values would say as much as these (n,), at least 2 of 2 or more.
+
+    Segments overlap, and what they show wanders: neighbours share much. For a first-order process
+    ``n (1 - r) / (1 + r)`` are left, r the correlation of neighbours (Bayley and Hammersley 1946);
+    negative ones are taken for chance.
+    """
+    if values.size <= MIN_EFFECTIVE:
+        return float(values.size)
+    rest = values - values.mean()
+    power = float(rest @ rest)
+    r = max(float(rest[1:] @ rest[:-1]) / power, 0.0) if power > 0.0 else 0.0
+    return max(MIN_EFFECTIVE, values.size * (1.0 - r) / (1.0 + r))
+
+
+def mean_budget(
+    value: float,
+    values: Sequence[float] | FloatArray,
+    systematic: tuple[BudgetLine, ...] = (),
+    sensitivity: float = 1.0,
+) -> Budget | None:
+    """Uncertainty of a mean, or of what is calculated from one.
+
+    Parameters
+    ----------
+    value
+        The result.
+    values : (n,)
+        What the mean is of, oldest first.
+    systematic
+        What stays from one averaging time to the next.
+    sensitivity
+        Change of the result per change of the mean.
+
+    Returns
+    -------
+    None where fewer than two values are known, or where they never differ: a transmitter that
+    repeats itself says nothing of how well it measures.
+    """
+    known = np.asarray(values, dtype=np.float64)
+    if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
+        return None
+    n_effective = effective_number(known)
+    standard = abs(sensitivity) * float(np.std(known, ddof=1)) / math.sqrt(n_effective)
+    return Budget(value, (random_line(SCATTER, standard, n_effective - 1.0), *systematic))
+
+
+def numbers(readings: Sequence[Reading]) -> FloatArray:
+    """Of those that have one."""
+    return np.array([r.value for r in readings if r.value is not None], np.float64)
+
+
+def with_budgets(
+    readings: Mapping[str, Reading], found: Mapping[str, Budget | None]
+) -> tuple[dict[str, Reading], dict[str, Budget]]:
+    """Readings that have a number with their uncertainty, and the budgets that say so."""
+    budgets = {
+        name: budget
+        for name, budget in found.items()
+        if budget is not None and readings[name].value is not None
+    }
+    told = {name: stated(reading, budgets.get(name)) for name, reading in readings.items()}
+    return told, budgets
+
+
+def stated(reading: Reading, budget: Budget | None) -> Reading:
+    """The reading with the uncertainty of a budget, where there is one."""
+    if budget is None:
+        return reading
+    return replace(
+        reading,
+        u_random=budget.random,
+        u_systematic=budget.systematic,
+        interval_95=budget.interval,
+    )
+
+
+def reading_of(budget: Budget, quality: Quality) -> Reading:
+    """The result of a budget with its standard uncertainties."""
+    return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
+
+
+SHAFT_GAIN = "gain of shaft probe"

@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.bracket import BracketDynamics
-from core.channel_budget import effective_number
-from core.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, RUNOUT, SHAFT_GAIN
-from core.uncertainty import BearingAccuracy, Budget, random_line, systematic_line
+from core.machine import BearingAccuracy
+from core.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, RUNOUT
+from core.uncertainty import SHAFT_GAIN, Budget, effective_number, random_line, systematic_line
 
 SPREAD = "spread of polls"
 COHERENCE = "coherence not known"

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray
-from core.channel_budget import amplitude_budget, amplitude_lines, with_budgets
+from core.channel_budget import amplitude_budget, amplitude_lines
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum, average
 from core.excitation import LineLimits, line_excitation
-from core.line_results import AMPLITUDES, DIRECTIONS, reading_of
+from core.line_results import AMPLITUDES, DIRECTIONS
 from core.machine import Bearing
 from core.overall_results import PHASES, Vectors, phase_readings
 from core.quality import GOOD, Quality, Reading, Reason, missing, worst
@@ -20,7 +20,7 @@ from core.sensor_checks import axes_quality, backward_share
 from core.settings import AnalysisSettings
 from core.stiffness_budget import transfer_budgets
 from core.transfer import line_transfer
-from core.uncertainty import Budget
+from core.uncertainty import Budget, reading_of, with_budgets
 from core.vector_budget import n_effective, n_independent, vector_ratio_budget
 from core.whirl import roundness
 

@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.assessment import Evidence
-from core.estimators import STIFFNESS_OF, Estimator, preferred_stiffness
+from core.estimators import STIFFNESS_OF, preferred_stiffness
 from core.film_results import NAMES as DYNAMIC_NAMES
-from core.machine import Bearing, Unit
+from core.machine import Bearing, Estimator, Unit
 from core.overall_results import OVERALL_NAMES, SHAFTS
 from core.polarity import signs_checked
 from core.position_results import position_results, slow_channels, slow_results

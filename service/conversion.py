@@ -2,11 +2,9 @@
 
 from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.dynamic_settings import DynamicSettings
-from core.machine import Bearing, Channel, Unit
-from core.probe_axes import GapAccuracy
+from core.machine import Bearing, BearingAccuracy, Channel, GapAccuracy, Unit
 from core.sensor_checks import SensorLimits
 from core.settings import AnalysisSettings
-from core.uncertainty import BearingAccuracy
 from core.usable_lines import LineSelection
 from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings

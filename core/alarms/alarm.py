@@ -1,18 +1,11 @@
 """`Alarm`: what is known of one alarm, and the words of its life cycle."""
 
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 from functools import cached_property
 
-from core.alarms.delays import RESTED, DelayTimer
 from core.condition.bearing_condition import OperatingPoint
-
-
-class AlarmLevel(IntEnum):
-    """How urgent an alarm is: its priority."""
-
-    ALERT = 1
-    DANGER = 2
+from core.limits import NEVER_JUDGED, RESTED, AlarmLevel, Condition, DelayTimer
 
 
 class AlarmState(StrEnum):
@@ -99,46 +92,6 @@ class AlarmIdentity:
     def id(self) -> str:
         """All of it in one word, fit for a URL."""
         return f"{self.unit}:{self.subject}:{self.kind}"
-
-
-@dataclass(frozen=True)
-class Condition:
-    """What is found at one moment of what an alarm watches.
-
-    Parameters
-    ----------
-    level
-        Which limit is passed; None if none is. While nothing is known, that which was known last.
-    is_known
-        Whether it could be judged at all; if not, it is neither active nor returned.
-    value, limit
-        What was compared with what, where there are numbers.
-    reason
-        Why it is so, in a word; "ok" if all is well.
-    suppressed_by
-        Why, by design, the alarm counts for nothing now; None if it counts.
-    point
-        Under which operating condition, where that is known of a level.
-    """
-
-    level: AlarmLevel | None = None
-    is_known: bool = True
-    value: float | None = None
-    limit: float | None = None
-    reason: str = "ok"
-    suppressed_by: str | None = None
-    point: OperatingPoint | None = None
-
-
-WITHIN = Condition()
-"""All is well, and there is no number to it."""
-
-NEVER_JUDGED = Condition(is_known=False, reason="waiting_for_data")
-
-
-def unknown(reason: str, suppressed_by: str | None = None) -> Condition:
-    """Build the condition of which nothing is known now."""
-    return Condition(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from core.alarms.alarm import Alarm, AlarmKind, AlarmRule, Condition, unknown
+from core.alarms.alarm import Alarm, AlarmKind, AlarmRule
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance, interrupted, restored
 from core.alarms.memory import is_same_occurrence
 from core.alarms.operation import Action, expire, operate
 from core.alarms.watch import Watch
+from core.limits import Condition, unknown
 
 RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 

@@ -1,7 +1,7 @@
 """Conditions that are not a value above a limit: a channel, a device's clock, a link."""
 
-from core.alarms.alarm import WITHIN, AlarmLevel, Condition
 from core.device_clock import DeviceClock, StampFault
+from core.limits import WITHIN, AlarmLevel, Condition
 from core.quality import Level, Quality, Reading, Reason, missing
 from core.sensor_checks import MAX_CLIPPED_SHARE
 

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmLevel, AlarmState
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.condition.bearing_condition import OperatingPoint
+from core.limits import AlarmLevel
 
 
 class AlarmChange(StrEnum):

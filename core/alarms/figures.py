@@ -4,9 +4,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import Alarm, AlarmLevel, AlarmState
+from core.alarms.alarm import Alarm, AlarmState
 from core.alarms.chatter import ChatterRule
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.limits import AlarmLevel
 from core.units import NS_PER_S
 
 TEN_MINUTES_NS = 600 * NS_PER_S

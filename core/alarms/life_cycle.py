@@ -6,9 +6,9 @@ samples lead to the same events however fast they are played.
 
 from dataclasses import replace
 
-from core.alarms.alarm import Alarm, AlarmLevel, AlarmRule, Condition
-from core.alarms.delays import ON, RESTED, DelayTimer
+from core.alarms.alarm import Alarm, AlarmRule
 from core.alarms.event import AlarmChange, AlarmEvent, changed
+from core.limits import ON, RESTED, AlarmLevel, Condition, DelayTimer
 
 Timers = tuple[DelayTimer, DelayTimer]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from core.alarms.alarm import AlarmRule
 from core.alarms.condition_limits import EVERY_STATE, ConditionLimits, Region, States
-from core.alarms.limits import Limits
+from core.limits import Limits
 from core.units import ns_from_s
 
 

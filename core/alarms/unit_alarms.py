@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from core.alarms.alarm import Alarm, Condition, unknown
+from core.alarms.alarm import Alarm
 from core.alarms.board import AlarmBoard
 from core.alarms.condition_limits import point_of, worst_of
 from core.alarms.conditions import (
@@ -26,6 +26,7 @@ from core.assessment import Assessment
 from core.blocks import SampleBlock
 from core.condition.bearing_condition import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import OperatingState
+from core.limits import Condition, unknown
 from core.line_results import AMPLITUDES, DIRECTIONS
 from core.machine import Unit
 from core.polarity import is_reversed

@@ -10,9 +10,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from core.alarms.alarm import AlarmLevel, Condition, unknown
-from core.alarms.limits import Limits, judge
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Condition, Limits, judge, unknown
 from core.quality import Reading, worst
 
 NO_REFERENCE, NO_PHASE = "no_reference", "no_phase"

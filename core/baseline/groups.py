@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.condition.cells import CellGrid
 from core.condition.film_conditions import FilmConditions
-from core.stiffness_history import TimeArray
 from core.units import NS_PER_S
 
 DAY_NS = 86_400 * NS_PER_S

@@ -7,13 +7,12 @@ of all towards what lasts for days. So spells of days are left out in turn.
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.baseline.cell_table import CellTable
 from core.baseline.fit import Fit, refit
 from core.baseline.groups import DAY_NS, Groups
 from core.baseline.settings import BaselineSettings
 from core.condition.film_conditions import FilmConditions
-from core.stiffness_history import TimeArray
 
 FOLDS = 5
 LONGEST_SPELL_DAYS = 10

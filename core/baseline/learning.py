@@ -9,7 +9,7 @@ that follow one another are.
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
 from core.baseline.cell_scatter import with_scatter
 from core.baseline.fit import Fit, fit_surface, surface_shape
@@ -21,7 +21,7 @@ from core.baseline.tabulate import tabulate
 from core.baseline.time_scatter import time_scatter
 from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
-from core.stiffness_history import DIRECTIONS, StiffnessHistory, TimeArray
+from core.stiffness_history import DIRECTIONS, StiffnessHistory
 
 REJECTED = 0.1
 """Robust weight below which a group counts as rejected."""

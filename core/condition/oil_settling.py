@@ -13,10 +13,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operating_state import Operation
-from core.stiffness_history import TimeArray
 
 PARTS = 8
 """Parts of the settling time at which the temperature is remembered."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.condition.oil_settling import oil_settled
 from core.condition.operating_limits import Band, OperatingLimits
 from core.condition.operating_state import STEADY, OperatingState
-from core.stiffness_history import CodeArray, TimeArray
+from core.stiffness_history import CodeArray
 
 _Bools = npt.NDArray[np.bool_]
 _Ints = npt.NDArray[np.int64]

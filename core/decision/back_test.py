@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
@@ -14,7 +14,7 @@ from core.decision.finding_history import FindingHistory, finding_history
 from core.decision.level_history import level_history
 from core.decision.limits import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits, sure_size
 from core.decision.verdict import OF_EVIDENCE, Verdict
-from core.stiffness_history import DIRECTIONS, CodeArray, StiffnessHistory, TimeArray
+from core.stiffness_history import DIRECTIONS, CodeArray, StiffnessHistory
 
 _Bools = npt.NDArray[np.bool_]
 

@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.alarms.alarm import AlarmLevel
 from core.baseline.baseline import QuantityBaseline
 from core.condition.film_conditions import FilmConditions
 from core.decision.gathered import NOTHING_GATHERED, Counted, Finding, GatheredEvidence
-from core.decision.level_timer import REST, LevelTimer
 from core.decision.limits import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits, sure_size
 from core.decision.reading import WatchedReading
 from core.decision.verdict import OF_EVIDENCE, Verdict, counted_verdict
+from core.limits import REST, AlarmLevel, LevelTimer
 from core.units import NS_PER_S
 
 

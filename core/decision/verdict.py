@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from core.alarms.alarm import AlarmLevel
+from core.limits import AlarmLevel
 from core.stiffness_history import Evidence
 
 

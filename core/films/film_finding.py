@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from core.alarms.alarm import AlarmLevel, Condition, unknown
 from core.decision.attribution import Attribution, Cause
 from core.decision.decision import Decision
 from core.decision.limits import ChangeLimits
 from core.decision.verdict import JUDGED, Verdict
+from core.limits import AlarmLevel, Condition, unknown
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
-from core.estimators import STIFFNESS_OF, Estimator
+from core.estimators import STIFFNESS_OF
+from core.machine import Estimator
 from core.quality import GOOD, Level, Quality, Reading, Reason, worst
 from core.stiffness_history import DIRECTIONS, Evidence
 

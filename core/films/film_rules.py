@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from core.condition.cells import CellGrid
 from core.condition.operating_limits import OperatingLimits
 from core.decision.limits import ChangeLimits
-from core.estimators import Estimator
+from core.machine import Estimator
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.condition.operating_state import OperatingState
 from core.history_rows.names import Names
 from core.history_rows.problems import RowProblems
 from core.quality import Reason
-from core.stiffness_history import DIRECTIONS, Evidence, TimeArray
+from core.stiffness_history import DIRECTIONS, Evidence
 
 Columns: TypeAlias = Mapping[str, Names | Sequence[Any] | npt.NDArray[Any]]
 Place: TypeAlias = tuple[str, str]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from core.stiffness_history import TimeArray
+from core.arrays import TimeArray
 
 MOST_NAMED = 10
 """Rows that a refusal names."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.history_rows.columns import (
     AMPLITUDES,
     PER_BEARING,
@@ -16,7 +16,7 @@ from core.history_rows.columns import (
     Rows,
 )
 from core.history_rows.problems import RowProblems
-from core.stiffness_history import DIRECTIONS, CodeArray, Evidence, StiffnessHistory, TimeArray
+from core.stiffness_history import DIRECTIONS, CodeArray, Evidence, StiffnessHistory
 
 _Ints = npt.NDArray[np.int64]
 

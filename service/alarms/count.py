@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import Alarm, AlarmLevel, AlarmState
+from core.alarms.alarm import Alarm, AlarmState
+from core.limits import AlarmLevel
 
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import Alarm, AlarmKind, Condition
+from core.alarms.alarm import Alarm, AlarmKind
 from core.alarms.chatter import ChatterRule, ChatterWatch
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.memory import AlarmMemory
@@ -16,6 +16,7 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import VectorReference
 from core.assessment import Assessment
 from core.blocks import SampleBlock
+from core.limits import Condition
 from service.alarms.count import AlarmCount, count_of
 from service.alarms.host_time import HostTime
 from service.alarms.service_alarms import ServiceAlarms

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable, Sequence
 
-from core.alarms.alarm import PLANT, WITHIN, Alarm, AlarmIdentity, AlarmKind, AlarmLevel, Condition
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
 from core.alarms.rules import rule_of
 from core.alarms.watch import Watch
+from core.limits import WITHIN, AlarmLevel, Condition
 from service.alarms.told_alarms import ToldAlarms
 
 SHARED = "shared work"

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from core.account import SampleAccount
-from core.alarms.alarm import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Condition
 from service.bus import Bus
 from service.capture.captures import Captures
 from service.continuous.tape import Tape

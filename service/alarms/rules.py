@@ -2,7 +2,6 @@
 
 from core.alarms.chatter import ChatterRule
 from core.alarms.condition_limits import ConditionLimits
-from core.alarms.limits import Limits
 from core.alarms.rules import (
     BearingRules,
     ClockRules,
@@ -12,7 +11,7 @@ from core.alarms.rules import (
     rule_of,
 )
 from core.alarms.vector_change import OrderVector, VectorReference
-from core.alarms.zones import ZoneLimits
+from core.limits import Limits, ZoneLimits
 from core.units import ns_from_s
 from service.origin import Origin
 from service.settings.alarms import AlarmSettings

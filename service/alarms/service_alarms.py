@@ -5,12 +5,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from core.account import SampleAccount
-from core.alarms.alarm import WITHIN, Alarm, AlarmKind, AlarmLevel, Condition
+from core.alarms.alarm import Alarm, AlarmKind
 from core.alarms.board import AlarmBoard
 from core.alarms.event import AlarmNews
 from core.alarms.operation import Action
 from core.alarms.watch import LimitWatch
 from core.condition.bearing_condition import NOWHERE_KNOWN
+from core.limits import WITHIN, AlarmLevel, Condition
 from core.quality import Reading
 from core.units import NS_PER_S
 from service.alarms.health import LookAtHealth, ServiceHealth

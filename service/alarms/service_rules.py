@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from core.alarms.alarm import PLANT, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.condition_limits import ConditionLimits
-from core.alarms.limits import Limits
 from core.alarms.rules import rule_of
 from core.alarms.watch import LimitWatch, Watch
+from core.limits import Limits
 from service.alarms.stream_alarms import STREAM
 from service.settings.alarms import AlarmSettings
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable
 
-from core.alarms.alarm import WITHIN, AlarmIdentity, AlarmKind, AlarmLevel, Condition
+from core.alarms.alarm import AlarmIdentity, AlarmKind
 from core.alarms.rules import rule_of
 from core.alarms.watch import Watch
+from core.limits import WITHIN, AlarmLevel, Condition
 from service.alarms.told_alarms import ToldAlarms
 
 STREAM = "stream"

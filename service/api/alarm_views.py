@@ -1,16 +1,9 @@
 """Alarms in the words of the API."""
 
-from core.alarms.alarm import (
-    Alarm,
-    AlarmIdentity,
-    AlarmKind,
-    AlarmLevel,
-    AlarmState,
-    Condition,
-    Hold,
-)
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.cells import CellGrid
+from core.limits import AlarmLevel, Condition
 from service.api.alarm_models import (
     AlarmCountModel,
     AlarmEventModel,

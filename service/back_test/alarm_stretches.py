@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.alarms.alarm import AlarmLevel
 from core.decision.back_test import DecisionHistory
+from core.limits import AlarmLevel
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from functools import reduce
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import Watched
 from core.baseline.response import (
     MEAN_READINGS,
@@ -17,7 +17,7 @@ from core.baseline.response import (
 from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
 from core.decision.attribution import Attribution, Cause, PlaceReadings, attribute
-from core.stiffness_history import DIRECTIONS, StiffnessHistory, TimeArray
+from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.back_test.bearing_run import BackTestRules, BearingRun
 from service.back_test.periods import Period, periods_of
 

@@ -7,7 +7,7 @@ from typing import BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from core.stiffness_history import TimeArray
+from core.arrays import TimeArray
 from service.back_test.file_columns import ReadingsError
 
 CHUNK_BYTES = 4_000_000

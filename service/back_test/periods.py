@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.stiffness_history import TimeArray
+from core.arrays import TimeArray
 
 DAY_NS = 86_400 * 10**9
 

@@ -10,9 +10,9 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
 from core.condition.operating_state import OperatingState
-from core.estimators import Estimator
 from core.history_rows import Place
 from core.history_rows.columns import AMPLITUDES, PER_BEARING, SILENT
+from core.machine import Estimator
 from core.stiffness_history import DIRECTIONS, Evidence
 from service.back_test.periods import DAY_NS
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import Alarm, AlarmKind, AlarmLevel, AlarmState
+from core.alarms.alarm import Alarm, AlarmKind, AlarmState
 from core.alarms.event import AlarmChange, AlarmEvent
+from core.limits import AlarmLevel
 from service.delivery.message import Composer, dumps
 from service.store.outbox_port import Letter
 

@@ -12,8 +12,9 @@ from core.baseline.response import learn_response
 from core.condition.film_conditions import FilmConditions
 from core.condition.operation_history import OperationHistory, operation_history
 from core.decision.back_test import DecisionHistory, back_test
-from core.estimators import STIFFNESS_OF, Estimator
+from core.estimators import STIFFNESS_OF
 from core.films.film_rules import FilmRules
+from core.machine import Estimator
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.films.rules import film_rules_of
 from service.settings.film_alarms import FilmAlarmSettings

@@ -7,10 +7,11 @@ from core.assessment import Assessment, AveragingWindow
 from core.condition.bearing_condition import BearingCondition
 from core.condition.cells import Cell, CellGrid
 from core.decision.attribution import Attribution
-from core.estimators import STIFFNESS_OF, Estimator
+from core.estimators import STIFFNESS_OF
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_rules import FilmRules
+from core.machine import Estimator
 from core.quality import Level, Reading
 from core.quantities import BY_NAME
 from core.uncertainty import Budget

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import AlarmIdentity, AlarmKind, Condition
+from core.alarms.alarm import AlarmIdentity, AlarmKind
 from core.assessment import Assessment
 from core.baseline.baseline import BearingBaseline
 from core.films.film_finding import alarm_condition
@@ -15,6 +15,7 @@ from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_memory import FilmMemory
 from core.films.film_rules import FilmRules
 from core.films.film_watch import FilmWatch
+from core.limits import Condition
 from core.machine import Unit
 from core.stiffness_history import DIRECTIONS
 from service.films.actions import Action, step_of

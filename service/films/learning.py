@@ -6,15 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from core.arrays import TimeArray
 from core.baseline.agreement import mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.drift import learning_drift
 from core.baseline.far_readings import far_readings
 from core.baseline.learning import learn
 from core.baseline.response import ShaftResponse, learn_response
-from core.estimators import Estimator
 from core.films.film_rules import FilmRules
-from core.stiffness_history import StiffnessHistory, TimeArray
+from core.machine import Estimator
+from core.stiffness_history import StiffnessHistory
 from core.units import NS_PER_S
 from service.films.versions import Versions, versions_after
 from service.settings.film_alarms import FilmAlarmSettings

@@ -5,9 +5,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from prometheus_client.metrics_core import Metric
 
-from core.alarms.alarm import PLANT, Alarm, AlarmLevel, AlarmState
+from core.alarms.alarm import PLANT, Alarm, AlarmState
 from core.decision.verdict import Verdict
 from core.films.film_judge import FilmNews
+from core.limits import AlarmLevel
 from core.quality import Level
 from service.api.ports import AlarmBoard
 from service.metrics.families import Rows, gauge, histogram

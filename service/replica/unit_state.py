@@ -9,9 +9,9 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from core.alarms.alarm import Alarm
 from core.assessment import AveragingWindow, Evidence
 from core.condition.bearing_condition import BearingCondition
-from core.estimators import Estimator
 from core.films.film_finding import FilmFinding
 from core.films.film_reading import FilmReading
+from core.machine import Estimator
 from core.quality import Quality, Reading
 from core.runout import RunoutVerdict
 from core.speed import SpeedSource

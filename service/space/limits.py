@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from core.alarms.limits import Limits
+from core.limits import Limits
 
 MOST_ALERT, MOST_DANGER = 0.25, 0.125
 """Shares that limits in bytes come to at most, so that a small disk can be in order at all."""

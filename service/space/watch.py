@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.clock import Clock
-from core.alarms.alarm import WITHIN, AlarmLevel, Condition, unknown
-from core.alarms.limits import judge
+from core.limits import WITHIN, AlarmLevel, Condition, judge, unknown
 from core.quality import Reading
 from service.heartbeats import UNHEARD, Pulse
 from service.space.disk import DiskSpace, Measure, measure_disk

@@ -3,18 +3,11 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from core.alarms.alarm import (
-    Alarm,
-    AlarmIdentity,
-    AlarmKind,
-    AlarmLevel,
-    AlarmState,
-    Condition,
-    Hold,
-)
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Condition
 from service.audit.entry import Deed
 from service.store.audit_deeds import alarm_deeds
 from service.store.commands import answer_command

@@ -13,8 +13,8 @@ from core.baseline.baseline import BearingBaseline
 from core.baseline.response import ShaftResponse
 from core.condition.operating_state import OperatingState
 from core.decision.decision import Decision
-from core.estimators import Estimator
 from core.films.film_judge import FilmNews
+from core.machine import Estimator
 from core.stiffness_history import CodeArray, StiffnessHistory
 from service.store.value_range import ValueRange
 

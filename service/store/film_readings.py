@@ -10,10 +10,10 @@ import numpy.typing as npt
 from core.baseline.exchange import content, written
 from core.baseline.strict import decode
 from core.decision.decision import Decision
-from core.estimators import Estimator
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_reading import FilmValue
+from core.machine import Estimator
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.store.conditions import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 from service.store.database import Connection

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.estimators import Estimator
+from core.machine import Estimator
 from core.quality import GOOD, Reason, bad
 from core.speed import SpeedSource
 from core.stiffness_history import DIRECTIONS, Evidence

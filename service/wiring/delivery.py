@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo
 
 from acquisition.clock import Clock
-from core.alarms.alarm import AlarmLevel
+from core.limits import AlarmLevel
 from service.delivery.facts import LookAround
 from service.delivery.mail import Mail, MailTarget
 from service.delivery.message import Composer, Plant

@@ -10,7 +10,7 @@ from core.alarms.event import AlarmChange
 from core.condition.operating_state import OperatingState
 from core.decision.attribution import Cause
 from core.decision.verdict import Verdict
-from core.estimators import Estimator
+from core.machine import Estimator
 from core.quality import Reason
 from core.runout import RunoutVerdict
 from core.speed import SpeedSource

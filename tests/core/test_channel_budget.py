@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from core.channel_budget import amplitude_budget, mean_budget, phase_budget
+from core.channel_budget import amplitude_budget, phase_budget
+from core.uncertainty import mean_budget
 
 N_SEGMENTS, N_LIVES = 24, 3000
 

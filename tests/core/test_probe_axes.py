@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.probe_axes import GapAccuracy, Growth, ProbeAxis
+from core.machine import GapAccuracy
+from core.probe_axes import Growth, ProbeAxis
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 from core.shaft_centre import ShaftCentre, locate_shaft, shaft_centre
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.arrays import FloatArray
 from core.blocks import SampleBlock
+from core.limits import Limits
 from core.machine import Unit
 from core.monitor import UnitMonitor
 from core.recent import MAX_PARTS, PART_TURNS, parts_of

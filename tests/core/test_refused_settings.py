@@ -6,7 +6,6 @@ from functools import partial
 
 import pytest
 
-from core.alarms.limits import Limits
 from core.baseline.settings import BaselineSettings
 from core.bracket import BracketDynamics
 from core.condition.cells import CellGrid
@@ -14,8 +13,9 @@ from core.condition.operating_limits import OperatingLimits
 from core.decision.limits import ChangeLimits
 from core.dynamic_settings import DynamicSettings
 from core.excitation import LineLimits
+from core.limits import Limits
+from core.machine import BearingAccuracy
 from core.transducer_response import ResponseTable
-from core.uncertainty import BearingAccuracy
 from core.vector_settings import VectorSettings
 
 Operating = partial(OperatingLimits, rated_speed_rpm=92.3)

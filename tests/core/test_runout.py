@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from core.key_phase import KeyPhase
-from core.machine import Unit
+from core.machine import SlowRollVector, Unit
 from core.quality import Reading, Reason, uncertain
-from core.runout import RunoutVerdict, SlowRollVector, take_off_runout
+from core.runout import RunoutVerdict, take_off_runout
 from core.segment_runout import without_runout
 from core.speed import Speed, SpeedSource
 

@@ -7,9 +7,10 @@ import pytest
 
 from core.bracket import BracketDynamics
 from core.cross_spectrum import BEARING_X, SHAFT_X, average
+from core.machine import BearingAccuracy
 from core.stiffness_budget import ratio_budget, transfer_budgets
 from core.transfer import line_transfer
-from core.uncertainty import BearingAccuracy, Budget, coverage_factor, random_line, systematic_line
+from core.uncertainty import Budget, coverage_factor, random_line, systematic_line
 
 
 def test_random_and_systematic_half_widths_stay_apart_and_combine_by_squares() -> None:

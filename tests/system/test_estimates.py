@@ -12,9 +12,9 @@ from acquisition.calibration import calibrate
 from acquisition.simulated.scenario import ChannelScenario, Scenario
 from acquisition.simulated.unit import SimulatedUnit
 from core.assessment import Assessment
-from core.estimators import STIFFNESS_OF, Estimator
+from core.estimators import STIFFNESS_OF
 from core.film import DAMPING_OVER_STIFFNESS_S, Film
-from core.machine import Unit
+from core.machine import Estimator, Unit
 from core.monitor import UnitMonitor
 from core.polarity import is_reversed
 from core.quality import Level, Reason, bad, missing

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.arrays import FloatArray
-from core.stiffness_history import TimeArray
+from core.arrays import FloatArray, TimeArray
 from core.units import NS_PER_S
 
 DAY_NS = 86_400 * NS_PER_S

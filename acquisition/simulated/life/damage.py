@@ -5,8 +5,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from core.arrays import FloatArray
-from core.stiffness_history import DIRECTIONS, TimeArray
+from core.arrays import FloatArray, TimeArray
+from core.stiffness_history import DIRECTIONS
 from core.units import NS_PER_S
 
 

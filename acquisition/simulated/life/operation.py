@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
-from core.stiffness_history import TimeArray
+from core.arrays import FloatArray, TimeArray
 from core.units import NS_PER_S
 
 RATED_POWER_MW = 700.0

@@ -7,8 +7,7 @@ import numpy as np
 from acquisition.simulated.life.held_load import HeldLoad
 from acquisition.simulated.life.operation import RATED_POWER_MW, STEP_S, Operation
 from acquisition.simulated.life.wander import wander
-from core.arrays import FloatArray
-from core.stiffness_history import TimeArray
+from core.arrays import FloatArray, TimeArray
 from core.units import NS_PER_S
 
 STEPS_PER_DAY = int(86_400.0 / STEP_S)

@@ -10,11 +10,12 @@ import numpy as np
 from acquisition.recording.manifest import RecordedChannel, RecordedUnit
 from acquisition.recording.reader import Recording, open_recording
 from acquisition.recording.writer import RecordingWriter
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Shelve, operate
 from core.blocks import SampleBlock
+from core.limits import AlarmLevel, Condition
 from core.machine import Measurand
 from core.quality import GOOD, Reason, bad
 from rigs.standing_clock import StandingClock

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmEvent
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Action, operate
 from core.blocks import SampleBlock
+from core.limits import Condition
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.quality import GOOD, Reading
 from core.units import NS_PER_S

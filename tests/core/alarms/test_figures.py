@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmState, Hold
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
 from core.alarms.chatter import ChatterRule, ChatterWatch
 from core.alarms.event import AlarmChange, AlarmEvent
 from core.alarms.figures import figures_of, stale_alarms
+from core.limits import AlarmLevel
 from core.units import NS_PER_S
 
 RULE = ChatterRule()

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 
 import pytest
 
-from core.alarms.alarm import AlarmLevel, AlarmState, Condition, unknown
-from core.alarms.limits import Limits
+from core.alarms.alarm import AlarmState
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import OrderVector, VectorReference, vector_condition
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Condition, Limits, unknown
 from core.machine import Unit
 from core.quality import Reading, Reason, missing
 

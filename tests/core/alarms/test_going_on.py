@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmLevel, AlarmState
+from core.alarms.alarm import Alarm, AlarmState
 from core.alarms.event import AlarmNews
-from core.alarms.limits import Limits
 from core.alarms.operation import Acknowledge, Action, Comment
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
+from core.limits import AlarmLevel, Limits
 from core.machine import Unit
 
 SECOND = 1_000_000_000

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import WITHIN, AlarmLevel, AlarmState, Condition, unknown
+from core.alarms.alarm import AlarmState
 from core.alarms.life_cycle import restored
 from core.alarms.operation import (
     Acknowledge,
@@ -17,6 +17,7 @@ from core.alarms.operation import (
     Unshelve,
     expire,
 )
+from core.limits import WITHIN, AlarmLevel, Condition, unknown
 from core.units import NS_PER_S
 
 Make = Callable[..., Any]

@@ -8,16 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from core.alarms.alarm import (
-    Alarm,
-    AlarmIdentity,
-    AlarmKind,
-    AlarmLevel,
-    AlarmRule,
-    AlarmState,
-    Condition,
-    unknown,
-)
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, AlarmState
 from core.alarms.event import ANNOUNCED, AlarmEvent
 from core.alarms.life_cycle import advance, interrupted, restored
 from core.alarms.operation import (
@@ -31,6 +22,7 @@ from core.alarms.operation import (
     expire,
     operate,
 )
+from core.limits import AlarmLevel, Condition, unknown
 
 IDENTITY = AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X)
 

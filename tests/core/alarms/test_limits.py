@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.alarms.alarm import AlarmLevel
 from core.alarms.condition_limits import AT_SPEED, ConditionLimits, Region
 from core.alarms.conditions import (
     channel_condition,
@@ -14,11 +13,10 @@ from core.alarms.conditions import (
     slow_channel_condition,
     stamp_condition,
 )
-from core.alarms.limits import Limits, judge
-from core.alarms.zones import ZoneLimits
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.device_clock import DeviceClock, StampFault
+from core.limits import AlarmLevel, Limits, ZoneLimits, judge
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 
 ALERT, DANGER = AlarmLevel

@@ -9,7 +9,6 @@ import pytest
 from core.alarms.alarm import AlarmState
 from core.alarms.condition_limits import AT_SPEED
 from core.alarms.event import AlarmEvent
-from core.alarms.limits import Limits
 from core.alarms.operation import Acknowledge
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
@@ -17,6 +16,7 @@ from core.alarms.vector_change import OrderVector, VectorReference
 from core.blocks import SampleBlock
 from core.condition.bearing_condition import BearingCondition, OperatingPoint
 from core.condition.operating_state import OperatingState
+from core.limits import Limits
 from core.machine import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing
 from core.quantities import CATALOGUE

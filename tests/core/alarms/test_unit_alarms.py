@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import AlarmKind, AlarmLevel, AlarmState
-from core.alarms.limits import Limits
+from core.alarms.alarm import AlarmKind, AlarmState
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.device_clock import StampFault
+from core.limits import AlarmLevel, Limits
 from core.machine import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from rigs.tiers import covering, fast_and_long
 
-from core.alarms.alarm import AlarmLevel
 from core.decision.back_test import DecisionHistory
 from core.decision.decision import UNDECIDED, Decision, release
 from core.decision.limits import ChangeLimits
 from core.decision.verdict import Verdict
+from core.limits import AlarmLevel
 from core.stiffness_history import Evidence, StiffnessHistory
 
 LIMITS = ChangeLimits()

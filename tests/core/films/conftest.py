@@ -14,10 +14,10 @@ from core.condition.cells import CellGrid
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
 from core.decision.limits import ChangeLimits
-from core.estimators import Estimator
 from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_rules import FilmRules
 from core.films.film_watch import FilmWatch
+from core.machine import Estimator
 from core.quality import Reading, Reason, missing
 from core.stiffness_history import StiffnessHistory
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.alarms.alarm import AlarmLevel
 from core.baseline.baseline import Watched
 from core.condition.operating_state import OperatingState
 from core.condition.operation_history import operation_history
@@ -17,6 +16,7 @@ from core.films.catching_up import decision_after, operation_after
 from core.films.film_finding import FilmFinding, alarm_condition
 from core.films.film_reading import film_reading
 from core.films.film_rules import FilmRules
+from core.limits import AlarmLevel
 from core.quality import Reading, Reason, missing, uncertain
 from core.stiffness_history import Evidence
 

@@ -8,9 +8,10 @@ from rigs.racks import AMPLITUDES, K_B, PHASES, blocks_of, polls, watch
 
 from core.assessment import Evidence
 from core.blocks import SampleBlock
+from core.machine import BearingAccuracy
 from core.quality import GOOD, Reason, bad, missing
-from core.stiffness_budget import BEARING_GAIN, BRACKET, SHAFT_GAIN
-from core.uncertainty import BearingAccuracy
+from core.stiffness_budget import BEARING_GAIN, BRACKET
+from core.uncertainty import SHAFT_GAIN
 from core.vector_budget import COHERENCE, SPREAD
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.alarms.alarm import Alarm, AlarmLevel, AlarmState, Condition, unknown
+from core.alarms.alarm import Alarm, AlarmState
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
 from core.alarms.operation import (
     Acknowledge,
@@ -35,6 +35,7 @@ from core.alarms.operation import (
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
+from core.limits import AlarmLevel, Condition, unknown
 from core.quality import GOOD, Reason, bad
 from service.alarms.engine import AlarmEngine
 from service.live import LiveView

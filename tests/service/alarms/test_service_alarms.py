@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from core.account import SampleAccount
-from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind, AlarmLevel
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Acknowledge
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
+from core.limits import AlarmLevel
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms

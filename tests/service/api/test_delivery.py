@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
+from core.limits import AlarmLevel, Condition
 from service.store.outbox_port import Letter, LetterState
 from service.store.sqlite import SqliteStore
 

@@ -12,7 +12,7 @@ import pytest
 
 from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
-from core.estimators import Estimator
+from core.machine import Estimator
 from core.quality import Reading
 from core.stiffness_history import StiffnessHistory
 from service.api.tables import Column, csv_pieces, parquet_file

@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Action, Comment, Shelve, TakeOutOfService, operate
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Condition
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import AuditEntry, Source
 from service.audit.life import Release, start_deeds, stop_deed

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from core.alarms.alarm import AlarmLevel
 from core.decision.back_test import DecisionHistory
+from core.limits import AlarmLevel
 from service.back_test.alarm_stretches import alarm_stretches
 from service.back_test.arguments import event_of, time_ns_of
 from service.back_test.periods import DAY_NS, Learning, MachineEvent, Period, periods_of

@@ -12,10 +12,10 @@ from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.decision.decision import UNDECIDED
 from core.decision.verdict import Verdict
-from core.estimators import Estimator
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_reading import FilmReading, FilmValue
+from core.machine import Estimator
 from core.quality import Reason
 from core.stiffness_history import Evidence
 from service.back_test import stored

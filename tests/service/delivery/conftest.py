@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmChange, AlarmNews
 from core.alarms.life_cycle import advance
+from core.limits import AlarmLevel, Condition
 from service.delivery.facts import Surroundings
 from service.delivery.message import Composer, Plant
 from service.delivery.network import Timeouts, Trust

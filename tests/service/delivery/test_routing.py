@@ -7,16 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from core.alarms.alarm import (
-    Alarm,
-    AlarmIdentity,
-    AlarmKind,
-    AlarmLevel,
-    AlarmRule,
-    AlarmState,
-    Condition,
-    unknown,
-)
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, AlarmState
 from core.alarms.event import AlarmChange, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import (
@@ -27,6 +18,7 @@ from core.alarms.operation import (
     Unshelve,
     operate,
 )
+from core.limits import AlarmLevel, Condition, unknown
 
 T0 = 1_767_225_600_000_000_000
 ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")

@@ -10,7 +10,7 @@ from zoneinfo import ZoneInfo
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.alarms.alarm import AlarmLevel, Condition
+from core.limits import AlarmLevel, Condition
 from service.delivery.outcome import Failed
 from service.delivery.quiet import QuietHours
 from service.delivery.sender import SenderState

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.decision.verdict import JUDGED, Verdict
-from core.estimators import Estimator
+from core.machine import Estimator
 from core.stiffness_history import StiffnessHistory
 from core.units import NS_PER_S
 from service.demo.past import fill, without_past

@@ -12,10 +12,10 @@ from core.condition.operating_state import OperatingState
 from core.condition.operation_history import operation_history
 from core.decision.decision import UNDECIDED
 from core.decision.verdict import Verdict
-from core.estimators import Estimator
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_reading import FilmReading, FilmValue
+from core.machine import Estimator
 from core.quality import Reason
 from core.stiffness_history import Evidence, StiffnessHistory
 from service.store.sqlite import SqliteStore

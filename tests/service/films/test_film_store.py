@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.alarms.alarm import AlarmLevel
 from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.learning import learn
 from core.baseline.response import learn_response
@@ -19,9 +18,10 @@ from core.decision.attribution import Attribution, Cause
 from core.decision.decision import Decision
 from core.decision.gathered import Finding, GatheredEvidence, ScaleSums
 from core.decision.verdict import Verdict
-from core.estimators import Estimator
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
+from core.limits import AlarmLevel
+from core.machine import Estimator
 from core.stiffness_history import StiffnessHistory
 from service.store.film_port import BaselineStep, FilmQuery, StoredStep
 from service.store.port import StoreError

@@ -10,10 +10,9 @@ import pytest
 from core.baseline.baseline import BearingBaseline
 from core.condition.cells import CellGrid
 from core.decision.verdict import JUDGED
-from core.estimators import Estimator
 from core.films.film_judge import FilmJudge, FilmNews
 from core.films.film_rules import FilmRules
-from core.machine import Bearing, Channel, Measurand, Unit
+from core.machine import Bearing, Channel, Estimator, Measurand, Unit
 from core.stiffness_history import StiffnessHistory
 from service.films.actions import Accept, BaselineRefusedError, Freeze, Reject, Renew, Thaw
 from service.films.keeper import FilmKeeper

@@ -5,9 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind, AlarmLevel
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
 from core.alarms.chatter import ChatterRule
 from core.alarms.event import AlarmChange, AlarmNews, changed
+from core.limits import AlarmLevel
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import ServiceHealth
 from service.alarms.start import alarm_engine

@@ -10,10 +10,10 @@ import pytest
 
 from acquisition.recording.manifest import RecordedChannel, RecordedUnit
 from acquisition.recording.writer import RecordingWriter
-from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.blocks import SampleBlock
+from core.limits import Limits
 from core.machine import Bearing, Channel, Measurand, Unit
 from core.monitor import UnitMonitor
 from core.outage import Reach

@@ -8,11 +8,11 @@ import pytest
 from core.alarms.alarm import AlarmRule
 from core.alarms.chatter import ChatterRule
 from core.alarms.condition_limits import AT_SPEED, EVERY_STATE, Region
-from core.alarms.limits import Limits
 from core.alarms.rules import BearingRules, LimitRule
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
+from core.limits import Limits
 from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.origin import Origin
 from service.settings.plant import PlantFile

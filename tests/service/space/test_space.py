@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from acquisition.clock import Clock
-from core.alarms.alarm import AlarmLevel
+from core.limits import AlarmLevel
 from service.settings.space import SpaceSettings
 from service.space.disk import DiskSpace, measure_disk
 from service.space.growth import Growth

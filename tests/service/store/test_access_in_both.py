@@ -3,11 +3,12 @@
 import pytest
 from harness.places import Place
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Condition
 from service.security.keys import ApiKey
 from service.security.roles import Role
 from service.security.sessions import Session

@@ -8,21 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rigs.store_fixtures import Execute, gap
 
-from core.alarms.alarm import (
-    Alarm,
-    AlarmIdentity,
-    AlarmKind,
-    AlarmLevel,
-    AlarmRule,
-    Condition,
-    unknown,
-)
-from core.alarms.delays import RESTED
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
+from core.limits import RESTED, AlarmLevel, Condition, unknown
 from service.store.port import AlarmQuery, StoreError
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange

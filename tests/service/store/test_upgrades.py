@@ -11,9 +11,10 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import gather_all, n_rows
 from rigs.store_fixtures import query
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
+from core.limits import AlarmLevel, Condition
 from service.store import schema
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError

@@ -12,8 +12,8 @@ from acquisition.errors import ConfigError
 from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.estimators import Estimator
 from core.films.film_reading import film_reading
+from core.machine import Estimator
 from core.monitor import UnitMonitor
 from core.units import NS_PER_S
 from service.conversion import analysis_of, calibration_of, machine_of

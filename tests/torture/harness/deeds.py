@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from core.account import Gap
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmLevel, AlarmRule, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
@@ -18,10 +18,11 @@ from core.condition.operating_state import OperatingState
 from core.cross_spectrum import average
 from core.decision.decision import UNDECIDED
 from core.decision.verdict import Verdict
-from core.estimators import Estimator
 from core.films.film_finding import FilmFinding
 from core.films.film_judge import FilmNews
 from core.films.film_reading import FilmReading, FilmValue
+from core.limits import AlarmLevel, Condition
+from core.machine import Estimator
 from core.quality import Reason, missing
 from core.quantities import CATALOGUE
 from core.stiffness_history import Evidence

@@ -19,8 +19,8 @@ from acquisition.simulated.plant import CHUNK_SAMPLES
 from acquisition.simulated.unit import SimulatedUnit
 from benchmarks.chain_unit import CALIBRATION, SETTINGS, UNIT, UNKNOWN, WINDOW_SAMPLES
 from core.assessment import Assessment
-from core.estimators import Estimator
 from core.films.film_reading import film_reading
+from core.machine import Estimator
 from core.monitor import UnitMonitor
 from core.units import NS_PER_S, ns_from_s
 

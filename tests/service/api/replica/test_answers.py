@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import AlarmLevel, AlarmState
+from core.alarms.alarm import AlarmState
+from core.limits import AlarmLevel
 from service.live import LinkState
 from service.replica.live import NOBODY, SILENT_AFTER_S
 from service.roles.replica import replica_on

@@ -1,11 +1,62 @@
-"""Alert and danger limits of a quantity, above and below, with a deadband."""
+"""Levels, limits, zones and delays: what alarms and changes of films are judged by."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cached_property
+from typing import Self
 
-from core.alarms.alarm import AlarmLevel, Condition, unknown
+from core.condition.bearing_condition import OperatingPoint
 from core.quality import Reading, Reason
+
+
+class AlarmLevel(IntEnum):
+    """How urgent an alarm is: its priority."""
+
+    ALERT = 1
+    DANGER = 2
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is found at one moment of what an alarm watches.
+
+    Parameters
+    ----------
+    level
+        Which limit is passed; None if none is. While nothing is known, that which was known last.
+    is_known
+        Whether it could be judged at all; if not, it is neither active nor returned.
+    value, limit
+        What was compared with what, where there are numbers.
+    reason
+        Why it is so, in a word; "ok" if all is well.
+    suppressed_by
+        Why, by design, the alarm counts for nothing now; None if it counts.
+    point
+        Under which operating condition, where that is known of a level.
+    """
+
+    level: AlarmLevel | None = None
+    is_known: bool = True
+    value: float | None = None
+    limit: float | None = None
+    reason: str = "ok"
+    suppressed_by: str | None = None
+    point: OperatingPoint | None = None
+
+
+WITHIN = Condition()
+"""All is well, and there is no number to it."""
+
+
+NEVER_JUDGED = Condition(is_known=False, reason="waiting_for_data")
+
+
+def unknown(reason: str, suppressed_by: str | None = None) -> Condition:
+    """Build the condition of which nothing is known now."""
+    return Condition(is_known=False, reason=reason, suppressed_by=suppressed_by)
+
 
 MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
 """Doubts about a reading that may have made it too low: it was read beside its line."""
@@ -150,3 +201,115 @@ def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Conditio
     return Condition(
         level, value=value, limit=limits.of(level, value), reason=limits.reason(level, value)
     )
+
+
+ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
+
+
+@dataclass(frozen=True)
+class ZoneLimits(Limits):
+    """Zones as limits: C is an alert, D a danger; what is within says whether it is A or B.
+
+    Parameters
+    ----------
+    zone_b
+        Where zone B begins.
+    """
+
+    zone_b: float = 0.0
+
+    @classmethod
+    def between(cls, a_b: float, b_c: float, c_d: float, deadband: float = 0.0) -> Self:
+        """Zones by their boundaries.
+
+        Raises
+        ------
+        ValueError
+            If they do not rise from above zero, or the deadband is not below the boundary B/C.
+        """
+        if not 0.0 < a_b < b_c:
+            raise ValueError(f"boundary A/B {a_b:g} must be above 0 and below B/C {b_c:g}")
+        return cls(b_c, c_d, deadband, zone_b=a_b)
+
+    def reason(self, level: AlarmLevel | None, value: float) -> str:
+        """The zone."""
+        if level is None:
+            return "zone_a" if value <= self.zone_b else "zone_b"
+        return ZONES[level]
+
+
+@dataclass(frozen=True)
+class DelayTimer:
+    """Whether a level counts, and for how long the condition has said otherwise.
+
+    Parameters
+    ----------
+    opposed_ns
+        Known time for which it has; what passes unseen does not count.
+    last_ns
+        When it last did; None if nothing was known since.
+    """
+
+    is_on: bool = False
+    opposed_ns: int = 0
+    last_ns: int | None = None
+
+    def step(self, wanted: bool, now_ns: int, on_delay_ns: int, off_delay_ns: int) -> "DelayTimer":
+        """Take in what the condition says now; a clock that was put back adds nothing."""
+        if wanted == self.is_on:
+            return ON if wanted else RESTED
+        since_ns = now_ns if self.last_ns is None else self.last_ns
+        opposed_ns = self.opposed_ns + max(0, now_ns - since_ns)
+        if opposed_ns >= (on_delay_ns if wanted else off_delay_ns):
+            return ON if wanted else RESTED
+        return DelayTimer(self.is_on, opposed_ns, now_ns)
+
+    def paused(self) -> "DelayTimer":
+        """The timer when nothing is known: what is pending stays pending, and no time passes."""
+        return self if self.last_ns is None else replace(self, last_ns=None)
+
+
+RESTED = DelayTimer()
+
+
+ON = DelayTimer(is_on=True)
+
+
+@dataclass(frozen=True)
+class LevelTimer:
+    """Whether a level counts, and for how many readings in a row something spoke for or against.
+
+    Only readings that were judged are counted: nothing that is unknown speaks for or against.
+    """
+
+    is_active: bool = False
+    n_passed: int = 0
+    n_below: int = 0
+
+    def step(
+        self, is_passed: bool, is_held: bool, n_on: int, n_off: int, is_latching: bool
+    ) -> "LevelTimer":
+        """Take in one judged reading.
+
+        Parameters
+        ----------
+        is_passed, is_held
+            Whether the limit is passed, and whether it still is with its deadband.
+        n_on, n_off
+            Readings in a row that switch the level on, or off.
+        """
+        n_passed = self.n_passed + 1 if is_passed else 0
+        n_below = 0 if is_held else self.n_below + 1
+        is_active = self.is_active
+        if n_passed >= n_on:
+            is_active = True
+        elif n_below >= n_off and not is_latching:
+            is_active = False
+        return LevelTimer(is_active, n_passed, n_below)
+
+    def released(self, n_off: int) -> "LevelTimer":
+        """Without its latch, if nothing has held it for the off-delay."""
+        return replace(self, is_active=False) if self.n_below >= n_off else self
+
+
+REST = LevelTimer()
