@@ -17,7 +17,6 @@ from core.baseline.learning import learn
 from core.baseline.response import MEAN_READINGS, Place, learn_response, place_columns
 from core.baseline.settings import BaselineSettings
 from core.baseline.watched import watched_values
-from core.condition.film_conditions import FilmConditions
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
 from core.decision.attribution import Attribution, PlaceReadings, attribute
@@ -105,7 +104,7 @@ class LearnedUnit:
     def place_readings(self, later: Later) -> PlaceReadings:
         """All of a unit's settled readings."""
         places = [(later.histories[b], self.stiffness(b, d)) for b, d in self.places()]
-        rises = [film.eccentricity_rise(FilmConditions.of(history)) for history, film in places]
+        rises = [film.eccentricity_rise(history.conditions) for history, film in places]
         return PlaceReadings(
             *place_columns(later.histories),
             np.stack([self._deviation(later, *place) for place in self.places()]),
@@ -116,7 +115,7 @@ class LearnedUnit:
     def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:
         history, baseline = later.histories[bearing], self.stiffness(bearing, direction)
         value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-        found = baseline.compare(FilmConditions.of(history), value, u_random)
+        found = baseline.compare(history.conditions, value, u_random)
         return np.where(later.is_settled, found.deviation, np.nan)
 
 

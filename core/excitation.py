@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from core.cross_spectrum import CrossSpectrum
+from core.lines import SegmentSettings
 from core.quality import Reason
 
 CHANCE = 1e-6
@@ -20,6 +21,26 @@ def chance_coherence(n_segments: float) -> float:
         Independent segments that are averaged, more than 1.
     """
     return float(1.0 - CHANCE ** (1.0 / (n_segments - 1.0)))
+
+
+@dataclass(frozen=True)
+class EvidenceSettings(SegmentSettings):
+    """Also what counts as evidence of a stiffness.
+
+    Parameters
+    ----------
+    min_segments
+        Below this number of segments a result is marked uncertain.
+    min_coherence
+        Squared coherence of shaft and bearing motion below which there is no stiffness. At 0.9, a
+        bearing line that is noise to the rest makes equation (5) read 5 % high.
+    min_coverage
+        Share of the wanted segments below which a result is marked uncertain.
+    """
+
+    min_segments: int = 4
+    min_coherence: float = 0.9
+    min_coverage: float = 0.5
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """What one order line says of a bearing: amplitudes, equation (5) and transfer, with evidence."""
 
+import cmath
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -7,15 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.channel_budget import amplitude_budget, amplitude_lines
+from core.channel_budget import amplitude_budget, amplitude_lines, phase_budget, phase_lines
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
-from core.excitation import LineLimits, chance_coherence, line_excitation
+from core.excitation import EvidenceSettings, LineLimits, chance_coherence, line_excitation
 from core.machine import Bearing
 from core.quality import Quality, Reading, Reason, missing, worst
 from core.ratio import effective_stiffness_n_per_m
 from core.segments import ORDER1, VORTEX
 from core.sensor_checks import axes_quality, backward_share
-from core.settings import AnalysisSettings
 from core.spectral_statistics import independent_segments
 from core.stiffness_budget import ratio_budget, transfer_budgets
 from core.transfer import line_transfer
@@ -61,7 +62,7 @@ class OrderLine:
     """
 
     bearing: Bearing
-    settings: AnalysisSettings
+    settings: EvidenceSettings
     orders: CrossSpectrum
     bins: CrossSpectrum
     line: int
@@ -279,3 +280,42 @@ def _names(axes: str) -> tuple[str, str, str, str]:
         f"transfer_k_{axes}_n_per_m",
         f"transfer_c_{axes}_n_s_per_m",
     )
+
+
+PHASES = {f"order1_{name}_phase_deg": place for name, place in AMPLITUDES.items()}
+"""1× phases of the catalogue, with the place of their channel."""
+
+
+@dataclass(frozen=True)
+class Vectors:
+    """Vectors (n,) of one channel whose mean has a phase.
+
+    Parameters
+    ----------
+    quality
+        Of what is read from them; without a number, why.
+    """
+
+    um_pk: ComplexArray
+    quality: Quality | Reading
+    runout_um_pk: float
+
+
+def phase_readings(
+    channels: Mapping[str, Vectors],
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Phases, deg, positive where a vector leads, and their budgets, by quantity."""
+    readings: dict[str, Reading] = {}
+    found: dict[str, Budget | None] = {}
+    for name, vectors in channels.items():
+        mean = complex(vectors.um_pk.mean()) if vectors.um_pk.size else 0j
+        if isinstance(vectors.quality, Reading):
+            readings[name] = vectors.quality
+        elif mean == 0j:
+            readings[name] = missing(Reason.INSUFFICIENT_EXCITATION)
+        else:
+            phase_deg = math.degrees(cmath.phase(mean)) % 360.0
+            readings[name] = Reading(phase_deg, vectors.quality)
+            lines = phase_lines(vectors.runout_um_pk, abs(mean))
+            found[name] = phase_budget(phase_deg, vectors.um_pk, lines)
+    return with_budgets(readings, found)

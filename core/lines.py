@@ -3,12 +3,62 @@
 Amplitudes are zero-to-peak; the taper is Hann's, periodic, as in the paper (Brito et al., 3.1).
 """
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 from scipy import fft
 
 from core.arrays import ComplexArray, FloatArray, SampleArray
+from core.sensor_checks import SensorLimits
+
+
+@dataclass(frozen=True)
+class SegmentSettings:
+    """How samples are cut into segments and what is read off one; defaults after Brito et al., 3.1.
+
+    Parameters
+    ----------
+    segment_samples
+        Points of one Hann-tapered segment.
+    overlap
+        Share of a segment that the next one repeats.
+    n_segments
+        Segments that are averaged; 24 at 600 Hz are about five minutes.
+    max_frequency_hz
+        Spectra are kept up to here.
+    vortex_order
+        Nominal frequency of the part-load vortex in multiples of the running speed.
+    vortex_band
+        Orders within which its peak is looked for.
+    min_line_to_floor
+        Power of a line over the median of its surroundings from which it stands out.
+    min_speed_fraction
+        Share of the rated speed below which the machine counts as standing.
+    velocity_low_order, velocity_high_hz
+        Band of a bearing's broad-band velocity: from this multiple of the rated speed (a quarter
+        takes in everything down to the vortex) to this frequency.
+    sensors
+        What counts as a failed transducer or an unsteady record.
+    """
+
+    segment_samples: int = 8192
+    overlap: float = 0.125
+    n_segments: int = 24
+    max_frequency_hz: float = 25.0
+    vortex_order: float = 0.25
+    vortex_band: tuple[float, float] = (0.2, 0.4)
+    min_line_to_floor: float = 10.0
+    min_speed_fraction: float = 0.2
+    velocity_low_order: float = 0.25
+    velocity_high_hz: float = 1000.0
+    sensors: SensorLimits = field(default_factory=SensorLimits)
+
+    @property
+    def hop_samples(self) -> int:
+        """Samples from one segment's start to the next one's."""
+        return self.segment_samples - round(self.segment_samples * self.overlap)
+
 
 FINE_STEPS = 64
 """Samples of one run in a Fourier sum at any frequency."""

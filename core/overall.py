@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
+from core.lines import SegmentSettings
 from core.machine import Measurand, Unit
-from core.settings import AnalysisSettings
 from core.transducers import displacement_factor
 from core.units import hz_from_rpm
 
@@ -59,7 +59,7 @@ class OverallTransform:
         far as the sampling rate reaches.
     """
 
-    def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
+    def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
         ids = [channel.id for channel in unit.channels]
         self._is_displacement = np.array([c.measurand in DISPLACEMENTS for c in unit.channels])
         self._shafts = [[ids.index(b.shaft_x), ids.index(b.shaft_y)] for b in unit.bearings]

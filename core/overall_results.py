@@ -3,14 +3,12 @@
 import cmath
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from core.arrays import ComplexArray
-from core.channel_budget import amplitude_lines, phase_budget, phase_lines
+from core.channel_budget import amplitude_lines
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
-from core.line_results import AMPLITUDES
+from core.line_results import PHASES, Vectors, phase_readings
 from core.machine import Bearing
 from core.quality import Quality, Reading, Reason, current_mean, missing, worst
 from core.recent import RecentReadings
@@ -31,9 +29,6 @@ ORBIT = "overall_shaft_um_pk"
 
 OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
 """Broad-band quantities of the catalogue."""
-
-PHASES = {f"order1_{name}_phase_deg": place for name, place in AMPLITUDES.items()}
-"""1× phases of the catalogue, with the place of their channel."""
 
 
 def overall_results(
@@ -127,41 +122,6 @@ def phase_results(
             for name, place in PHASES.items()
         }
     )
-
-
-@dataclass(frozen=True)
-class Vectors:
-    """Vectors (n,) of one channel whose mean has a phase.
-
-    Parameters
-    ----------
-    quality
-        Of what is read from them; without a number, why.
-    """
-
-    um_pk: ComplexArray
-    quality: Quality | Reading
-    runout_um_pk: float
-
-
-def phase_readings(
-    channels: Mapping[str, Vectors],
-) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
-    """Phases, deg, positive where a vector leads, and their budgets, by quantity."""
-    readings: dict[str, Reading] = {}
-    found: dict[str, Budget | None] = {}
-    for name, vectors in channels.items():
-        mean = complex(vectors.um_pk.mean()) if vectors.um_pk.size else 0j
-        if isinstance(vectors.quality, Reading):
-            readings[name] = vectors.quality
-        elif mean == 0j:
-            readings[name] = missing(Reason.INSUFFICIENT_EXCITATION)
-        else:
-            phase_deg = math.degrees(cmath.phase(mean)) % 360.0
-            readings[name] = Reading(phase_deg, vectors.quality)
-            lines = phase_lines(vectors.runout_um_pk, abs(mean))
-            found[name] = phase_budget(phase_deg, vectors.um_pk, lines)
-    return with_budgets(readings, found)
 
 
 def _vectors(

@@ -11,7 +11,7 @@ from core.arrays import ComplexArray, FloatArray
 from core.blocks import SampleBlock
 from core.cross_spectrum import average
 from core.key_phase import KeyPhase, read_key_phase
-from core.lines import bin_phasors, exact_phasors, tapered
+from core.lines import SegmentSettings, bin_phasors, exact_phasors, tapered
 from core.machine import Channel, Unit
 from core.overall import Overall, OverallTransform
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
@@ -25,7 +25,6 @@ from core.sensor_checks import (
     quietest_rms,
     signal_quality,
 )
-from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
 from core.transducers import displacement_factor
 from core.units import hz_from_rpm
@@ -110,7 +109,7 @@ class SegmentTransform:
         Gives sampling rate, channels and rated speed.
     """
 
-    def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
+    def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
         self._unit = unit
         self._settings = settings
         bin_hz = unit.rate_hz / settings.segment_samples

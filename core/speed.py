@@ -9,11 +9,10 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.key_phase import KeyPhase
-from core.lines import peak_frequency_hz
+from core.lines import SegmentSettings, peak_frequency_hz
 from core.machine import Unit
 from core.quality import Reading, Reason, missing, uncertain
 from core.sensor_checks import checked_speed
-from core.settings import AnalysisSettings
 from core.units import hz_from_rpm, rpm_from_hz
 
 LINE_SEARCH = (0.85, 1.15)
@@ -58,7 +57,7 @@ def running_speed(
     slow: Mapping[str, Reading],
     frequency_hz: FloatArray,
     shaft_power: FloatArray,
-    settings: AnalysisSettings,
+    settings: SegmentSettings,
     key_phase: KeyPhase | None = None,
 ) -> Speed:
     """Take the best speed there is: key-phase, else speed channel, else 1× line, else rated value.
@@ -117,7 +116,7 @@ def _line(
     about_rpm: float,
     frequency_hz: FloatArray,
     shaft_power: FloatArray,
-    settings: AnalysisSettings,
+    settings: SegmentSettings,
 ) -> _Line | None:
     """The 1× line near an expected speed, if it stands above its surroundings."""
     about_hz = hz_from_rpm(about_rpm)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
+from core.condition.film_conditions import FilmConditions
 
 CodeArray: TypeAlias = npt.NDArray[np.int8]
 """Members of an IntEnum, one byte each."""
@@ -75,6 +76,11 @@ class StiffnessHistory:
 
     def __len__(self) -> int:
         return int(self.time_ns.size)
+
+    @property
+    def conditions(self) -> FilmConditions:
+        """What all readings are compared under."""
+        return FilmConditions(self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
         """The readings from row `start` up to, not including, row `stop`."""

@@ -9,15 +9,13 @@ import numpy.typing as npt
 from core.arrays import ComplexArray
 from core.channel_budget import amplitude_budget, amplitude_lines
 from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum, average
-from core.excitation import LineLimits, line_excitation
-from core.line_results import AMPLITUDES, DIRECTIONS
+from core.excitation import EvidenceSettings, LineLimits, line_excitation
+from core.line_results import AMPLITUDES, DIRECTIONS, PHASES, Vectors, phase_readings
 from core.machine import Bearing
-from core.overall_results import PHASES, Vectors, phase_readings
 from core.quality import GOOD, Quality, Reading, Reason, missing, worst
 from core.ratio import effective_stiffness_n_per_m
 from core.segments import ORDER1
 from core.sensor_checks import axes_quality, backward_share
-from core.settings import AnalysisSettings
 from core.stiffness_budget import transfer_budgets
 from core.transfer import line_transfer
 from core.uncertainty import Budget, reading_of, with_budgets
@@ -47,7 +45,7 @@ class VectorLine:
     """
 
     bearing: Bearing
-    settings: AnalysisSettings
+    settings: EvidenceSettings
     line: int
     frequency_hz: float
     phasors_um_pk: ComplexArray

@@ -8,12 +8,12 @@ import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray, SampleArray
 from core.blocks import SampleBlock
+from core.lines import SegmentSettings
 from core.machine import Unit
 from core.overall import Overall
 from core.quality import Level, Quality, Reading, Reason, bad
 from core.runout import RunoutVerdict
 from core.segments import ORDER1, VORTEX, Segment
-from core.settings import AnalysisSettings
 from core.speed import Speed, running_speed
 from core.transducers import displacement_factor
 from core.units import hz_from_rpm, ns_from_s
@@ -69,7 +69,7 @@ class PollReader:
         If a row is of a channel that the unit has not, or there twice.
     """
 
-    def __init__(self, unit: Unit, rows: Sequence[VectorRow], settings: AnalysisSettings) -> None:
+    def __init__(self, unit: Unit, rows: Sequence[VectorRow], settings: SegmentSettings) -> None:
         self._unit, self._settings = unit, settings
         self._row = {(row.channel, row.part): n for n, row in enumerate(rows)}
         known = {channel.id for channel in unit.channels}

@@ -16,7 +16,6 @@ from core.baseline.baseline import QuantityBaseline
 from core.baseline.groups import group_readings
 from core.baseline.robust import robust_std
 from core.baseline.watched import watched_values
-from core.condition.film_conditions import FilmConditions
 from core.stiffness_history import StiffnessHistory
 
 SPELL_DAYS = 8
@@ -45,7 +44,7 @@ def learning_drift(
     -------
     None if too few conditions were met again in other spells.
     """
-    conditions = FilmConditions.of(history)
+    conditions = history.conditions
     value, _ = watched_values(history, baseline.quantity, baseline.direction)
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
     if not usable.any():

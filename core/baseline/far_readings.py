@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from core.baseline.baseline import BearingBaseline
 from core.baseline.watched import watched_values
-from core.condition.film_conditions import FilmConditions
 from core.stiffness_history import StiffnessHistory
 
 FAR = math.log(2.0)
@@ -28,7 +27,7 @@ def far_readings(
     is_settled : (n,)
         Whether the unit had settled in a steady state.
     """
-    conditions, counts = FilmConditions.of(history), []
+    conditions, counts = history.conditions, []
     for learned in baseline.quantities:
         values = watched_values(history, learned.quantity, learned.direction)
         found = learned.compare(conditions, *values)

@@ -72,7 +72,7 @@ def _learn_quantity(
     direction: str,
     settings: BaselineSettings,
 ) -> QuantityBaseline | None:
-    conditions = FilmConditions.of(history)
+    conditions = history.conditions
     value, u_random = watched_values(history, quantity, direction)
     usable = is_settled & settings.is_known(conditions) & np.isfinite(value)
     time_ns, conditions, value = history.time_ns[usable], conditions.rows(usable), value[usable]

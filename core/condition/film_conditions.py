@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.stiffness_history import StiffnessHistory
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +21,6 @@ class FilmConditions:
     eccentricity_ratio: FloatArray
     oil_temperature_c: FloatArray
     attitude_deg: FloatArray
-
-    @classmethod
-    def of(cls, history: StiffnessHistory) -> Self:
-        """Conditions of all readings of a history."""
-        return cls(history.eccentricity_ratio, history.oil_temperature_c, history.attitude_deg)
 
     @classmethod
     def one(cls, eccentricity_ratio: float, oil_temperature_c: float, attitude_deg: float) -> Self:

@@ -8,7 +8,6 @@ import numpy.typing as npt
 from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.watched import watched_values
-from core.condition.film_conditions import FilmConditions
 from core.decision.decision import least_step_ns, readings_of
 from core.decision.finding_history import FindingHistory, finding_history
 from core.decision.level_history import level_history
@@ -57,7 +56,7 @@ def back_test(
     is_settled : (n,)
         Whether the unit had settled in a steady state.
     """
-    conditions = FilmConditions.of(history)
+    conditions = history.conditions
     value, u_random = watched_values(history, baseline.quantity, baseline.direction)
     unusable = _unusable(history, is_settled, baseline, np.isfinite(value))
     found = baseline.compare(conditions, value, u_random)
@@ -77,7 +76,7 @@ def _unusable(
     is_there: _Bools,
 ) -> CodeArray:
     """(n,) why a reading cannot be used; -1 if it can."""
-    is_known = baseline.is_known(FilmConditions.of(history)) & is_there
+    is_known = baseline.is_known(history.conditions) & is_there
     why = np.where(is_known, -1, Verdict.BAD_QUALITY).astype(np.int8)
     evidence = history.evidence[DIRECTIONS.index(baseline.direction)]
     for said, verdict in OF_EVIDENCE.items():

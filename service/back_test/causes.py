@@ -15,7 +15,6 @@ from core.baseline.response import (
     place_columns,
 )
 from core.baseline.watched import watched_values
-from core.condition.film_conditions import FilmConditions
 from core.decision.attribution import Attribution, Cause, PlaceReadings, attribute
 from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.back_test.bearing_run import BackTestRules, BearingRun
@@ -108,7 +107,7 @@ def _compared_places(run: BearingRun, direction: str) -> tuple[FloatArray, Float
         rows = slice(period.period.learned, period.period.end)
         history = run.rows.history.rows(rows.start, rows.stop)
         value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-        conditions = FilmConditions.of(history)
+        conditions = history.conditions
         deviation[rows] = baseline.compare(conditions, value, u_random).deviation
         rise[rows] = baseline.eccentricity_rise(conditions)
     return np.where(run.operation.is_settled, deviation, np.nan), rise

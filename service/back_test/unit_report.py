@@ -7,7 +7,6 @@ import numpy as np
 from core.arrays import FloatArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.cell_table import Support
-from core.condition.film_conditions import FilmConditions
 from core.condition.operating_state import OperatingState
 from core.decision.attribution import Attribution
 from core.decision.verdict import JUDGED, Verdict
@@ -95,7 +94,7 @@ def _change(found: Change) -> ChangeReport:
 
 
 def _condition(run: BearingRun, row: int, baseline: QuantityBaseline | None) -> ConditionReport:
-    here = FilmConditions.of(run.rows.history).rows(np.array([row]))
+    here = run.rows.history.conditions.rows(np.array([row]))
     cell = None
     if baseline is not None and baseline.grid.is_known(here)[0]:
         cell = tuple(int(n) for n in baseline.grid.cells(here)[:, 0])

@@ -9,7 +9,6 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
 from core.baseline.learning import learn
 from core.baseline.response import learn_response
-from core.condition.film_conditions import FilmConditions
 from core.condition.operation_history import OperationHistory, operation_history
 from core.decision.back_test import DecisionHistory, back_test
 from core.estimators import STIFFNESS_OF
@@ -135,7 +134,7 @@ def _deviation(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], learned: QuantityBaseline
 ) -> tuple[FloatArray, FloatArray]:
     row = DIRECTIONS.index(learned.direction)
-    found = learned.compare(FilmConditions.of(history), history.ln_k[row], history.u_random[row])
+    found = learned.compare(history.conditions, history.ln_k[row], history.u_random[row])
     is_compared = is_settled & (found.place >= 0)
     std = np.hypot(found.scatter, found.surface_std)
     return np.where(is_compared, found.deviation, np.nan), np.where(is_compared, std, np.nan)

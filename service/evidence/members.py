@@ -6,7 +6,6 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline
 from core.condition.cells import Cell
-from core.condition.film_conditions import FilmConditions
 from core.films.film_rules import FilmRules
 from core.stiffness_history import StiffnessHistory
 from core.units import NS_PER_S
@@ -74,7 +73,7 @@ def members_of(
     )
     found = store.history(query)
     history = found.history
-    conditions = FilmConditions.of(history)
+    conditions = history.conditions
     in_cell = np.ones(len(history), np.bool_)
     if len(history):
         wanted = np.array(cell)[:, np.newaxis]

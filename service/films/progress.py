@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.condition.film_conditions import FilmConditions
 from core.condition.operating_state import STEADY
 from core.decision.verdict import JUDGED
 from core.stiffness_history import Evidence
@@ -128,5 +127,5 @@ def _recent(
 
 def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
     """(n,) for each direction: whether readings have stiffness and condition."""
-    is_known = settings.baseline.settings().is_known(FilmConditions.of(found.history))
+    is_known = settings.baseline.settings().is_known(found.history.conditions)
     return [is_known & (evidence == Evidence.MEASURED) for evidence in found.history.evidence]

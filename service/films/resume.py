@@ -8,7 +8,6 @@ import numpy as np
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Watched
 from core.baseline.response import ShaftResponse
-from core.condition.film_conditions import FilmConditions
 from core.condition.oil_settling import OilSettling
 from core.condition.operating_state import Operation
 from core.decision.decision import UNDECIDED, Decision
@@ -137,5 +136,5 @@ def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> Float
     for row, direction in enumerate(DIRECTIONS):
         learned = baseline.of(Watched.STIFFNESS, direction) if baseline else None
         if learned is not None:
-            rises[row] = learned.eccentricity_rise(FilmConditions.of(history))
+            rises[row] = learned.eccentricity_rise(history.conditions)
     return rises

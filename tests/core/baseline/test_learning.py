@@ -36,7 +36,7 @@ def learned(
 
 
 def deviation(baseline: QuantityBaseline, history: StiffnessHistory) -> np.ndarray:
-    conditions = FilmConditions.of(history)
+    conditions = history.conditions
     return baseline.compare(conditions, history.ln_k[0], history.u_random[0]).deviation
 
 
@@ -53,7 +53,7 @@ def test_what_never_changes_is_its_own_baseline_and_a_stiffer_bracket_moves_both
     healthy: StiffnessHistory,
 ) -> None:
     constant = learned(with_ln_k(healthy, np.full_like(healthy.ln_k, 20.0)))
-    heights = constant.surface.at(FilmConditions.of(healthy))
+    heights = constant.surface.at(healthy.conditions)
     assert np.allclose(heights, 20.0, rtol=0.0, atol=1e-9)
     assert {cell.location for cell in constant.table.cells} == {20.0}
     moved = with_ln_k(healthy, healthy.ln_k + 0.5)
@@ -89,7 +89,7 @@ def test_the_surface_is_as_near_the_truth_as_it_says(film_life: FilmLife) -> Non
     for seed in range(6):
         history = film_life(seed)
         baseline = learned(history)
-        conditions = FilmConditions.of(history)
+        conditions = history.conditions
         e, oil_c = conditions.eccentricity_ratio, conditions.oil_temperature_c
         truth = np.log(0.5e9) + 4.0 * (e - 0.4) - 0.02 * (oil_c - 45.0)
         found = baseline.compare(conditions, truth, history.u_random[0])
@@ -110,7 +110,7 @@ def test_nothing_is_compared_outside_the_learned_support_nor_at_an_unseen_attitu
     random = np.random.default_rng(4)
     attitude_deg = 30.0 + random.normal(0.0, 3.0, len(healthy))
     baseline = learned(replace(healthy, attitude_deg=attitude_deg))
-    turned = FilmConditions.of(replace(healthy, attitude_deg=attitude_deg + 90.0))
+    turned = replace(healthy, attitude_deg=attitude_deg + 90.0).conditions
     found = baseline.compare(turned, healthy.ln_k[0], healthy.u_random[0])
     assert np.mean(found.place >= 0) < 0.01
 

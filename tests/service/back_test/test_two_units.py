@@ -15,7 +15,6 @@ from core.baseline.learning import learn
 from core.baseline.response import learn_response, place_columns
 from core.baseline.settings import BaselineSettings
 from core.baseline.watched import watched_values
-from core.condition.film_conditions import FilmConditions
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operation_history import operation_history
 from core.decision.attribution import PlaceReadings, attribute
@@ -149,7 +148,7 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
             for b, d in places
         ]
     )
-    rise = [films[b, d].eccentricity_rise(FilmConditions.of(histories[b])) for b, d in places]
+    rise = [films[b, d].eccentricity_rise(histories[b].conditions) for b, d in places]
     attitude = [histories[b].attitude_deg for b, _ in places]
     begins = [rfc3339(int(t)) == alarm.begin for t in life.operation.time_ns]
     known = np.isfinite(deviation[places.index(("LJB", "x"))])
@@ -170,7 +169,7 @@ def _film(baselines: Any, bearing: str, direction: str) -> Any:
 
 def _deviation(history: Any, film: Any, direction: str) -> Any:
     value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-    return film.compare(FilmConditions.of(history), value, u_random).deviation
+    return film.compare(history.conditions, value, u_random).deviation
 
 
 def test_every_reading_is_counted_once(two_units: Any, histories: Histories, found: Found) -> None:

@@ -12,7 +12,6 @@ import pytest
 from core.assessment import Assessment
 from core.baseline.baseline import Watched
 from core.condition.bearing_condition import BearingCondition
-from core.condition.film_conditions import FilmConditions
 from core.condition.operating_state import OperatingState
 from core.condition.operation_history import operation_history
 from core.decision.decision import UNDECIDED
@@ -142,7 +141,7 @@ class Machine:
     def _learned(self, direction: str) -> float:
         """What was learned of the upper bearing under that condition, in ln."""
         learned = self._service.films.baseline("U1", "UJB").of(Watched.STIFFNESS, direction)
-        newest = FilmConditions.of(self._lived).rows(np.array([len(self._lived) - 1]))
+        newest = self._lived.conditions.rows(np.array([len(self._lived) - 1]))
         return float(learned.surface.at(newest)[0])
 
 
