@@ -1,1 +1,1 @@
-"""Plant protocols on one side, :class:`core.blocks.SampleBlock` on the other."""
+"""Plant protocols on one side, :class:`core.samples.blocks.SampleBlock` on the other."""

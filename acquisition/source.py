@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import AbstractAsyncContextManager
 from typing import Protocol, runtime_checkable
 
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 
 
 class SampleSource(Protocol):

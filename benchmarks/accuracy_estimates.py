@@ -5,15 +5,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from benchmarks.accuracy_plant import BearingSpectra
-from core.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
-from core.dynamic import dynamic_stiffness
-from core.dynamic_settings import DynamicSettings
-from core.excitation import LineLimits, line_excitation
-from core.machine import BearingAccuracy
+from core.machine.unit import BearingAccuracy
 from core.quality import Reason
-from core.segments import ORDER1, VORTEX
-from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
-from core.transfer import line_transfer
+from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from core.spectra.segments import ORDER1, VORTEX
+from core.stiffness.dynamic import dynamic_stiffness
+from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.evidence import LineLimits, line_excitation
+from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
+from core.stiffness.transfer import line_transfer
 from core.uncertainty import Budget
 
 LINES = {"1×": ORDER1, "vortex": VORTEX}

@@ -9,27 +9,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition.calibration import (
+from acquisition.delivery.calibration import (
     ChannelCalibration,
     SlowCalibration,
     UnitCalibration,
     calibrate,
 )
-from acquisition.simulated.plant import CHUNK_SAMPLES
-from acquisition.simulated.scenario import ChannelScenario, Scenario, TransducerNoise
-from acquisition.simulated.unit import SimulatedUnit
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.plant import CHUNK_SAMPLES
+from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
+from acquisition.simulated.plant.rotor_parameters import (
+    ForcePlane,
+    RotorParameters,
+    unbalance_force_n,
+)
+from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
+from acquisition.simulated.plant.unit import SimulatedUnit
 from core.arrays import FloatArray
-from core.blocks import SampleBlock
-from core.bracket import BracketDynamics
-from core.cross_spectrum import CrossSpectrum, average
-from core.film import Film
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.ring import Ring
-from core.rotor import bearing_response, forward_force, rotor_matrices
-from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
-from core.segments import SegmentTransform
-from core.settings import AnalysisSettings
-from core.transducer_response import Response
+from core.machine.bracket import BracketDynamics
+from core.machine.response import Response
+from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.monitor.settings import AnalysisSettings
+from core.samples.blocks import SampleBlock
+from core.samples.ring import Ring
+from core.spectra.cross_spectrum import CrossSpectrum, average
+from core.spectra.segments import SegmentTransform
 
 RATE_HZ = 600.0
 START_NS = 1_790_000_000_000_000_000

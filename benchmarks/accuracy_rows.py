@@ -4,14 +4,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
-from acquisition.simulated.scenario import BearingScenario, HydraulicNoise, Scenario, VortexRope
+from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film
+from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
+from acquisition.simulated.plant.rotor_parameters import (
+    ForcePlane,
+    RotorParameters,
+    unbalance_force_n,
+)
+from acquisition.simulated.plant.scenario import (
+    BearingScenario,
+    HydraulicNoise,
+    Scenario,
+    VortexRope,
+)
 from benchmarks.accuracy_plant import IDEAL, REALISTIC, Run, Transducers
-from core.excitation import LineLimits
-from core.film import DAMPING_OVER_STIFFNESS_S, Film
-from core.machine import BearingAccuracy, Measurand
-from core.rotor import bearing_response, forward_force, rotor_matrices
-from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
-from core.transducer_response import HighPass, Response
+from core.machine.response import HighPass, Response
+from core.machine.unit import BearingAccuracy, Measurand
+from core.stiffness.evidence import LineLimits
 from service.validation import paper
 
 MINUTE_S = 60.0

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.calibration import calibrate
 from acquisition.clock import SystemClock
+from acquisition.delivery.calibration import calibrate
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.blocks import SampleBlock
-from core.device_clock import DeviceClock
 from core.limits import Limits
 from core.quality import GOOD, Reading, Reason, bad
+from core.samples.blocks import SampleBlock
+from core.samples.device_clock import DeviceClock
 from service.conversion import calibration_of, machine_of
 from service.origin import Origin
 from service.settings.loading import load_plant_file

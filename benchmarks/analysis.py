@@ -20,9 +20,12 @@ import scipy.signal
 
 from benchmarks.accuracy_plant import RATE_HZ, machine
 from core.arrays import FloatArray
-from core.blocks import SampleBlock
-from core.bracket import BracketDynamics
-from core.cross_spectrum import (
+from core.machine.bracket import BracketDynamics
+from core.machine.unit import BearingAccuracy, Measurand, Unit
+from core.monitor.settings import AnalysisSettings
+from core.quality import GOOD, Reading
+from core.samples.blocks import SampleBlock
+from core.spectra.cross_spectrum import (
     BEARING_X,
     BEARING_Y,
     SHAFT_X,
@@ -30,15 +33,12 @@ from core.cross_spectrum import (
     CrossSpectrum,
     average,
 )
-from core.dynamic import DynamicStiffness, dynamic_stiffness
-from core.dynamic_settings import DynamicSettings
-from core.machine import BearingAccuracy, Measurand, Unit
-from core.quality import GOOD, Reading
-from core.segments import ORDER1, VORTEX, SegmentTransform
-from core.settings import AnalysisSettings
-from core.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
-from core.transfer import line_transfer
-from core.whirl import whirl
+from core.spectra.segments import ORDER1, VORTEX, SegmentTransform
+from core.spectra.vortex import whirl
+from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
+from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
+from core.stiffness.transfer import line_transfer
 
 REQUIRED_RATIO = 300.0
 WINDOW_S = 300

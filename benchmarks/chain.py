@@ -24,10 +24,10 @@ from benchmarks.chain_unit import readings
 from benchmarks.detection_unit import LearnedUnit
 from core.arrays import FloatArray
 from core.baseline.response import Place
-from core.decision.verdict import JUDGED, Verdict
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmReading
-from core.stiffness_history import DIRECTIONS
+from core.baseline.stiffness_history import DIRECTIONS
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmReading
+from core.change.verdict import JUDGED, Verdict
 
 STORY = Story(seed=2002, day=141.0)
 SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -21,6 +21,10 @@ from benchmarks.detection_unit import (
     YEARS,
     LearnedUnit,
 )
+from core.baseline.stiffness_history import Evidence
+from core.change.film_judge import FilmJudge, FilmNews
+from core.change.film_reading import FilmReading, FilmValue
+from core.change.film_rules import FilmRules
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operating_state import (
@@ -29,12 +33,8 @@ from core.condition.operating_state import (
     Operation,
     advance,
 )
-from core.films.film_judge import FilmJudge, FilmNews
-from core.films.film_reading import FilmReading, FilmValue
-from core.films.film_rules import FilmRules
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from core.quality import Reason
-from core.stiffness_history import Evidence
 from core.units import ns_from_s
 
 ROWS_PER_H = 6

@@ -7,21 +7,21 @@ ones; so are the settings.
 import math
 from dataclasses import dataclass
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.delivery import Delivery
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
 from acquisition.simulated.life.measured import RUNOUT_UM_PK
-from acquisition.simulated.plant import CHUNK_SAMPLES
-from acquisition.simulated.scenario import Scenario
-from acquisition.simulated.unit import SimulatedUnit
-from core.assessment import Assessment
+from acquisition.simulated.plant.plant import CHUNK_SAMPLES
+from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.scenario import Scenario
+from acquisition.simulated.plant.unit import SimulatedUnit
+from core.change.film_reading import FilmReading, film_reading
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.films.film_reading import FilmReading, film_reading
-from core.machine import Bearing, Channel, Estimator, Measurand, Unit
-from core.monitor import UnitMonitor
-from core.rotor_parameters import RotorParameters
-from core.settings import AnalysisSettings
+from core.machine.unit import Bearing, Channel, Estimator, Measurand, Unit
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
 from core.units import ns_from_s
 
 RATE_HZ = 600.0

@@ -7,9 +7,9 @@ import numpy as np
 from acquisition.simulated.life.condition_change import cooling_failure, four_fold
 from acquisition.simulated.life.damage import Damage, DamageKind
 from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit
-from core.decision.attribution import Cause
-from core.decision.verdict import Verdict
-from core.stiffness_history import DIRECTIONS
+from core.baseline.stiffness_history import DIRECTIONS
+from core.change.attribution import Cause
+from core.change.verdict import Verdict
 
 ROWS_PER_H = 6
 MARGIN_DAYS = 100

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.smoothing import running_median
-from core.decision.level_history import level_history
+from core.change.level_history import level_history
 
 N_ON, N_OFF = 6, 48
 """An hour and eight, as for the sequential test."""

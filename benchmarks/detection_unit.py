@@ -10,21 +10,21 @@ from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.damage import Damage
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.plant.rotor_parameters import RotorParameters
 from benchmarks.detection_fixed import BANDS, FixedThreshold
 from core.arrays import FloatArray
 from core.baseline.baseline import Origin, QuantityBaseline, Watched
 from core.baseline.learning import learn
 from core.baseline.response import MEAN_READINGS, Place, learn_response, place_columns
 from core.baseline.settings import BaselineSettings
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.baseline.watched import watched_values
+from core.change.attribution import Attribution, PlaceReadings, attribute
+from core.change.back_test import DecisionHistory, back_test
+from core.change.operation_history import operation_history
+from core.change.settings import ChangeLimits
+from core.change.verdict import JUDGED
 from core.condition.operating_limits import OperatingLimits
-from core.condition.operation_history import operation_history
-from core.decision.attribution import Attribution, PlaceReadings, attribute
-from core.decision.back_test import DecisionHistory, back_test
-from core.decision.limits import ChangeLimits
-from core.decision.verdict import JUDGED
-from core.rotor_parameters import RotorParameters
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
 
 DAY_NS = 86_400 * 10**9
 START_NS = 19_723 * DAY_NS

@@ -13,7 +13,7 @@ import numpy as np
 
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.life_truth import UnitLife
-from core.stiffness_history import Evidence
+from core.baseline.stiffness_history import Evidence
 from core.units import NS_PER_S
 
 START_NS = 1_735_689_600 * NS_PER_S

@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery import Delivery
-from core.blocks import SampleBlock
+from acquisition.delivery.blocks import Delivery
+from core.samples.blocks import SampleBlock
 from service.continuous.joining import join
 from service.continuous.pieces import TapeSettings
 from service.continuous.unit_tape import UnitTape

@@ -10,8 +10,8 @@ import sys
 import time
 from collections.abc import Callable
 
+from core.monitor.catalogue import CATALOGUE
 from core.quality import Level
-from core.quantities import CATALOGUE
 from service.api.models import ApiModel, LevelName
 from service.api.trend_views import trend_model
 from service.api.views import LEVEL_NAMES

@@ -17,7 +17,7 @@ import numpy as np
 
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
-from core.quantities import CATALOGUE
+from core.monitor.catalogue import CATALOGUE
 from service.api.trend_groups import trend_groups
 from service.api.trend_views import trend_columns, trend_model
 from service.store.codec import Layout, columns_of, remember_layout

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import AsyncIterator
 
 from acquisition.clock import Clock
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 
 
 class Bus:

@@ -1,11 +1,11 @@
 """From the plant file's settings to the plain values that core and adapters take."""
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from core.dynamic_settings import DynamicSettings
-from core.machine import Bearing, BearingAccuracy, Channel, GapAccuracy, Unit
-from core.sensor_checks import SensorLimits
-from core.settings import AnalysisSettings
-from core.usable_lines import LineSelection
+from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from core.checks.sensor_checks import SensorLimits
+from core.machine.unit import Bearing, BearingAccuracy, Channel, GapAccuracy, Unit
+from core.monitor.settings import AnalysisSettings
+from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.usable_lines import LineSelection
 from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings
 from service.settings.plant import AnalysisModel

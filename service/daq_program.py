@@ -8,8 +8,8 @@ import threading
 from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack, suppress
 
-from acquisition.daq.port import DaqServer
 from acquisition.errors import AcquisitionError
+from acquisition.simulated.devices.port import DaqServer
 
 Tell = Callable[[str], None]
 

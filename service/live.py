@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from acquisition.clock import Clock
-from core.account import SampleAccount
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.device_clock import DeviceClock, StampFault
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
 from core.quality import Quality, Reading, Reason, bad, missing
-from core.quantities import CATALOGUE
+from core.samples.account import SampleAccount
+from core.samples.blocks import SampleBlock
+from core.samples.device_clock import DeviceClock, StampFault
 from service.capture.history import BlockHistory
 
 HELD_S = 10.0

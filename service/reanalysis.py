@@ -2,10 +2,10 @@
 
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 
-from acquisition.calibration import UnitCalibration
+from acquisition.delivery.calibration import UnitCalibration
 from acquisition.source import SampleSource
-from core.assessment import Assessment
-from core.monitor import UnitMonitor
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from service.api.models import (
     ApiModel,
     EstimatorName,

@@ -13,9 +13,9 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.event import AlarmNews
-from core.assessment import Assessment
-from core.cross_spectrum import NO_SPECTRUM
-from core.films.film_judge import FilmNews
+from core.change.film_judge import FilmNews
+from core.monitor.assessment import Assessment
+from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.heartbeats import UNHEARD, Pulse
 from service.live import LiveView
 from service.parked_rows import ParkedRows

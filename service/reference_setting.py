@@ -1,6 +1,6 @@
 """What a reference is made of: gaps given by hand, or those measured just now."""
 
-from core.machine import Bearing
+from core.machine.unit import Bearing
 from core.quality import Level
 from core.units import s_from_ns
 from service.api.times import rfc3339

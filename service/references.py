@@ -8,7 +8,7 @@ from typing import Protocol
 import structlog
 
 from acquisition.clock import Clock
-from core.machine import Bearing, Unit
+from core.machine.unit import Bearing, Unit
 from service.heartbeats import UNHEARD, Pulse
 from service.store.gap_reference import GapReference
 from service.store.port import Store, StoreError

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from acquisition.errors import LinkError
 from acquisition.source import SampleSource
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from service.settings.plant import PlantFile
 from service.settings.store import StoreSettings

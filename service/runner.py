@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Mapping
 
 from acquisition.clock import Clock
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.alarms.engine import AlarmEngine
 from service.bus import Bus
 from service.films.keeper import FilmKeeper

@@ -24,11 +24,11 @@ from hypothesis import settings as hypothesis_settings
 from rigs.assessments import assessment as build_assessment
 from scipy.signal import lfilter
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.raw import RawBlock
+from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from acquisition.delivery.raw import RawBlock
 from core.arrays import FloatArray
-from core.assessment import Assessment
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
+from core.monitor.assessment import Assessment
 
 NS_PER_S = 1_000_000_000
 

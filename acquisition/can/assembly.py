@@ -11,8 +11,8 @@ from acquisition.can.pause import PauseCheck
 from acquisition.can.plan import Part, Plan
 from acquisition.can.raw_blocks import RawBlockBuilder
 from acquisition.can.uncounted import UncountedInstants
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import FrameError
-from acquisition.raw import RawBlock
 
 
 class Assembler:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-from acquisition.calibration import UnitCalibration
 from acquisition.can.dbc import DbcSignal, load_dbc, parse_dbc
 from acquisition.can.layout import FrameLayout, ScalarReader, scalar_reader
 from acquisition.can.plan import (
@@ -27,6 +26,7 @@ from acquisition.can.waveforms import (
     is_counts,
     require_full_scale,
 )
+from acquisition.delivery.calibration import UnitCalibration
 from acquisition.errors import ConfigError
 
 _MIN_COUNTER_BITS = 2

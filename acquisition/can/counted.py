@@ -8,7 +8,7 @@ from acquisition.can.instants import Instant, PendingInstant, Refusal, RefusalCo
 from acquisition.can.plan import Counter as PartCounter
 from acquisition.can.plan import Part, Plan
 from acquisition.can.rivals import Rivals
-from acquisition.epochs import Epochs
+from acquisition.delivery.epochs import Epochs
 
 MAX_PENDING = 64
 """Instants that may be incomplete at the same time."""

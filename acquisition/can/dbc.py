@@ -9,8 +9,8 @@ from cantools.database import load_string
 from cantools.database.can import Database, Message, Signal
 from cantools.database.errors import Error as DatabaseError
 
+from acquisition.delivery.small_file import read_small_file
 from acquisition.errors import ConfigError, FrameError
-from acquisition.small_file import read_small_file
 
 MAX_FILE_BYTES = 8_000_000
 MAX_SAID = 500

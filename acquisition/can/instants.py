@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from core.blocks import UNCOUNTED_LOSS as UNCOUNTED
+from core.samples.blocks import UNCOUNTED_LOSS as UNCOUNTED
 
 
 class Refusal(StrEnum):

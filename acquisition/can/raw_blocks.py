@@ -9,10 +9,10 @@ import numpy as np
 from acquisition.can.instants import Instant, Refusal, RefusalCounts
 from acquisition.can.plan import EPOCH, OK_BITS, SECONDS, Plan
 from acquisition.can.tracks import Tracks, ok_flags
-from acquisition.host_stamps import HostStamps
-from acquisition.raw import RawBlock
+from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.raw import RawBlock
 from core.arrays import RawArray
-from core.blocks import Rejection
+from core.samples.blocks import Rejection
 
 
 class RawBlockBuilder:

@@ -10,16 +10,16 @@ from typing import Literal
 
 import can
 
-from acquisition.arrival import Arrival
 from acquisition.can.bus import foreign_errors_renamed
 from acquisition.can.error_frames import lost_in_controller, require_bus
 from acquisition.can.gate import Frame, FrameGate
 from acquisition.can.instants import Refusal, RefusalCounts
-from acquisition.can.interface_clock import InterfaceClock
 from acquisition.can.slcan import SlcanBus
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.interface_clock import InterfaceClock
 from acquisition.errors import FrameError, LinkError
-from core.device_clock import StampFault
+from core.samples.device_clock import StampFault
 
 _RECEIVE_S = 0.1
 _REST_S = 0.005

@@ -6,21 +6,21 @@ from contextlib import aclosing, asynccontextmanager
 
 import can
 
-from acquisition.calibration import UnitCalibration
 from acquisition.can.assembly import Assembler
 from acquisition.can.bus import LINUX_ERROR_FRAMES, open_bus
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
-from acquisition.can.interface_clock import InterfaceClock
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.can.uncounted import MAX_UNSURE_NS
 from acquisition.clock import Clock
-from acquisition.delivery import Delivery
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.interface_clock import InterfaceClock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import LinkError
-from acquisition.raw import RawBlock
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S, ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]

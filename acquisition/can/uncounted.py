@@ -2,7 +2,7 @@
 
 from acquisition.can.instants import Instant, Refusal, RefusalCounts
 from acquisition.can.plan import Part, Plan
-from acquisition.epochs import Epochs
+from acquisition.delivery.epochs import Epochs
 from core.units import NS_PER_S
 
 MAX_UNSURE_NS = NS_PER_S

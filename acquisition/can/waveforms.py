@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.calibration import COUNTS_FULL_SCALE, ChannelCalibration
 from acquisition.can.dbc import DbcSignal
 from acquisition.can.layout import FrameLayout, byte_offset
 from acquisition.can.settings import CanChannel
 from acquisition.can.units import known_unit, spellings
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE, ChannelCalibration
 from acquisition.errors import ConfigError
 from core.arrays import RawArray, SampleArray
 

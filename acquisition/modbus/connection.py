@@ -11,6 +11,7 @@ from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
 
+from acquisition.delivery.stopping import let_stop_through
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import ReadOnlyFramer, Reply, RtuFramer, TcpFramer
 from acquisition.modbus.refusals import BUSY, refusal_error
@@ -20,7 +21,6 @@ from acquisition.modbus.transport import (
     SerialTransport,
     TcpTransport,
 )
-from acquisition.stopping import let_stop_through
 
 _RECEIVE_LIMIT_BYTES = 1 << 20  # the framer judges every byte; pymodbus' own limit drops silently
 _CLOSED = "the device closed the connection"

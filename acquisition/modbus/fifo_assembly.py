@@ -7,8 +7,8 @@ import numpy as np
 
 from acquisition.errors import FrameError
 from acquisition.modbus.counted_samples import WRAP, CountedSamples, Place
+from acquisition.modbus.fifo_layout import FifoPiece
 from acquisition.modbus.uncounted_samples import UncountedSamples
-from acquisition.registers.fifo_layout import FifoPiece
 from core.arrays import CountArray
 
 _MOST_EPOCHS = 2

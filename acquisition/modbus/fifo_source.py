@@ -4,22 +4,22 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
-from acquisition.arrival import Arrival
-from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
-from acquisition.delivery import Delivery
+from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.freshness import Freshness
+from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError, LinkError
-from acquisition.host_stamps import HostStamps
 from acquisition.modbus.counted_samples import CountedSamples
 from acquisition.modbus.fifo_assembly import ChannelAssembly, PlacedSamples, place_records
-from acquisition.modbus.freshness import Freshness
+from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.transport import LinkSettings
 from acquisition.modbus.uncounted_samples import UncountedSamples
-from acquisition.modbus.wrong_replies import wrong_replies_drop_the_link
-from acquisition.raw import RawBlock
-from acquisition.registers.fifo_layout import FifoKind, FifoLayout, FifoPiece
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 
 

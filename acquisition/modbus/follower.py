@@ -3,15 +3,15 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from acquisition.epochs import Epochs
+from acquisition.delivery.epochs import Epochs
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.profile import RingHeader
 from acquisition.modbus.ring_layout import U32, RingLayout
 from acquisition.modbus.ring_reader import RingReader
 from acquisition.modbus.slot import Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
-from acquisition.raw import RawBlock
-from core.blocks import Rejection
+from core.samples.blocks import Rejection
 
 _N_REREADS = 3
 """A device needs milliseconds to write a slot; still torn after this many round trips, it lies."""

@@ -15,7 +15,7 @@ from pymodbus.framer.base import FramerBase
 from pymodbus.pdu import DecodePDU, ModbusPDU
 
 from acquisition.errors import FrameError
-from acquisition.modbus.replies import (
+from acquisition.modbus.requests import (
     EXCEPTION_BIT,
     MAX_PDU_BYTES,
     ReplyShape,

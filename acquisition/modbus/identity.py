@@ -5,7 +5,7 @@ from typing import Protocol, TypeAlias
 
 from acquisition.errors import ConfigError
 from acquisition.modbus.identification import Identification
-from acquisition.modbus.replies import READ_HOLDING_REGISTERS
+from acquisition.modbus.requests import READ_HOLDING_REGISTERS
 
 _N_TRIES = 2
 """A reply that was changed on the way is not another device."""

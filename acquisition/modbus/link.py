@@ -12,7 +12,7 @@ from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.connection import Connection
 from acquisition.modbus.identification import Identification
 from acquisition.modbus.identity import require_identity
-from acquisition.modbus.replies import (
+from acquisition.modbus.requests import (
     READ_COILS,
     READ_DISCRETE_INPUTS,
     READ_HOLDING_REGISTERS,

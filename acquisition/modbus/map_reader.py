@@ -1,10 +1,10 @@
 """`MapReader`: reads a register map over an open link, poll by poll."""
 
 from acquisition.errors import ConfigError
+from acquisition.modbus.cells import BIT_FUNCTIONS, reads_as
+from acquisition.modbus.decoding import CellDecoder, MapDecoder, MapReading
 from acquisition.modbus.link import ModbusLink
-from acquisition.registers.cells import BIT_FUNCTIONS, reads_as
-from acquisition.registers.decoding import CellDecoder, MapDecoder, MapReading
-from acquisition.registers.read_plan import ReadPlan, plan_signature
+from acquisition.modbus.read_plan import ReadPlan, plan_signature
 
 
 class MapReader:

@@ -9,22 +9,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.arrival import Arrival
-from acquisition.calibration import ChannelCalibration, UnitCalibration
 from acquisition.clock import Clock
-from acquisition.delivery import Delivery
+from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration
+from acquisition.delivery.freshness import Freshness
+from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.ticks import Ticks
+from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError
-from acquisition.host_stamps import HostStamps
-from acquisition.modbus.freshness import Freshness
+from acquisition.modbus.decoding import MapDecoder, MapReading, ValueState
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.map_reader import MapReader
-from acquisition.modbus.ticks import Ticks
+from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.transport import LinkSettings
-from acquisition.modbus.wrong_replies import wrong_replies_drop_the_link
-from acquisition.raw import RawBlock
-from acquisition.registers.decoding import MapDecoder, MapReading, ValueState
-from acquisition.registers.register_map import RegisterMap
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 
 _LEAST_STAMP_STEPS = 2.0
 """A device's clock must tell neighbouring polls apart, or its stamps would seem to stand still."""

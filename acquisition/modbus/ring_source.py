@@ -4,19 +4,19 @@ from collections.abc import AsyncGenerator, AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 
-from acquisition.arrival import Arrival
-from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
-from acquisition.delivery import Delivery
+from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.ring_pace import out_of_step_s
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.follower import RingFollower
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.profile import HEADER_REGISTERS
-from acquisition.modbus.replies import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
-from acquisition.modbus.ring_pace import out_of_step_s
+from acquisition.modbus.requests import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
 from acquisition.modbus.ring_reader import RingReader
 from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 
 _MIN_STALE_SLOTS = 3
 """A device with long slots may be silent for more than a slot without being stale."""

@@ -6,9 +6,9 @@ from enum import StrEnum
 from itertools import count
 from typing import Literal, TypeAlias, get_args
 
+from acquisition.delivery.names import KnownAddresses
 from acquisition.errors import ConfigError
 from acquisition.modbus.identity import Identity
-from acquisition.names import KnownAddresses
 
 Parity: TypeAlias = Literal["none", "even", "odd"]
 

@@ -3,7 +3,7 @@
 from core.alarms.alarm import AlarmIdentity, AlarmKind
 from core.alarms.rules import BearingRules, LimitRule, ZoneRule
 from core.alarms.watch import LimitWatch
-from core.machine import Bearing
+from core.machine.unit import Bearing
 
 READINGS: dict[str, dict[AlarmKind, str]] = {
     "shaft_order1": {

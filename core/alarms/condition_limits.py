@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Self
 
-from core.assessment import Assessment
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import STEADY, OperatingState
 from core.limits import AlarmLevel, Condition, Limits, judge, unknown
+from core.monitor.assessment import Assessment
 from core.quality import Reading, Reason, missing
 
 AT_SPEED = STEADY

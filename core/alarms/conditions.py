@@ -1,9 +1,9 @@
 """Conditions that are not a value above a limit: a channel, a device's clock, a link."""
 
-from core.device_clock import DeviceClock, StampFault
+from core.checks.sensor_checks import MAX_CLIPPED_SHARE
 from core.limits import WITHIN, AlarmLevel, Condition
 from core.quality import Level, Quality, Reading, Reason, missing
-from core.sensor_checks import MAX_CLIPPED_SHARE
+from core.samples.device_clock import DeviceClock, StampFault
 
 COVERAGE = 1.96
 """Standard uncertainties on each side of a value that hold the truth with 95 %."""

@@ -22,15 +22,15 @@ from core.alarms.rules import UnitRules
 from core.alarms.vector_change import VectorReference, vector_condition
 from core.alarms.watch import LimitWatch, Watch
 from core.alarms.watch_list import DEVICE, watch_list
-from core.assessment import Assessment
-from core.blocks import SampleBlock
 from core.condition.bearing_condition import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import Condition, unknown
-from core.line_results import AMPLITUDES, DIRECTIONS
-from core.machine import Unit
-from core.polarity import is_reversed
+from core.machine.unit import Unit
+from core.monitor.assessment import Assessment
 from core.quality import Quality, Reading, Reason, missing, worst
+from core.samples.blocks import SampleBlock
+from core.stiffness.line_results import AMPLITUDES, DIRECTIONS
+from core.stiffness.polarity import is_reversed
 from core.units import NS_PER_S
 
 NOT_THERE = missing(Reason.NOT_MEASURED)

@@ -6,7 +6,7 @@ from core.alarms.alarm import AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.bearing_watches import change_watches, reading_watches
 from core.alarms.rules import BearingRules, ClockRules, LimitRule, UnitRules
 from core.alarms.watch import LimitWatch, Watch
-from core.machine import Unit
+from core.machine.unit import Unit
 
 DEVICE, LINK = "device", "link"
 """Subjects of alarms about the whole unit."""

@@ -15,8 +15,8 @@ from core.arrays import FloatArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.groups import group_readings
 from core.baseline.robust import robust_std
+from core.baseline.stiffness_history import StiffnessHistory
 from core.baseline.watched import watched_values
-from core.stiffness_history import StiffnessHistory
 
 SPELL_DAYS = 8
 """Longer than what makes healthy days alike."""

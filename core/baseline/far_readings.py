@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.baseline.baseline import BearingBaseline
+from core.baseline.stiffness_history import StiffnessHistory
 from core.baseline.watched import watched_values
-from core.stiffness_history import StiffnessHistory
 
 FAR = math.log(2.0)
 """A film of one condition is never twice as stiff as on another day: what is known of warm films

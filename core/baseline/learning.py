@@ -17,11 +17,11 @@ from core.baseline.groups import DAY_NS, Groups, group_readings
 from core.baseline.held_out import held_out_deviations
 from core.baseline.settings import BaselineSettings
 from core.baseline.slope_scatter import LEAST_SCATTER
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.baseline.tabulate import tabulate
 from core.baseline.time_scatter import time_scatter
 from core.baseline.watched import watched_values
 from core.condition.film_conditions import FilmConditions
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
 
 REJECTED = 0.1
 """Robust weight below which a group counts as rejected."""

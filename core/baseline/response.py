@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.robust import bisquare, robust_std
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 
 Place: TypeAlias = tuple[str, str]
 """Bearing and direction."""

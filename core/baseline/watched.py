@@ -4,7 +4,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.baseline import Watched
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 
 
 def watched_values(

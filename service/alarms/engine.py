@@ -14,9 +14,9 @@ from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import VectorReference
-from core.assessment import Assessment
-from core.blocks import SampleBlock
 from core.limits import Condition
+from core.monitor.assessment import Assessment
+from core.samples.blocks import SampleBlock
 from service.alarms.count import AlarmCount, count_of
 from service.alarms.host_time import HostTime
 from service.alarms.service_alarms import ServiceAlarms

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from core.account import SampleAccount
 from core.limits import WITHIN, AlarmLevel, Condition
+from core.samples.account import SampleAccount
 from service.bus import Bus
 from service.capture.captures import Captures
 from service.continuous.tape import Tape

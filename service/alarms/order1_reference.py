@@ -1,10 +1,10 @@
 """A reference vector of 1× taken from the running machine."""
 
 from core.alarms.vector_change import OrderVector, VectorReference
-from core.assessment import Assessment
 from core.condition.operating_state import OperatingState
-from core.line_results import AMPLITUDES
+from core.monitor.assessment import Assessment
 from core.quality import Level, Reading, Reason
+from core.stiffness.line_results import AMPLITUDES
 
 NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
 """Doubts with which an amplitude is no reference."""

@@ -4,7 +4,6 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from core.account import SampleAccount
 from core.alarms.alarm import Alarm, AlarmKind
 from core.alarms.board import AlarmBoard
 from core.alarms.event import AlarmNews
@@ -13,6 +12,7 @@ from core.alarms.watch import LimitWatch
 from core.condition.bearing_condition import NOWHERE_KNOWN
 from core.limits import WITHIN, AlarmLevel, Condition
 from core.quality import Reading
+from core.samples.account import SampleAccount
 from core.units import NS_PER_S
 from service.alarms.health import LookAtHealth, ServiceHealth
 from service.alarms.service_rules import LOSS_MINUTES, ServiceRules, loss_key, service_watches

@@ -11,8 +11,8 @@ from core.alarms.event import AlarmNews
 from core.alarms.memory import AlarmMemory
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.blocks import SampleBlock
-from core.films.film_rules import FilmRules
+from core.change.film_rules import FilmRules
+from core.samples.blocks import SampleBlock
 from service.alarms.engine import NO_MEMORIES, AlarmEngine
 from service.alarms.gone_alarms import is_shared
 from service.alarms.health import LookAtHealth

@@ -7,7 +7,7 @@ import numpy as np
 from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
 from core.baseline.cell_table import CellStatistics
 from core.condition.cells import CellGrid
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from service.api.baseline_models import (
     BaselineCellsModel,
     BaselineDirectionModel,

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BeforeValidator
 
-from core.account import Gap
-from core.estimators import STIFFNESS_OF
-from core.quantities import BY_NAME
+from core.monitor.catalogue import BY_NAME
+from core.samples.account import Gap
+from core.stiffness.estimators import STIFFNESS_OF
 from core.units import ns_from_s
 from service.api.access.declared import needs
 from service.api.bearing_models import BearingModel

@@ -1,6 +1,6 @@
 """From bearings and their references to what the API says of them."""
 
-from core.machine import Bearing
+from core.machine.unit import Bearing
 from service.api.bearing_models import BearingModel, ReferenceModel, SetReferenceModel
 from service.api.times import rfc3339
 from service.store.gap_reference import GapReference

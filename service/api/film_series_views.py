@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
+from core.baseline.stiffness_history import CodeArray, Evidence
+from core.change.verdict import Verdict
 from core.condition.operating_state import OperatingState
-from core.decision.verdict import Verdict
-from core.stiffness_history import CodeArray, Evidence
 from core.units import NS_PER_S
 from service.api.film_conditions import STATE_NAMES
 from service.api.film_series_models import EvidenceName, FilmReadingsModel, FilmSeriesModel

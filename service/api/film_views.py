@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from typing import cast
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
+from core.baseline.stiffness_history import DIRECTIONS
+from core.change.decision import Decision
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmReading
+from core.change.film_rules import FilmRules
+from core.change.verdict import Verdict
 from core.condition.film_conditions import FilmConditions
-from core.decision.decision import Decision
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmReading
-from core.films.film_rules import FilmRules
-from core.stiffness_history import DIRECTIONS
 from service.api.context import Context
 from service.api.film_conditions import condition_model
 from service.api.film_models import (

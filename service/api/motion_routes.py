@@ -6,8 +6,8 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from acquisition.errors import ConfigError
-from core.blocks import SampleBlock
-from core.machine import Bearing
+from core.machine.unit import Bearing
+from core.samples.blocks import SampleBlock
 from service.api.access.declared import needs
 from service.api.context import BearingId, Context, UnitId
 from service.api.motion_models import MotionModel

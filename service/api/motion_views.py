@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from core.arrays import FloatArray
-from core.machine import Bearing
+from core.machine.unit import Bearing
 from service.api.film_series_views import listed
 from service.api.motion_models import EllipseModel, MotionModel, MotionOrder1Model
 from service.api.times import rfc3339

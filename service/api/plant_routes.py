@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Request, Response
 
-from core.quantities import CATALOGUE
+from core.monitor.catalogue import CATALOGUE
 from service.api.access.declared import Reach, needs
 from service.api.context import Context, UnitId
 from service.api.overview import Overview

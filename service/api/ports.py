@@ -7,12 +7,12 @@ from core.alarms.alarm import Alarm
 from core.alarms.chatter import ChatterRule
 from core.alarms.operation import Action
 from core.alarms.vector_change import VectorReference
-from core.assessment import Assessment
 from core.baseline.baseline import BearingBaseline
-from core.blocks import SampleBlock
-from core.films.film_judge import FilmNews
-from core.films.film_rules import FilmRules
+from core.change.film_judge import FilmNews
+from core.change.film_rules import FilmRules
+from core.monitor.assessment import Assessment
 from core.quality import Reason
+from core.samples.blocks import SampleBlock
 from service.alarms.count import AlarmCount
 from service.films.actions import Action as BaselineAction
 from service.films.learning import FilmPlace

@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response
 
 from core.condition.cells import CellGrid
-from core.quantities import BY_NAME
+from core.monitor.catalogue import BY_NAME
 from core.units import ns_from_s
 from service.api.access.declared import needs
 from service.api.bearing_routes import TimeRange, eccentricity_range, oil_temperature_range

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
-from core.quantities import BY_NAME
+from core.monitor.catalogue import BY_NAME
 from service.api.tables import Column
 from service.api.trend_groups import TrendGroup
 from service.api.views import LEVEL_NAMES

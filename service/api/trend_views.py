@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from core.quantities import BY_NAME
+from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S
 from service.api.series_models import TrendGroupModel, TrendModel, TrendSeriesModel
 from service.api.times import rfc3339

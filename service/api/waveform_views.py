@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import FloatArray
-from core.blocks import SampleBlock
 from core.quality import Level, Quality, worst
+from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.api.channel_models import ChannelSamplesModel, WaveformModel
 from service.api.channel_views import UNITS

@@ -8,19 +8,15 @@ import numpy.typing as npt
 
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
 from core.baseline.far_readings import far_readings
+from core.baseline.history_rows import BearingRows, Place
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.change.back_test import DecisionHistory, back_test
+from core.change.operation_history import OperationHistory, operation_history, operation_of_states
+from core.change.settings import ChangeLimits
+from core.change.verdict import OF_EVIDENCE, Verdict
 from core.condition.operating_limits import OperatingLimits
-from core.condition.operation_history import (
-    OperationHistory,
-    operation_history,
-    operation_of_states,
-)
-from core.decision.back_test import DecisionHistory, back_test
-from core.decision.limits import ChangeLimits
-from core.decision.verdict import OF_EVIDENCE, Verdict
-from core.history_rows import BearingRows, Place
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from service.back_test.file_columns import ReadingsError
 from service.back_test.periods import Learning, MachineEvent, Period, periods_of
 from service.films.learning import drifted

@@ -14,9 +14,9 @@ from core.baseline.response import (
     learn_response,
     place_columns,
 )
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.baseline.watched import watched_values
-from core.decision.attribution import Attribution, Cause, PlaceReadings, attribute
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.change.attribution import Attribution, Cause, PlaceReadings, attribute
 from service.back_test.bearing_run import BackTestRules, BearingRun
 from service.back_test.periods import Period, periods_of
 

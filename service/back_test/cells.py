@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from core.history_rows.problems import RowProblems
+from core.baseline.history_rows.problems import RowProblems
 from service.back_test.file_columns import LINE, TIME, TIME_NS, ReadingsError, schema_of
 
 _UTC = pa.timestamp("ns", tz="UTC")

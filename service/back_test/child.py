@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 
 import pyarrow as pa
 
-from acquisition.reading_process import confine
+from acquisition.recordings.confined import confine
 from service.back_test.csv_rows import csv_batches
 from service.back_test.file_columns import MAX_ROWS, ReadingsError
 from service.back_test.parquet_rows import MAGIC, parquet_batches

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow.compute as pc
 
-from core.history_rows import Names
-from core.history_rows.problems import shown
+from core.baseline.history_rows import Names
+from core.baseline.history_rows.problems import shown
 from service.back_test.file_columns import LINE, TEXTS, ReadingsError
 
 MAX_NAMES = 2000

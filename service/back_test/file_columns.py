@@ -5,8 +5,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from core.history_rows.columns import KNOWN, NAMES, NUMBERS, OPTIONAL_NAMES, REQUIRED
-from core.history_rows.problems import shown
+from core.baseline.history_rows.columns import KNOWN, NAMES, NUMBERS, OPTIONAL_NAMES, REQUIRED
+from core.baseline.history_rows.problems import shown
 
 TIME, TIME_NS, LINE = "time", "time_ns", "line"
 TEXTS = (*NAMES, *OPTIONAL_NAMES)

@@ -7,8 +7,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from acquisition.reading_process import ReadingProcess, reading_process
-from core.history_rows import BearingRows, Place, histories_from_columns
+from acquisition.recordings.confined import ReadingProcess, reading_process
+from core.baseline.history_rows import BearingRows, Place, histories_from_columns
 from service.back_test.child import WRONG_FILE
 from service.back_test.coded import Gathered
 from service.back_test.file_columns import LINE, ReadingsError

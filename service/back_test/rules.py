@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from core.history_rows import Place
+from core.baseline.history_rows import Place
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.periods import Learning, MachineEvent
 from service.settings.film_alarms import FilmAlarmSettings

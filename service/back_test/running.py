@@ -7,10 +7,10 @@ from itertools import groupby
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline
+from core.baseline.history_rows import BearingRows, Place
 from core.baseline.response import ShaftResponse
+from core.baseline.stiffness_history import Evidence, StiffnessHistory
 from core.condition.operating_state import STEADY
-from core.history_rows import BearingRows, Place
-from core.stiffness_history import Evidence, StiffnessHistory
 from service.back_test.bearing_run import BackTestRules, BearingRun, run_bearing
 from service.back_test.causes import UnitCauses
 from service.back_test.file_columns import ReadingsError

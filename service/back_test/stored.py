@@ -9,11 +9,11 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
+from core.baseline.history_rows import Place
+from core.baseline.history_rows.columns import AMPLITUDES, PER_BEARING, SILENT
+from core.baseline.stiffness_history import DIRECTIONS, Evidence
 from core.condition.operating_state import OperatingState
-from core.history_rows import Place
-from core.history_rows.columns import AMPLITUDES, PER_BEARING, SILENT
-from core.machine import Estimator
-from core.stiffness_history import DIRECTIONS, Evidence
+from core.machine.unit import Estimator
 from service.back_test.periods import DAY_NS
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 

@@ -7,10 +7,10 @@ import numpy as np
 from core.arrays import FloatArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.cell_table import Support
+from core.baseline.stiffness_history import DIRECTIONS
+from core.change.attribution import Attribution
+from core.change.verdict import JUDGED, Verdict
 from core.condition.operating_state import OperatingState
-from core.decision.attribution import Attribution
-from core.decision.verdict import JUDGED, Verdict
-from core.stiffness_history import DIRECTIONS
 from core.units import NS_PER_S
 from service.api.times import rfc3339
 from service.back_test.alarm_stretches import AlarmStretch, Change, alarm_stretches

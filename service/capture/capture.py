@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from core.alarms.event import AlarmEvent
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.capture.file import CaptureFile
 from service.capture.span import Span
 

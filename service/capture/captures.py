@@ -10,7 +10,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.event import AlarmEvent, AlarmNews
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.capture.capture import Capture
 from service.capture.file import CaptureError, CaptureFile, MakeWriter
 from service.capture.folders import clear_leftovers

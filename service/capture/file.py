@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import checksum_of
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.manifest import checksum_of
+from acquisition.recordings.writer import RecordingWriter
 from core.alarms.event import AlarmEvent
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.api.times import rfc3339
 from service.capture.folders import ALARM, aside, capture_folder
 

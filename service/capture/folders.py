@@ -5,8 +5,8 @@ from collections.abc import Container, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES
-from acquisition.recording.writer import INCOMPLETE
+from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES
+from acquisition.recordings.writer import INCOMPLETE
 from core.alarms.event import AlarmEvent
 from core.units import NS_PER_S
 from service.continuous.names import unit_of

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Iterator
 
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 
 
 class BlockHistory:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from core.alarms.alarm import AlarmKind, AlarmState
 from core.alarms.event import ANNOUNCED, AlarmEvent
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 
 WITHOUT_SAMPLES = (

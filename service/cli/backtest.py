@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.clock import SystemClock
-from core.history_rows import BearingRows, Place
+from core.baseline.history_rows import BearingRows, Place
 from service.back_test.arguments import event_of, time_ns_of
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines

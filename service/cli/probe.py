@@ -11,8 +11,8 @@ import typer
 from pydantic import ValidationError
 
 from acquisition.errors import AcquisitionError
-from acquisition.registers.cells import ByteOrder
-from core.machine import Measurand
+from acquisition.modbus.cells import ByteOrder
+from core.machine.unit import Measurand
 from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit

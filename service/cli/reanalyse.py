@@ -13,8 +13,8 @@ import uvloop
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
 from acquisition.source import SampleSource
-from core.assessment import Assessment
-from core.monitor import UnitMonitor
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit

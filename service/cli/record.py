@@ -13,7 +13,7 @@ import uvloop
 
 from acquisition.clock import Clock, SystemClock
 from acquisition.errors import AcquisitionError, LinkError
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
 from service.cli.made_by import made_by
 from service.cli.plant_file import PlantPath, fail, read_plant_file

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.export import ExportFormat, export_recording
-from acquisition.recording.summary import summary_of
+from acquisition.recordings.export import ExportFormat, export_recording
+from acquisition.recordings.summary import summary_of
 from service.cli.made_by import made_by
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.recording_check import check

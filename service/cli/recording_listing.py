@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
-from acquisition.recording.export import UNITS
-from acquisition.recording.reader import Recording
-from acquisition.recording.summary import RecordingSummary
+from acquisition.recordings.export import UNITS
+from acquisition.recordings.reader import Recording
+from acquisition.recordings.summary import RecordingSummary
 from service.api.times import rfc3339
 
 GAPS_PRINTED = 20

@@ -8,7 +8,7 @@ import typer
 from pydantic import TypeAdapter
 
 from acquisition.clock import SystemClock
-from core.machine import Bearing
+from core.machine.unit import Bearing
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import Source
 from service.cli.made_by import person

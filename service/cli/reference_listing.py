@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from core.machine import Bearing
+from core.machine.unit import Bearing
 from service.api.bearing_models import ReferenceModel, SetReferenceModel
 from service.api.bearing_views import reference_model, set_reference_model
 from service.api.models import ApiModel

@@ -6,9 +6,9 @@ from pathlib import Path
 import structlog
 
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES, RecordedUnit
-from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.writer import INCOMPLETE, RecordingWriter
+from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES, RecordedUnit
+from acquisition.recordings.reader import Recording, open_recording
+from acquisition.recordings.writer import INCOMPLETE, RecordingWriter
 from service.continuous.names import PARTS, damaged_folder, joined_folder, parts_folder, unit_of
 
 log = structlog.get_logger()

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import read_manifest
-from acquisition.recording.reader import open_recording
+from acquisition.recordings.manifest import read_manifest
+from acquisition.recordings.reader import open_recording
 from service.continuous.names import KIND, unit_of
 
 MAX_TRIED = 3

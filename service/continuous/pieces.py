@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from core.blocks import Rejection, SampleBlock
+from core.samples.blocks import Rejection, SampleBlock
 
 
 class Shed(StrEnum):

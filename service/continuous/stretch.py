@@ -5,9 +5,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import RecordedUnit
-from acquisition.recording.writer import RecordingWriter
-from core.blocks import SampleBlock
+from acquisition.recordings.manifest import RecordedUnit
+from acquisition.recordings.writer import RecordingWriter
+from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.continuous.names import part_folder, parts_folder, stretch_folder
 from service.continuous.pieces import TapeSettings

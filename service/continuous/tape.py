@@ -11,8 +11,8 @@ import structlog
 
 from acquisition.clock import Clock
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import RecordedUnit
-from core.blocks import SampleBlock
+from acquisition.recordings.manifest import RecordedUnit
+from core.samples.blocks import SampleBlock
 from service.continuous.joining import clear_unfinished, join, unjoined
 from service.continuous.last import last_end
 from service.continuous.pieces import Hole, Shed, TapeSettings

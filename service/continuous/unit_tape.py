@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import RecordedUnit
-from core.blocks import Rejection, SampleBlock
+from acquisition.recordings.manifest import RecordedUnit
+from core.samples.blocks import Rejection, SampleBlock
 from service.continuous.pieces import Hole, Shed, TapeSettings
 from service.continuous.stretch import Stretch
 

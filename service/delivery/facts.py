@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from core.alarms.alarm import AlarmIdentity, AlarmKind
 from core.alarms.bearing_watches import READINGS
-from core.assessment import Assessment
-from core.films.film_judge import FilmNews
-from core.quantities import CATALOGUE
+from core.change.film_judge import FilmNews
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
 from service.live import LiveView
 
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")

@@ -6,7 +6,7 @@ import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.names import NameLookUp
+from acquisition.delivery.names import NameLookUp
 
 
 @dataclass(frozen=True)

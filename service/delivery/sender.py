@@ -8,8 +8,8 @@ from typing import Literal, TypeVar
 
 import structlog
 
-from acquisition.arrival import Arrival
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import Arrival
 from core.units import ns_from_s
 from service.delivery.backoff import wait_s
 from service.delivery.message import loads

@@ -9,12 +9,12 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
 from core.baseline.learning import learn
 from core.baseline.response import learn_response
-from core.condition.operation_history import OperationHistory, operation_history
-from core.decision.back_test import DecisionHistory, back_test
-from core.estimators import STIFFNESS_OF
-from core.films.film_rules import FilmRules
-from core.machine import Estimator
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.change.back_test import DecisionHistory, back_test
+from core.change.film_rules import FilmRules
+from core.change.operation_history import OperationHistory, operation_history
+from core.machine.unit import Estimator
+from core.stiffness.estimators import STIFFNESS_OF
 from service.films.rules import film_rules_of
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.plant import PlantFile

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from acquisition.recording.manifest import MANIFEST
+from acquisition.recordings.manifest import MANIFEST
 from core.alarms.event import ANNOUNCED, AlarmEvent
 from service.capture.span import is_captured
 from service.evidence.capture_link import CapturePart, linked

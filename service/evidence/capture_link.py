@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import ValidationError
 
-from acquisition.recording.manifest import MANIFEST
+from acquisition.recordings.manifest import MANIFEST
 from service.capture.folders import ALARM
 from service.evidence.document import FilePart
 from service.evidence.files import file_part, write_whole

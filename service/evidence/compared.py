@@ -7,11 +7,11 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
 from core.baseline.cell_table import CellStatistics
+from core.change.decision import Decision
+from core.change.film_judge import FilmNews
+from core.change.film_rules import FilmRules
 from core.condition.cells import Cell
 from core.condition.film_conditions import FilmConditions
-from core.decision.decision import Decision
-from core.films.film_judge import FilmNews
-from core.films.film_rules import FilmRules
 from service.api.times import rfc3339
 from service.evidence.bearing_part import AXES, Direction
 from service.evidence.comparison_part import (

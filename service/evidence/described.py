@@ -3,17 +3,17 @@
 import math
 from collections.abc import Iterator
 
-from core.assessment import Assessment, AveragingWindow
+from core.change.attribution import Attribution
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_rules import FilmRules
 from core.condition.bearing_condition import BearingCondition
 from core.condition.cells import Cell, CellGrid
-from core.decision.attribution import Attribution
-from core.estimators import STIFFNESS_OF
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_rules import FilmRules
-from core.machine import Estimator
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment, AveragingWindow
+from core.monitor.catalogue import BY_NAME
 from core.quality import Level, Reading
-from core.quantities import BY_NAME
+from core.stiffness.estimators import STIFFNESS_OF
 from core.uncertainty import Budget
 from service.api.alarm_views import LEVEL_NAMES
 from service.api.times import rfc3339

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline
+from core.baseline.stiffness_history import StiffnessHistory
+from core.change.film_rules import FilmRules
 from core.condition.cells import Cell
-from core.films.film_rules import FilmRules
-from core.stiffness_history import StiffnessHistory
 from core.units import NS_PER_S
 from service.evidence.bearing_part import AXES, Direction
 from service.evidence.comparison_part import MembersPart

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from core.alarms.event import AlarmEvent
-from core.assessment import Assessment
 from core.baseline.baseline import BearingBaseline
-from core.films.film_judge import FilmNews
-from core.films.film_rules import FilmRules
+from core.change.film_judge import FilmNews
+from core.change.film_rules import FilmRules
+from core.monitor.assessment import Assessment
 from service.films.keeper import FilmKeeper
 from service.live import LiveView, UnitStatus
 from service.settings.units import UnitSettings

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from core.assessment import Assessment
-from core.cross_spectrum import CrossSpectrum
-from core.decision.verdict import Verdict
+from core.change.verdict import Verdict
+from core.monitor.assessment import Assessment
+from core.spectra.cross_spectrum import CrossSpectrum
 from service.evidence.bearing_part import AXES
 from service.store.film_port import FilmHistory
 

@@ -4,7 +4,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from service.evidence.compared import cell_of, comparisons
 from service.evidence.comparison_part import ComparisonPart
 from service.evidence.composed import composed, not_known, sealed

@@ -8,16 +8,16 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import AlarmIdentity, AlarmKind
-from core.assessment import Assessment
 from core.baseline.baseline import BearingBaseline
-from core.films.film_finding import alarm_condition
-from core.films.film_judge import FilmJudge, FilmNews
-from core.films.film_memory import FilmMemory
-from core.films.film_rules import FilmRules
-from core.films.film_watch import FilmWatch
+from core.baseline.stiffness_history import DIRECTIONS
+from core.change.film_finding import alarm_condition
+from core.change.film_judge import FilmJudge, FilmNews
+from core.change.film_memory import FilmMemory
+from core.change.film_rules import FilmRules
+from core.change.film_watch import FilmWatch
 from core.limits import Condition
-from core.machine import Unit
-from core.stiffness_history import DIRECTIONS
+from core.machine.unit import Unit
+from core.monitor.assessment import Assessment
 from service.films.actions import Action, step_of
 from service.films.learning import FilmPlace, Learner
 from service.films.resume import UnitStart, in_force, unit_start

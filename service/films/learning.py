@@ -13,9 +13,9 @@ from core.baseline.drift import learning_drift
 from core.baseline.far_readings import far_readings
 from core.baseline.learning import learn
 from core.baseline.response import ShaftResponse, learn_response
-from core.films.film_rules import FilmRules
-from core.machine import Estimator
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
+from core.change.film_rules import FilmRules
+from core.machine.unit import Estimator
 from core.units import NS_PER_S
 from service.films.versions import Versions, versions_after
 from service.settings.film_alarms import FilmAlarmSettings

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from core.baseline.stiffness_history import Evidence
+from core.change.verdict import JUDGED
 from core.condition.operating_state import STEADY
-from core.decision.verdict import JUDGED
-from core.stiffness_history import Evidence
 from service.films.learning import DAY_NS, FilmPlace
 from service.films.versions import Versions
 from service.settings.film_alarms import FilmAlarmSettings

@@ -8,13 +8,13 @@ import numpy as np
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Watched
 from core.baseline.response import ShaftResponse
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.change.catching_up import decision_after, operation_after
+from core.change.decision import UNDECIDED, Decision
+from core.change.film_rules import FilmRules
+from core.change.recent_readings import KEPT
 from core.condition.oil_settling import OilSettling
 from core.condition.operating_state import Operation
-from core.decision.decision import UNDECIDED, Decision
-from core.films.catching_up import decision_after, operation_after
-from core.films.film_rules import FilmRules
-from core.films.recent_readings import KEPT
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.units import NS_PER_S
 from service.films.learning import FilmPlace, common_times
 from service.films.versions import versions_after

@@ -1,7 +1,7 @@
 """From the plant file to the rules that a unit's films are watched by."""
 
-from core.films.film_rules import FilmRules
-from core.machine import Estimator
+from core.change.film_rules import FilmRules
+from core.machine.unit import Estimator
 from core.units import ns_from_s
 from service.settings.bearings import BearingSettings
 from service.settings.film_alarms import FilmAlarmSettings

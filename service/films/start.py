@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from acquisition.clock import Clock
-from core.machine import Unit
+from core.machine.unit import Unit
 from service.films.keeper import FilmKeeper
 from service.films.rules import film_rules_of
 from service.settings.plant import PlantFile

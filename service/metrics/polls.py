@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 
 from acquisition.clock import Clock
 from acquisition.source import SampleSource, refused_frames_of
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.heartbeats import UNHEARD, Pulse
 from service.metrics.durations import Durations
 

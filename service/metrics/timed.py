@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from core.account import Gap, SampleAccount
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.machine import Unit
-from core.monitor_port import Monitor
-from core.monitor_state import MonitorState
-from core.outage import Reach
+from core.machine.unit import Unit
+from core.monitor.assessment import Assessment
+from core.monitor.monitor_port import Monitor
+from core.monitor.monitor_state import MonitorState
+from core.samples.account import Gap, SampleAccount
+from core.samples.blocks import SampleBlock
+from core.samples.outage import Reach
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.roles.watched_unit import WatchedUnit

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import FloatArray
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.orbit import Ellipse, ellipse_of, marks_of, order_phasors, trace_of
-from core.position_results import probe_axis
+from core.condition.shaft_centre import locate_shaft
+from core.condition.shaft_readings import probe_axis
+from core.machine.unit import Bearing, Channel, Measurand, Unit
 from core.quality import Reading, Reason, missing
-from core.shaft_centre import locate_shaft
+from core.spectra.orbit import Ellipse, ellipse_of, marks_of, order_phasors, trace_of
 from core.units import hz_from_rpm, rpm_from_hz
 from service.orbits.stretch import ShaftStretch
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from acquisition.recording.manifest import Manifest
-from acquisition.recording.reader import Recording
-from core.machine import Bearing, Unit
+from acquisition.recordings.manifest import Manifest
+from acquisition.recordings.reader import Recording
+from core.machine.unit import Bearing, Unit
 from core.units import ns_from_s, s_from_ns
 from service.orbits.motion import ShaftMotion, channels_for, motion_of
 from service.orbits.stretch import stretch_of

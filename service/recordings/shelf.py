@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import ConfigError
-from acquisition.recording.export import csv_tables
-from acquisition.recording.manifest import Manifest, checksum_of, read_manifest
-from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.summary import RecordingSummary, summary_of
+from acquisition.recordings.export import csv_tables
+from acquisition.recordings.manifest import Manifest, checksum_of, read_manifest
+from acquisition.recordings.reader import Recording, open_recording
+from acquisition.recordings.summary import RecordingSummary, summary_of
 from service.capture.folders import ALARM, FILES
 from service.continuous.names import KIND, unit_of
 from service.evidence.bundle import Sink, zipped

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from acquisition.calibration import calibrate
+from acquisition.delivery.calibration import calibrate
 from acquisition.errors import ConfigError
-from acquisition.recording.reader import Recording
-from acquisition.recording.selection import all_of
-from core.blocks import SampleBlock
+from acquisition.recordings.reader import Recording
+from acquisition.recordings.selection import all_of
+from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 
 

@@ -1,6 +1,6 @@
 """`Described`: a unit as it is described, in a process that analyses none."""
 
-from core.machine import Unit
+from core.machine.unit import Unit
 
 
 class Described:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from service.alarms.engine import AlarmEngine
 from service.alarms.service_rules import told_by
 from service.films.keeper import FilmKeeper

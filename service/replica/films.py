@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from core.baseline.baseline import BearingBaseline
-from core.decision.decision import UNDECIDED
-from core.films.film_judge import FilmNews
-from core.films.film_rules import FilmRules
+from core.change.decision import UNDECIDED
+from core.change.film_judge import FilmNews
+from core.change.film_rules import FilmRules
 from service.films.learning import FilmPlace
 from service.films.rules import film_rules_of
 from service.replica.unit_state import UnitState

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.cross_spectrum import NO_SPECTRUM
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
 from core.quality import Reason, bad, missing
-from core.quantities import CATALOGUE
+from core.samples.blocks import SampleBlock
+from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.alarms.gone_alarms import SHARED
 from service.api.elsewhere import NotHereError
 from service.live import CurrentBearing, LinkState, UnitStatus

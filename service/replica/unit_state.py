@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from core.alarms.alarm import Alarm
-from core.assessment import AveragingWindow, Evidence
+from core.change.film_finding import FilmFinding
+from core.change.film_reading import FilmReading
 from core.condition.bearing_condition import BearingCondition
-from core.films.film_finding import FilmFinding
-from core.films.film_reading import FilmReading
-from core.machine import Estimator
+from core.machine.unit import Estimator
+from core.monitor.assessment import AveragingWindow, Evidence
 from core.quality import Quality, Reading
-from core.runout import RunoutVerdict
-from core.speed import SpeedSource
+from core.spectra.runout import RunoutVerdict
+from core.spectra.speed import SpeedSource
 from core.uncertainty import Budget
 from service.live import UnitStatus
 

@@ -10,7 +10,7 @@ import structlog
 from acquisition.clock import Clock
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.source import SampleSource
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.connect_gate import ConnectGate
 from service.heartbeats import Audible, Heartbeats, Pulse
 from service.live import LinkState, LiveView

@@ -3,11 +3,11 @@
 import asyncio
 from collections.abc import Mapping
 
-from core.account import SampleAccount
-from core.blocks import SampleBlock
-from core.counts import Counts
-from core.monitor_port import Monitor
-from core.monitor_state import MonitorState
+from core.monitor.monitor_port import Monitor
+from core.monitor.monitor_state import MonitorState
+from core.samples.account import SampleAccount
+from core.samples.blocks import SampleBlock
+from core.samples.counts import Counts
 from service.alarms.engine import AlarmEngine
 from service.films.keeper import FilmKeeper
 from service.live import LiveView

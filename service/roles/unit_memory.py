@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from core.alarms.memory import AlarmMemory
-from core.counts import Count
-from core.films.film_memory import FilmMemory
-from core.monitor_state import MonitorState
+from core.change.film_memory import FilmMemory
+from core.monitor.monitor_state import MonitorState
+from core.samples.counts import Count
 
 VERSION = 1
 

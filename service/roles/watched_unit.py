@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from acquisition.source import SampleSource
-from core.monitor_port import Monitor
+from core.monitor.monitor_port import Monitor
 
 
 @dataclass(frozen=True)

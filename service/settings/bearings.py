@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from core.machine import PREFERENCE, Estimator
+from core.machine.unit import PREFERENCE, Estimator
 from service.settings.alarms import BearingAlarmSettings
 from service.settings.base import Identifier, MisfitError, Settings
 

@@ -5,8 +5,8 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from acquisition.small_file import read_small_file
-from core.transducer_response import ResponseTable
+from acquisition.delivery.small_file import read_small_file
+from core.machine.response import ResponseTable
 
 COLUMNS = ("frequency_hz", "magnitude", "phase_deg")
 MAX_SHEET_BYTES = 1_000_000

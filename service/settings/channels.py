@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from core.machine import Measurand
+from core.machine.unit import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, Settings
 from service.settings.response import ResponseSettings

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from acquisition.small_file import read_small_file
+from acquisition.delivery.small_file import read_small_file
 from service.settings.mistakes import is_echo, located, sentence
 from service.settings.plant import PlantFile
 from service.settings.positions import line_of

@@ -4,10 +4,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from acquisition.registers.cells import ByteOrder, Cell, MapError
-from acquisition.registers.decoding import MapDecoder
-from acquisition.registers.device_time import CALENDAR_FIELDS, CalendarTime, EpochTime
-from acquisition.registers.register_map import RegisterMap, Signature, Together
+from acquisition.modbus.cells import ByteOrder, Cell, MapError
+from acquisition.modbus.decoding import MapDecoder
+from acquisition.modbus.device_time import CALENDAR_FIELDS, CalendarTime, EpochTime
+from acquisition.modbus.register_map import RegisterMap, Signature, Together
 from service.settings.base import MisfitError, Settings
 from service.settings.register_conversion import CellDefaults
 from service.settings.register_values import Address, CellSettings, Function, ValueSettings

@@ -6,11 +6,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from acquisition.registers.cells import MapError
-from acquisition.registers.fifo_layout import FifoKind, FifoLayout
-from acquisition.registers.register_map import RegisterMap
-from core.vector_rows import VectorPart, VectorRow
-from core.vector_settings import VectorSettings
+from acquisition.modbus.cells import MapError
+from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
+from acquisition.modbus.register_map import RegisterMap
+from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.vector_settings import VectorSettings
 from service.settings.base import MisfitError
 from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from acquisition.registers.cells import ByteOrder, Cell, MapError
-from acquisition.registers.register_map import FlagCheck, FullScale, MapValue, ScaleRegister
+from acquisition.modbus.cells import ByteOrder, Cell, MapError
+from acquisition.modbus.register_map import FlagCheck, FullScale, MapValue, ScaleRegister
 from service.settings.register_values import (
     CellSettings,
     FlagSettings,

@@ -5,9 +5,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from acquisition.registers.cells import ByteOrder, NumberType
-from acquisition.registers.register_map import Meaning
-from core.vector_rows import AMPLITUDE_PARTS, VectorPart, VectorRow
+from acquisition.modbus.cells import ByteOrder, NumberType
+from acquisition.modbus.register_map import Meaning
+from core.spectra.vector_rows import AMPLITUDE_PARTS, VectorPart, VectorRow
 from service.settings.base import Identifier, MisfitError, Settings
 
 Function = Literal[1, 2, 3, 4]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from core.transducer_response import (
+from core.machine.response import (
     BUTTERWORTH_DAMPING,
     HighPass,
     Resonance,

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from acquisition.small_file import read_small_file
+from acquisition.delivery.small_file import read_small_file
 from service.settings.base import MisfitError, Settings
 from service.settings.positions import Location, line_of
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from core.baseline.baseline import BearingBaseline
 from core.baseline.exchange import from_json, response_from_json, response_to_json, to_json
 from core.baseline.response import ShaftResponse
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from service.store.database import Connection
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 from service.store.port import StoreError

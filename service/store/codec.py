@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
+from core.monitor.catalogue import Quantity
 from core.quality import Quality, Reading, Reason
-from core.quantities import Quantity
 from service.store.database import Connection
 
 LEVEL_SHIFT = 6

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
 from core.baseline.response import ShaftResponse
+from core.baseline.stiffness_history import CodeArray, StiffnessHistory
+from core.change.decision import Decision
+from core.change.film_judge import FilmNews
 from core.condition.operating_state import OperatingState
-from core.decision.decision import Decision
-from core.films.film_judge import FilmNews
-from core.machine import Estimator
-from core.stiffness_history import CodeArray, StiffnessHistory
+from core.machine.unit import Estimator
 from service.store.value_range import ValueRange
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from core.baseline.exchange import content, written
+from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.baseline.strict import decode
-from core.decision.decision import Decision
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmValue
-from core.machine import Estimator
-from core.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.change.decision import Decision
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmValue
+from core.machine.unit import Estimator
 from service.store.conditions import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 from service.store.database import Connection
 from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
 from core.baseline.response import ShaftResponse
-from core.films.film_judge import FilmNews
-from core.machine import Estimator
+from core.change.film_judge import FilmNews
+from core.machine.unit import Estimator
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import step_deeds
 from service.store.baselines import (

@@ -5,14 +5,14 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from core.account import Gap
 from core.alarms.alarm import Alarm
 from core.alarms.event import AlarmEvent, AlarmNews
-from core.assessment import Assessment
+from core.change.film_judge import FilmNews
 from core.condition.operating_state import OperatingState
-from core.films.film_judge import FilmNews
-from core.outage import Reach
+from core.monitor.assessment import Assessment
 from core.quality import Level, Reading
+from core.samples.account import Gap
+from core.samples.outage import Reach
 from service.store.access_port import AccessStore
 from service.store.audit_port import AuditStore
 from service.store.commands_port import Commands

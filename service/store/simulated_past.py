@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.machine import Estimator
+from core.baseline.stiffness_history import DIRECTIONS, Evidence
+from core.machine.unit import Estimator
 from core.quality import GOOD, Reason, bad
-from core.speed import SpeedSource
-from core.stiffness_history import DIRECTIONS, Evidence
+from core.spectra.speed import SpeedSource
 from service.store.codec import LEVEL_SHIFT
 from service.store.database import Connection
 from service.store.film_port import FilmHistory, Provenance

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from core.account import Gap
 from core.alarms.alarm import Alarm
 from core.alarms.event import AlarmNews
-from core.assessment import Assessment
-from core.films.film_judge import FilmNews
-from core.outage import Reach
-from core.quantities import CATALOGUE
+from core.change.film_judge import FilmNews
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
+from core.samples.account import Gap
+from core.samples.outage import Reach
 from service.store.access import SqlAccess
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import SqlAudit

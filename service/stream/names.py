@@ -2,7 +2,7 @@
 
 import re
 
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.stream.identity import UnitIdentity, fingerprint

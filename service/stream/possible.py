@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.stream.wire_errors import WireError
 
 

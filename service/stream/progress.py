@@ -6,9 +6,9 @@ from dataclasses import replace
 import structlog
 
 from acquisition.clock import Clock
-from core.blocks import SampleBlock
-from core.misfit import BlockMisfitError
-from core.outage import Reach
+from core.samples.blocks import SampleBlock
+from core.samples.misfit import BlockMisfitError
+from core.samples.outage import Reach
 from core.units import s_from_ns
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder

@@ -3,8 +3,8 @@
 from collections import deque
 from dataclasses import dataclass
 
-from core.blocks import SampleBlock
-from core.monitor_state import MonitorState
+from core.monitor.monitor_state import MonitorState
+from core.samples.blocks import SampleBlock
 
 
 @dataclass(frozen=True)

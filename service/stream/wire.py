@@ -6,9 +6,9 @@ from typing import Annotated, TypeVar
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from core.blocks import Rejection, SampleBlock
-from core.device_clock import DeviceClock, StampFault
 from core.quality import Quality, Reading
+from core.samples.blocks import Rejection, SampleBlock
+from core.samples.device_clock import DeviceClock, StampFault
 from service.live import LinkState
 from service.roles.link_news import LinkNews
 from service.stream.frame import Frame, Kind, framed, unframed

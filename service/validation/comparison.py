@@ -6,10 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.film import Film
-from core.ratio import effective_stiffness_n_per_m
-from core.rotor import bearing_response, forward_force, rotor_matrices
-from core.rotor_parameters import LJB, UJB, ForcePlane, RotorParameters, unbalance_force_n
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
+from acquisition.simulated.plant.rotor_parameters import (
+    LJB,
+    UJB,
+    ForcePlane,
+    RotorParameters,
+    unbalance_force_n,
+)
+from core.stiffness.ratio import effective_stiffness_n_per_m
 from core.units import hz_from_rpm, um_from_m
 from service.validation import paper
 

@@ -4,8 +4,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from acquisition.recording.manifest import BLOCKS, MANIFEST, SAMPLES
-from acquisition.recording.writer import INCOMPLETE
+from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES
+from acquisition.recordings.writer import INCOMPLETE
 from service.capture.folders import FILES
 from service.continuous.names import DAMAGED, PARTS, unit_of
 

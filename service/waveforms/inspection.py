@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.errors import ConfigError
-from acquisition.recording.manifest import MANIFEST
-from acquisition.recording.reader import open_recording
-from acquisition.recording.summary import summary_of
+from acquisition.recordings.manifest import MANIFEST
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.summary import summary_of
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 from service.waveforms.folders import n_bytes_of
 

@@ -7,8 +7,8 @@ from importlib.metadata import version
 
 import structlog
 
-from acquisition.arrival import Arrival
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import Arrival
 from service.alarms.host_time import STEP_S
 from service.audit.life import STARTED, Release, start_deeds, step_deed, stop_deed
 from service.audit.refusals import Refusals

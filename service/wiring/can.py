@@ -6,14 +6,14 @@ from typing import Any
 from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
-from acquisition.daq.can_bus import CanBusServer
-from acquisition.daq.can_dbc import daq_settings
-from acquisition.daq.can_device import CanDevice
-from acquisition.daq.can_shape import CanShape, DaqSignal
-from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
-from acquisition.daq.port import DaqServer
-from acquisition.raw import RawFeed
-from core.machine import Measurand
+from acquisition.delivery.raw import RawFeed
+from acquisition.simulated.devices.can_bus import CanBusServer
+from acquisition.simulated.devices.can_dbc import daq_settings
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.simulated.devices.port import DaqServer
+from core.machine.unit import Measurand
 from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings

@@ -1,13 +1,13 @@
 """Frames of an imported CAN log through the decoder of live ones."""
 
-from acquisition.calibration import UnitCalibration
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.importing.frames import FrameBatch
-from acquisition.raw import RawBlock
+from acquisition.recordings.frames import FrameBatch
 from service.conversion import calibration_of
 from service.settings.can import CanSettings as CanSourceSettings
 from service.settings.units import UnitSettings
@@ -37,7 +37,7 @@ class CanLogDecoder:
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: FrameBatch) -> list[RawBlock]:
-        """Decode frames; see :class:`acquisition.importing.frames.FrameDecoder`.
+        """Decode frames; see :class:`acquisition.recordings.frames.FrameDecoder`.
 
         Raises
         ------

@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from acquisition.clock import Clock
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.writer import RecordingWriter
 from service.capture.captures import Captures
 from service.capture.file import MakeWriter
 from service.capture.span import CaptureSettings

@@ -6,10 +6,11 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from acquisition.block_grid import BlockGrid
+from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.importing.frames import FrameDecoder
-from acquisition.importing.job import (
+from acquisition.recordings.frames import FrameDecoder
+from acquisition.recordings.imports.job import (
     ChannelColumn,
     CsvLayout,
     ImportJob,
@@ -17,11 +18,10 @@ from acquisition.importing.job import (
     SlowColumn,
     TimeAxis,
 )
-from acquisition.importing.reading import Reading, reading
-from acquisition.importing.units import slow_conversion, waveform_factor
-from acquisition.raw import RawBlock
-from acquisition.recording.manifest import Manifest, read_manifest
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.imports.units import slow_conversion, waveform_factor
+from acquisition.recordings.manifest import Manifest, read_manifest
+from acquisition.recordings.reading import Reading, reading
+from acquisition.recordings.writer import RecordingWriter
 from service.conversion import calibration_of
 from service.settings.import_mapping import (
     ImportMapping,

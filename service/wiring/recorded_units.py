@@ -1,6 +1,6 @@
 """What a recording says of the unit that it is of."""
 
-from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from service.settings.units import UnitSettings
 
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import Clock
+from acquisition.delivery.raw import RawFeed
 from acquisition.errors import ConfigError
-from acquisition.raw import RawFeed
-from acquisition.recording.feed import RecordedFeed
-from acquisition.recording.manifest import read_manifest
-from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.selection import Selection, select
-from acquisition.recording.source import RecordingSource
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.manifest import read_manifest
+from acquisition.recordings.reader import Recording, open_recording
+from acquisition.recordings.selection import Selection, select
+from acquisition.recordings.source import RecordingSource
+from acquisition.recordings.writer import RecordingWriter
+from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.source import SampleSource
 from service.conversion import calibration_of, machine_of
 from service.settings.plant import PlantFile

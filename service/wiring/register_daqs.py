@@ -2,16 +2,16 @@
 
 from pathlib import Path
 
-from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
-from acquisition.daq.fifo_device import FifoDevice
-from acquisition.daq.map_device import MapDevice
-from acquisition.daq.modbus_server import ModbusDevice, ModbusServer
-from acquisition.daq.rtu_server import ModbusRtuServer
-from acquisition.daq.tcp_server import ModbusTcpServer
-from acquisition.daq.vector_device import VectorDevice
-from acquisition.raw import RawFeed
-from core.machine import Unit
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.raw import RawFeed
+from acquisition.simulated.devices.fifo_device import FifoDevice
+from acquisition.simulated.devices.map_device import MapDevice
+from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
+from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.vector_device import VectorDevice
+from core.machine.unit import Unit
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,

@@ -2,17 +2,17 @@
 
 from dataclasses import replace
 
-from acquisition.calibration import UnitCalibration
 from acquisition.clock import Clock
-from acquisition.joined_source import JoinedSource, only_slow, without_slow
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
-from acquisition.modbus.polled_slow_values import PolledSlowValues
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.slow_values import PolledSlowValues
+from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.source import SampleSource
-from acquisition.vector_calibration import vector_calibration
-from core.machine import Unit
-from core.settings import AnalysisSettings
-from core.vector_monitor import VectorMonitor
+from core.machine.unit import Unit
+from core.monitor.settings import AnalysisSettings
+from core.monitor.vector_monitor import VectorMonitor
 from service.settings.modbus_sources import (
     MappedDeviceSettings,
     ModbusFifoSettings,

@@ -10,9 +10,9 @@ from acquisition.simulated.life.life_course import LifeCourse
 from acquisition.simulated.life.moment import TRANSDUCER_NOISE
 from acquisition.simulated.life.operation import RATED_POWER_MW
 from acquisition.simulated.life.present import LifePlan, course_from, history_until
-from acquisition.simulated.scenario import TransducerNoise
-from core.rotor_parameters import RotorParameters
-from core.stiffness_history import StiffnessHistory
+from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.scenario import TransducerNoise
+from core.baseline.stiffness_history import StiffnessHistory
 from core.units import ns_from_s
 from service.conversion import machine_of
 from service.settings.simulated_life import SimulatedDamageSettings

@@ -1,15 +1,15 @@
 """The simulated machines behind simulated sources and DAQs."""
 
 from acquisition.clock import Clock
-from acquisition.simulated.scenario import (
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.scenario import (
     BearingScenario,
     HydraulicNoise,
     Scenario,
     TransducerNoise,
     VortexRope,
 )
-from acquisition.simulated.unit import SimulatedUnit
-from core.film import Film
+from acquisition.simulated.plant.unit import SimulatedUnit
 from service.conversion import calibration_of, machine_of
 from service.settings.simulation import SimulatedBearingSettings, SimulationSettings
 from service.settings.units import UnitSettings

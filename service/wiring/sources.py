@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from functools import partial
 
-from acquisition.calibration import UnitCalibration
 from acquisition.can.source import CanSource
 from acquisition.clock import Clock
+from acquisition.delivery.calibration import UnitCalibration
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.simulated.source import SimulatedSource
+from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.source import SampleSource
-from core.monitor import UnitMonitor
-from core.monitor_port import Monitor
+from core.monitor.monitor import UnitMonitor
+from core.monitor.monitor_port import Monitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.metrics.polls import TimedSource
 from service.roles.watched_unit import WatchedUnit

@@ -7,13 +7,13 @@ import pytest
 
 from core.alarms.alarm import AlarmKind, AlarmState
 from core.alarms.event import AlarmChange
+from core.change.attribution import Cause
+from core.change.verdict import Verdict
 from core.condition.operating_state import OperatingState
-from core.decision.attribution import Cause
-from core.decision.verdict import Verdict
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from core.quality import Reason
-from core.runout import RunoutVerdict
-from core.speed import SpeedSource
+from core.spectra.runout import RunoutVerdict
+from core.spectra.speed import SpeedSource
 
 STATIC = Path(__file__).parents[2] / "service" / "dashboard" / "static"
 SOURCE, FILM_WORDS = STATIC / "words.js", STATIC / "film_words.js"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import LinkError
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 
 
 async def blocks_up_to(blocks: AsyncIterator[SampleBlock], stop_index: int) -> list[SampleBlock]:

@@ -8,12 +8,12 @@ import pytest
 from rigs.shaken_shaft import shaken
 
 from core.arrays import ComplexArray, FloatArray
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.monitor import UnitMonitor
+from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading, Reason, missing
-from core.settings import AnalysisSettings
+from core.samples.blocks import SampleBlock
 
 RATE_HZ = 600.0
 

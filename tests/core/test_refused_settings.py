@@ -7,16 +7,16 @@ from functools import partial
 import pytest
 
 from core.baseline.settings import BaselineSettings
-from core.bracket import BracketDynamics
+from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
 from core.condition.operating_limits import OperatingLimits
-from core.decision.limits import ChangeLimits
-from core.dynamic_settings import DynamicSettings
-from core.excitation import LineLimits
 from core.limits import Limits
-from core.machine import BearingAccuracy
-from core.transducer_response import ResponseTable
-from core.vector_settings import VectorSettings
+from core.machine.bracket import BracketDynamics
+from core.machine.response import ResponseTable
+from core.machine.unit import BearingAccuracy
+from core.spectra.vector_settings import VectorSettings
+from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.evidence import LineLimits
 
 Operating = partial(OperatingLimits, rated_speed_rpm=92.3)
 PAIR, ZEROS = (1.0, 2.0), (0.0, 0.0)

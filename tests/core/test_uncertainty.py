@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from core.bracket import BracketDynamics
-from core.cross_spectrum import BEARING_X, SHAFT_X, average
-from core.machine import BearingAccuracy
-from core.stiffness_budget import ratio_budget, transfer_budgets
-from core.transfer import line_transfer
+from core.machine.bracket import BracketDynamics
+from core.machine.unit import BearingAccuracy
+from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, average
+from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
+from core.stiffness.transfer import line_transfer
 from core.uncertainty import Budget, coverage_factor, random_line, systematic_line
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from core.film import Film
+from acquisition.simulated.plant.films import Film
 from service.validation import paper
 from service.validation.comparison import (
     Row,

@@ -14,10 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery import Delivery
-from acquisition.raw import RawBlock
-from core.assessment import Assessment
-from core.monitor import UnitMonitor
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.raw import RawBlock
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.reanalysis import assessments
 from service.settings.loading import load_plant_file

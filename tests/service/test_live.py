@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from acquisition.clock import Clock
-from core.account import SampleAccount
-from core.assessment import Assessment
-from core.blocks import SampleBlock
+from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
+from core.samples.account import SampleAccount
+from core.samples.blocks import SampleBlock
 from service.live import LinkState, LiveView
 
 STALE_AFTER_S = 30.0

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.calibration import calibrate
-from acquisition.delivery import Delivery
-from acquisition.raw import RawBlock
-from core.assessment import Assessment
-from core.blocks import Rejection
-from core.monitor import UnitMonitor
-from core.settings import AnalysisSettings
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.raw import RawBlock
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
+from core.samples.blocks import Rejection
 from service.conversion import calibration_of, machine_of
 from service.reanalysis import LastAverages, assessment_model, assessments, calibration_differences
 from service.settings.loading import load_plant_file

@@ -9,10 +9,10 @@ import pytest
 import structlog
 
 from acquisition.clock import Clock
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.monitor import UnitMonitor
+from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
 from core.quality import Reading, Reason, missing, uncertain
-from core.settings import AnalysisSettings
 from service.reference_setting import ReferenceRefusedError, doubts, given_gaps, measured_gaps
 from service.references import LOOK_EVERY_S, ReferencesInForce, with_reference
 from service.store.gap_reference import GapReference, ReferenceSource

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from core.alarms.alarm import AlarmKind
-from core.assessment import Assessment
 from core.limits import AlarmLevel
+from core.monitor.assessment import Assessment
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms
 from service.live import LiveView

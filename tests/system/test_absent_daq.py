@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 
 from .conftest import WIRE, Start
 

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.calibration import calibrate
-from acquisition.simulated.scenario import ChannelScenario, Scenario
-from acquisition.simulated.unit import SimulatedUnit
-from core.assessment import Assessment
-from core.estimators import STIFFNESS_OF
-from core.film import DAMPING_OVER_STIFFNESS_S, Film
-from core.machine import Estimator, Unit
-from core.monitor import UnitMonitor
-from core.polarity import is_reversed
+from acquisition.delivery.calibration import calibrate
+from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film
+from acquisition.simulated.plant.scenario import ChannelScenario, Scenario
+from acquisition.simulated.plant.unit import SimulatedUnit
+from core.machine.response import HighPass
+from core.machine.unit import Estimator, Unit
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import BY_NAME
+from core.monitor.monitor import UnitMonitor
 from core.quality import Level, Reason, bad, missing
-from core.quantities import BY_NAME
-from core.transducer_response import HighPass
+from core.stiffness.estimators import STIFFNESS_OF
+from core.stiffness.polarity import is_reversed
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -16,7 +16,7 @@ from benchmarks.chain import MOST_BIAS, STORY, Verdicts, judged, without_scatter
 from benchmarks.chain_story import ROWS_PER_H, Watch, from_readings, silenced, windows
 from benchmarks.chain_unit import readings
 from benchmarks.detection_unit import LearnedUnit
-from core.films.film_reading import FilmReading
+from core.change.film_reading import FilmReading
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 

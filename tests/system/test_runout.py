@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.calibration import calibrate
-from acquisition.simulated.faults import Fault, FaultKind
-from acquisition.simulated.scenario import (
+from acquisition.delivery.calibration import calibrate
+from acquisition.simulated.plant.faults import Fault, FaultKind
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.scenario import (
     BearingScenario,
     ChannelScenario,
     HydraulicNoise,
@@ -22,16 +23,15 @@ from acquisition.simulated.scenario import (
     Scenario,
     TransducerNoise,
 )
-from acquisition.simulated.unit import SimulatedUnit
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.film import Film
-from core.machine import Unit
-from core.monitor import UnitMonitor
+from acquisition.simulated.plant.unit import SimulatedUnit
+from core.machine.unit import Unit
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
 from core.quality import Reason, bad
-from core.runout import RunoutVerdict
-from core.settings import AnalysisSettings
-from core.speed import SpeedSource
+from core.samples.blocks import SampleBlock
+from core.spectra.runout import RunoutVerdict
+from core.spectra.speed import SpeedSource
 from service.conversion import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings

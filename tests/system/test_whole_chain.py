@@ -9,23 +9,23 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import TcpTransport
-from acquisition.simulated.scenario import (
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.rotor_parameters import unbalance_force_n
+from acquisition.simulated.plant.scenario import (
     BearingScenario,
     HydraulicNoise,
     Scenario,
     TransducerNoise,
 )
-from acquisition.simulated.unit import SimulatedUnit
-from core.assessment import Assessment
-from core.film import Film
-from core.monitor import UnitMonitor
-from core.rotor_parameters import unbalance_force_n
-from core.settings import AnalysisSettings
+from acquisition.simulated.plant.unit import SimulatedUnit
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
 from core.units import rad_s_from_rpm
 from service.conversion import calibration_of, machine_of
 from service.settings.loading import load_plant_file

@@ -16,8 +16,8 @@ from harness.summary import Torture
 from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
-from acquisition.recording.reader import open_recording
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.writer import RecordingWriter
 from service.store.port import StoreError
 from service.store.seals.table import SealedTable
 from service.store.sqlite import SqliteStore

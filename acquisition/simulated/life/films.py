@@ -8,8 +8,8 @@ import numpy as np
 from acquisition.simulated.life.damage import Alteration
 from acquisition.simulated.life.life_bearing import LifeBearing
 from acquisition.simulated.life.thermal import ThermalCourse
+from acquisition.simulated.plant.tilting_pad import FilmColumns
 from core.arrays import FloatArray
-from core.tilting_pad import FilmColumns
 
 UNIT_CLEARANCE_RMS = 0.02
 PAD_CLEARANCE_RMS = 0.01

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from core.oil import Oil
-from core.tilting_pad import PadRing
+from acquisition.simulated.plant.oil import Oil
+from acquisition.simulated.plant.tilting_pad import PadRing
 
 DESIGN_VISCOSITY_PA_S = 0.0340
 """Of the paper's oil at 47.5 °C, the middle of the range its Table 1 gives (40 to 55 °C)."""

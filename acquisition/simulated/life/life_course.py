@@ -19,8 +19,8 @@ from acquisition.simulated.life.moment import (
 )
 from acquisition.simulated.life.operation import Operation
 from acquisition.simulated.life.order1 import rotor_of
-from acquisition.simulated.scenario import HydraulicNoise, Scenario, TransducerNoise
-from core.machine import Unit
+from acquisition.simulated.plant.scenario import HydraulicNoise, Scenario, TransducerNoise
+from core.machine.unit import Unit
 from core.units import ns_from_s
 
 LEAST_FILM_SPEED = 0.2

@@ -10,9 +10,9 @@ from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.damage import Alteration, Damage
 from acquisition.simulated.life.measured import Chain
 from acquisition.simulated.life.operation import Operation
+from acquisition.simulated.plant.tilting_pad import FilmColumns
 from core.arrays import ComplexArray, FloatArray
-from core.stiffness_history import StiffnessHistory
-from core.tilting_pad import FilmColumns
+from core.baseline.stiffness_history import StiffnessHistory
 
 
 @dataclass(frozen=True, eq=False)

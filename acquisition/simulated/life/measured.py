@@ -8,7 +8,7 @@ import numpy.typing as npt
 from acquisition.simulated.life.operation import Operation
 from acquisition.simulated.life.wander import wander
 from core.arrays import ComplexArray, FloatArray
-from core.stiffness_history import CodeArray, Evidence
+from core.baseline.stiffness_history import CodeArray, Evidence
 
 U_RANDOM_AT_REFERENCE = 0.005
 REFERENCE_FORCE_N = 20.0e3

@@ -7,7 +7,7 @@ import numpy as np
 from acquisition.simulated.life.excitation import VORTEX_FORCE_N, has_vortex, hydraulic_force_n
 from acquisition.simulated.life.life_truth import BearingMoments, UnitLife
 from acquisition.simulated.life.order1 import rotor_of
-from acquisition.simulated.scenario import (
+from acquisition.simulated.plant.scenario import (
     BearingScenario,
     ChannelScenario,
     HydraulicNoise,
@@ -16,7 +16,7 @@ from acquisition.simulated.scenario import (
     VortexRope,
 )
 from core.arrays import FloatArray
-from core.machine import Bearing, Unit
+from core.machine.unit import Bearing, Unit
 
 TRANSDUCER_NOISE = TransducerNoise(gap_um_rms=1.2, accelerometer_g_per_sqrt_hz=5e-6)
 """What the accuracy benchmark calls realistic."""

@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.arrays import ComplexArray, FloatArray
-from core.film import DAMPING_OVER_STIFFNESS_S, Film
-from core.rotor import rotor_matrices
-from core.rotor_parameters import (
+from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film
+from acquisition.simulated.plant.rotor import rotor_matrices
+from acquisition.simulated.plant.rotor_parameters import (
     N_SHAFT_COORDINATES,
     RotorParameters,
     unbalance_force_n,
 )
-from core.tilting_pad import FilmColumns
+from acquisition.simulated.plant.tilting_pad import FilmColumns
+from core.arrays import ComplexArray, FloatArray
 from core.units import um_from_m
 
 NO_FILM = Film.proportional(0.0, 0.0)
@@ -27,7 +27,7 @@ def order1_um_pk(
     grade_mm_s: FloatArray,
     rotor: RotorParameters,
 ) -> dict[str, ComplexArray]:
-    """Answer to an unbalance in the plane of the mass centre, the model of `core.rotor`.
+    """Answer to an unbalance in the plane of the mass centre, the model of `plant.rotor`.
 
     Brackets are eliminated: with D = K + iΩC of the film and b = k_b − m_b Ω² of the bracket, the
     shaft meets (D⁻¹ + b⁻¹)⁻¹, which leaves four equations instead of ten.

@@ -19,8 +19,8 @@ from acquisition.simulated.life.life_course import LifeCourse
 from acquisition.simulated.life.life_truth import UnitLife
 from acquisition.simulated.life.moment import TRANSDUCER_NOISE
 from acquisition.simulated.life.schedule import YEAR_DAYS
-from acquisition.simulated.scenario import TransducerNoise
-from core.machine import Unit
+from acquisition.simulated.plant.scenario import TransducerNoise
+from core.machine.unit import Unit
 from core.units import NS_PER_S, ns_from_s
 
 YEARS = 3.0

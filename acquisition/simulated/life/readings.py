@@ -14,9 +14,9 @@ from acquisition.simulated.life.measured import (
     u_random,
 )
 from acquisition.simulated.life.operation import Operation
+from acquisition.simulated.plant.tilting_pad import FilmColumns
 from core.arrays import FloatArray
-from core.stiffness_history import Evidence, StiffnessHistory
-from core.tilting_pad import FilmColumns
+from core.baseline.stiffness_history import Evidence, StiffnessHistory
 
 
 def ln_stiffness(film: FilmColumns) -> FloatArray:

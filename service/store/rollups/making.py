@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from core.quantities import CATALOGUE
+from core.monitor.catalogue import CATALOGUE
 from service.store.codec import Layout, columns_of, remember_layout
 from service.store.database import Connection
 from service.store.rollups.cells import NO_STATE, Cells, Conditions

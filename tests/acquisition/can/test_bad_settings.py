@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.can.compiler import compile_plan
 from acquisition.can.dbc import load_dbc
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
+from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.errors import ConfigError
 
 LINK = CanLinkSettings(interface="virtual", channel="none")

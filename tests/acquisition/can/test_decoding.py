@@ -7,7 +7,7 @@ import pytest
 from acquisition.can.dbc import load_dbc
 from acquisition.can.layout import FrameLayout, byte_offset, scalar_reader
 from acquisition.errors import ConfigError, FrameError
-from core.blocks import Rejection
+from core.samples.blocks import Rejection
 
 N_FRAMES = 20
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from rigs.tiers import covering, fast_and_long
 
-from acquisition.daq.can_bus import CanBusServer
-from acquisition.daq.can_device import CanDevice
-from acquisition.daq.can_slcan import SlcanPtyServer, SlcanTcpServer
-from acquisition.delivery import Delivery
+from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.raw import FeedEndedError
 from acquisition.errors import LinkError
-from acquisition.raw import FeedEndedError
+from acquisition.simulated.devices.can_bus import CanBusServer
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 
 N_EACH = 200
 N_CHANNELS = 4

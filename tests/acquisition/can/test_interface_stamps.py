@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from rigs.standing_clock import StandingClock
 
-from acquisition.arrival import Arrival
-from acquisition.can.interface_clock import InterfaceClock
 from acquisition.can.source import CanSource
+from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.interface_clock import InterfaceClock
 
 RATE_HZ = 600.0
 BLOCK = 50

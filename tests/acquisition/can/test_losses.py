@@ -11,16 +11,16 @@ import pytest
 from rigs.tiers import covering, fast_and_long
 
 import acquisition.can
-from acquisition.calibration import calibrate
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
-from acquisition.daq.can_bus import _message
-from acquisition.daq.can_dbc import daq_settings
-from acquisition.daq.can_frames import FrameEncoder, shortened
-from core.blocks import Rejection
-from core.ring import Ring
+from acquisition.delivery.calibration import calibrate
+from acquisition.simulated.devices.can_bus import _message
+from acquisition.simulated.devices.can_dbc import daq_settings
+from acquisition.simulated.devices.can_frames import FrameEncoder, shortened
+from core.samples.blocks import Rejection
+from core.samples.ring import Ring
 
 BLOCK = 50
 START_NS = 1_767_225_600_000_000_000

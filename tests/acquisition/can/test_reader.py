@@ -15,8 +15,8 @@ from rigs.fake_bus import VIRTUAL, can_threads, send_block
 from acquisition.can.bus import open_bus
 from acquisition.can.settings import CanLinkSettings
 from acquisition.clock import SystemClock
-from acquisition.daq.can_device import CanDevice
 from acquisition.errors import AcquisitionError, ConfigError, LinkError
+from acquisition.simulated.devices.can_device import CanDevice
 
 
 class HeldClock(SystemClock):

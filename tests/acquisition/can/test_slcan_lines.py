@@ -10,8 +10,8 @@ import pytest
 import serial
 
 from acquisition.can.slcan import open_slcan
-from acquisition.daq.can_frames import FD_LENGTHS, WireFrame
-from acquisition.daq.can_slcan import slcan_line
+from acquisition.simulated.devices.can_frames import FD_LENGTHS, WireFrame
+from acquisition.simulated.devices.can_slcan import slcan_line
 
 N_KINDS = 200
 IDS = (0x100, 0x123)

@@ -4,12 +4,12 @@ import itertools
 
 import pytest
 
-from acquisition.arrival import Arrival
 from acquisition.can.reader import Batch
 from acquisition.can.source import CanSource
+from acquisition.delivery.arrival import Arrival
 from acquisition.errors import LinkError
-from core.blocks import SampleBlock
-from core.outage import Reach, restart
+from core.samples.blocks import SampleBlock
+from core.samples.outage import Reach, restart
 
 RATE_HZ = 60.0
 STOPS_AT_S = 10.0

@@ -9,18 +9,18 @@ from rigs.modbus import transport_of
 from rigs.polled import CALIBRATION, Follower, device_of, map_of
 
 from acquisition.clock import SystemClock
-from acquisition.daq.map_device import MapDevice
-from acquisition.daq.register_memory import RegisterMemory
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.rtu_server import ModbusRtuServer
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
-from acquisition.registers.register_map import RegisterMap
-from core.blocks import SampleBlock
+from acquisition.simulated.devices.map_device import MapDevice
+from acquisition.simulated.devices.register_memory import RegisterMemory
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from core.samples.blocks import SampleBlock
 
 
 @pytest.fixture

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.daq import faults
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.tcp_server import ModbusTcpServer
-from core.blocks import SampleBlock
+from acquisition.simulated.devices import faults
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from core.samples.blocks import SampleBlock
 
 N_SLOTS = 16
 SLOT = 50

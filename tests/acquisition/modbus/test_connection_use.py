@@ -11,15 +11,15 @@ import pytest
 from rigs.hostile_modbus import HostileServer
 from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, FrameError, LinkError
+from acquisition.modbus.cells import Cell
 from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.register_map import Signature
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, TcpTransport
-from acquisition.registers.cells import Cell
-from acquisition.registers.register_map import Signature
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 
 ACME = ExpectedIdentification(vendor="Acme")
 SIGNED = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.daq.fifo_device import FifoDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.transport import TcpTransport
-from acquisition.registers.fifo_layout import FifoKind, FifoLayout
-from core.blocks import SampleBlock
+from acquisition.simulated.devices.fifo_device import FifoDevice
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from core.samples.blocks import SampleBlock
 
 STEP = 50
 INTERLEAVED = FifoLayout(addresses=(1000,), n_channels=2)

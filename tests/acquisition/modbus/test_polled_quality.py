@@ -3,8 +3,8 @@
 import pytest
 from rigs.polled import map_of, take
 
-from acquisition.registers.cells import Cell
-from acquisition.registers.register_map import FullScale, MapValue, RegisterMap
+from acquisition.modbus.cells import Cell
+from acquisition.modbus.register_map import FullScale, MapValue, RegisterMap
 from core.quality import GOOD, Level, Reason
 
 

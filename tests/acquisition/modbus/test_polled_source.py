@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from rigs.polled import map_of, take
 
+from acquisition.delivery.ticks import Ticks
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.ticks import Ticks
-from acquisition.registers.cells import Cell, NumberType
-from acquisition.registers.device_time import EpochTime
-from acquisition.registers.register_map import Signature
+from acquisition.modbus.cells import Cell, NumberType
+from acquisition.modbus.device_time import EpochTime
+from acquisition.modbus.register_map import Signature
 from core.quality import GOOD
 
 FLOAT = Cell(address=30, type=NumberType.FLOAT32)

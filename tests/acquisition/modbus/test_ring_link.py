@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from acquisition.arrival import Arrival
-from acquisition.clock_estimate import ClockEstimate
-from acquisition.daq import faults
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.clock_estimate import ClockEstimate
+from acquisition.delivery.ring_pace import out_of_step_s
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.ring_pace import out_of_step_s
+from acquisition.simulated.devices import faults
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from core.alarms.conditions import drift_reading
 
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from acquisition.clock import SystemClock
-from acquisition.daq import faults
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.errors import LinkError
 from acquisition.modbus.profile import RingHeader, encode_header
 from acquisition.modbus.slot import encode_slot
-from core.blocks import Rejection
-from core.device_clock import StampFault
+from acquisition.simulated.devices import faults
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from core.quality import Reason
+from core.samples.blocks import Rejection
+from core.samples.device_clock import StampFault
 
 U32 = 2**32
 

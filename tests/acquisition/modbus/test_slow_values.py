@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from rigs.registers import SlowFeed
 
-from acquisition.calibration import SlowCalibration, UnitCalibration
 from acquisition.clock import SystemClock
-from acquisition.daq.map_device import MapDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.delivery.calibration import SlowCalibration, UnitCalibration
+from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.errors import ConfigError, LinkError
-from acquisition.joined_source import JoinedSource, only_slow, without_slow
-from acquisition.modbus.polled_slow_values import PolledSlowValues
+from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSettings
+from acquisition.modbus.register_map import MapValue, RegisterMap
+from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.modbus.transport import TcpTransport
-from acquisition.registers.cells import Cell, NumberType
-from acquisition.registers.register_map import MapValue, RegisterMap
+from acquisition.simulated.devices.map_device import MapDevice
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.source import refused_frames_of
-from core.blocks import SampleBlock
 from core.quality import GOOD, Level, Reading, Reason
+from core.samples.blocks import SampleBlock
 
 OIL = SlowCalibration("oil", 0.0, 100.0)
 POWER = SlowCalibration("power", 0.0, 1000.0)

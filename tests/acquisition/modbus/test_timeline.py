@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from acquisition.errors import FrameError
 from acquisition.modbus.counted_samples import WRAP, CountedSamples, Place
 from acquisition.modbus.fifo_assembly import ChannelAssembly, place_records
+from acquisition.modbus.fifo_layout import FifoPiece
 from acquisition.modbus.ring_layout import U32, RingLayout
 from acquisition.modbus.slot import Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from acquisition.modbus.uncounted_samples import UncountedSamples
-from acquisition.registers.fifo_layout import FifoPiece
 
 LAYOUT = RingLayout(1, 50, 8, 600_000, 0, 16, 65)
 NS_PER_SLOT = 50 * 10**9 // 600

@@ -4,18 +4,18 @@ from collections.abc import Callable
 
 import pytest
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.simulated.scenario import (
+from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.scenario import (
     BearingScenario,
     HydraulicNoise,
     Scenario,
     TransducerNoise,
     VortexRope,
 )
-from acquisition.simulated.unit import SimulatedUnit
-from core.film import Film
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.unit import SimulatedUnit
+from core.machine.unit import Bearing, Channel, Measurand, Unit
 
 RATE_HZ = 600.0
 CLEARANCE_UM = {"UJB": 200.0, "LJB": 300.0, "TJB": 200.0}

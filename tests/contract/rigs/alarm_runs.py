@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from core.alarms.event import AlarmEvent
-from core.blocks import SampleBlock
 from core.quality import GOOD, Reason, bad
+from core.samples.blocks import SampleBlock
 from service.store.port import AlarmQuery
 
 Make = Callable[..., Any]

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from core.assessment import Assessment, AveragingWindow
-from core.cross_spectrum import average
+from core.monitor.assessment import Assessment, AveragingWindow
+from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD, Reading, Reason, missing
-from core.quantities import CATALOGUE
-from core.speed import SpeedSource
+from core.spectra.cross_spectrum import average
+from core.spectra.speed import SpeedSource
 
 
 def assessment(

@@ -5,10 +5,10 @@ from contextlib import AsyncExitStack
 from acquisition.can.settings import CanLinkSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.daq.can_dbc import daq_settings
-from acquisition.daq.can_device import CanDevice
-from acquisition.daq.can_shape import CanShape, DaqSignal
-from acquisition.daq.can_slcan import SlcanTcpServer
+from acquisition.simulated.devices.can_dbc import daq_settings
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.devices.can_slcan import SlcanTcpServer
 from acquisition.source import SampleSource
 
 

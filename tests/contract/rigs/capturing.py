@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
-from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
+from acquisition.recordings.reader import Recording, open_recording
+from acquisition.recordings.writer import RecordingWriter
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Shelve, operate
-from core.blocks import SampleBlock
 from core.limits import AlarmLevel, Condition
-from core.machine import Measurand
+from core.machine.unit import Measurand
 from core.quality import GOOD, Reason, bad
+from core.samples.blocks import SampleBlock
 from rigs.standing_clock import StandingClock
 from service.capture.captures import Captures
 from service.capture.span import CaptureSettings

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import ConfigError
-from acquisition.importing.job import ImportJob
+from acquisition.recordings.imports.job import ImportJob
 
 Read = Callable[[Path, ImportJob], Any]
 Placed = Callable[..., ImportJob]
@@ -24,8 +24,8 @@ import json, resource, sys
 from pathlib import Path
 from pydantic import TypeAdapter
 from acquisition.errors import ConfigError
-from acquisition.importing.job import ImportJob
-from acquisition.importing.reading import reading
+from acquisition.recordings.imports.job import ImportJob
+from acquisition.recordings.reading import reading
 
 job, said = TypeAdapter(ImportJob).validate_json(sys.argv[1]), []
 for path in sys.argv[2:]:

@@ -8,9 +8,9 @@ from typing import Self
 
 from pymodbus.framer import FramerRTU
 
-from acquisition.daq.answers import ReadableDevice, answer
-from acquisition.daq.modbus_server import ModbusDevice
-from acquisition.daq.rtu_server import ModbusRtuServer
+from acquisition.simulated.devices.answers import ReadableDevice, answer
+from acquisition.simulated.devices.modbus_server import ModbusDevice
+from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 
 _MBAP_HEAD_BYTES = 6
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.daq.ring_shape import RingDeviceSettings
 from acquisition.errors import ConfigError, LinkError
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from rigs.hostile_modbus import HostileLine, HostileServer, rtu_frame
 from rigs.modbus import ModbusRig, ModbusRtuRig
 from rigs.registers import REGISTER_RIGS

@@ -5,13 +5,13 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.daq.modbus_server import ModbusDevice, ModbusServer
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.rtu_server import ModbusRtuServer
-from acquisition.daq.tcp_server import ModbusTcpServer
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
+from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.source import SampleSource
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
+from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, missing, uncertain
 from rigs.rolled_trends import require_same
 from service.store.port import Trend, TrendQuery

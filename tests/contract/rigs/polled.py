@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from acquisition.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.daq.map_device import MapDevice
+from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from acquisition.delivery.raw import RawBlock
+from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSource
-from acquisition.raw import RawBlock
-from acquisition.registers.cells import Cell, NumberType
-from acquisition.registers.register_map import FlagCheck, MapValue, Meaning, RegisterMap
-from core.blocks import SampleBlock
+from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
+from acquisition.simulated.devices.map_device import MapDevice
+from core.samples.blocks import SampleBlock
 
 STATUS = Cell(address=50)
 BAD_IF_SET = FlagCheck(cell=STATUS, mask=0x0008, set_means=Meaning.BAD)

@@ -7,9 +7,9 @@ from typing import Any
 import httpx2
 import numpy as np
 
-from core.assessment import Assessment
-from core.blocks import SampleBlock
+from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, bad
+from core.samples.blocks import SampleBlock
 from service.recorder import Findings
 
 ALARMS = "/api/v1/alarms"

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.machine import Unit
+from core.machine.unit import Unit
+from core.monitor.assessment import Assessment
+from core.monitor.settings import AnalysisSettings
+from core.monitor.vector_monitor import VectorMonitor
 from core.quality import GOOD, Quality, Reading
-from core.settings import AnalysisSettings
-from core.vector_monitor import VectorMonitor
-from core.vector_rows import VectorPart, VectorRow
-from core.vector_settings import VectorSettings
+from core.samples.blocks import SampleBlock
+from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.vector_settings import VectorSettings
 
 RATE_HZ = 0.2
 K_B = 1.18e9

@@ -4,13 +4,13 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from acquisition.recording.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
-from acquisition.recording.reader import open_recording
-from acquisition.recording.source import RecordingSource
-from acquisition.recording.writer import RecordingWriter
-from acquisition.simulated.source import SimulatedSource
+from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.source import RecordingSource
+from acquisition.recordings.writer import RecordingWriter
+from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.source import SampleSource
-from core.machine import Measurand
+from core.machine.unit import Measurand
 
 
 class RecordingRig:

@@ -6,27 +6,21 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.daq.fifo_device import FifoDevice
-from acquisition.daq.map_device import MapDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
-from acquisition.joined_source import JoinedSource, only_slow, without_slow
+from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
+from acquisition.delivery.raw import RawBlock
+from acquisition.modbus.cells import ByteOrder, Cell, NumberType
+from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
-from acquisition.modbus.polled_slow_values import PolledSlowValues
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap, Together
+from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.modbus.transport import TcpTransport
-from acquisition.raw import RawBlock
-from acquisition.registers.cells import ByteOrder, Cell, NumberType
-from acquisition.registers.fifo_layout import FifoKind, FifoLayout
-from acquisition.registers.register_map import (
-    FlagCheck,
-    MapValue,
-    Meaning,
-    RegisterMap,
-    Together,
-)
+from acquisition.modbus.vector_calibration import vector_calibration
+from acquisition.simulated.devices.fifo_device import FifoDevice
+from acquisition.simulated.devices.map_device import MapDevice
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.source import SampleSource
-from acquisition.vector_calibration import vector_calibration
-from core.vector_rows import VectorPart, VectorRow
+from core.spectra.vector_rows import VectorPart, VectorRow
 from rigs.modbus import OnRtu, OnTcp, Rig
 
 SLOW = ("slow0", "slow1")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from rigs.memory_folder import memory_folder
 from service.store.port import Trend
 from service.store.sql_store import SqlStore

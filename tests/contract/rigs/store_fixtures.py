@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from core.account import Gap
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
+from core.samples.account import Gap
 from service.store.port import TrendQuery, UnitGap
 
 Build = Callable[..., Assessment]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from rigs.old_results import HOUR_NS, MINUTE_NS, SECOND_NS, Build, result_at
 from service.store.port import TrendQuery
 

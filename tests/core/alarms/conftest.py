@@ -11,10 +11,10 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmEvent
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Action, operate
-from core.blocks import SampleBlock
 from core.limits import Condition
-from core.machine import Bearing, Channel, Measurand, Unit
+from core.machine.unit import Bearing, Channel, Measurand, Unit
 from core.quality import GOOD, Reading
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 
 IDS = ("sx", "sy", "bx", "by", "spare")

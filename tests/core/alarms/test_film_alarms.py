@@ -11,7 +11,7 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import OrderVector, VectorReference, vector_condition
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Condition, Limits, unknown
-from core.machine import Unit
+from core.machine.unit import Unit
 from core.quality import Reading, Reason, missing
 
 FILM_X = "U1:UJB:stiffness_x"

@@ -10,9 +10,9 @@ from core.alarms.event import AlarmNews
 from core.alarms.operation import Acknowledge, Action, Comment
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.blocks import SampleBlock
 from core.limits import AlarmLevel, Limits
-from core.machine import Unit
+from core.machine.unit import Unit
+from core.samples.blocks import SampleBlock
 
 SECOND = 1_000_000_000
 OIL = "U1:UJB:oil_temperature"

@@ -15,9 +15,9 @@ from core.alarms.conditions import (
 )
 from core.condition.bearing_condition import OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.device_clock import DeviceClock, StampFault
 from core.limits import AlarmLevel, Limits, ZoneLimits, judge
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
+from core.samples.device_clock import DeviceClock, StampFault
 
 ALERT, DANGER = AlarmLevel
 LIMITS = Limits(150.0, 200.0, 10.0)

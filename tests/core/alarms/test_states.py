@@ -13,13 +13,13 @@ from core.alarms.operation import Acknowledge
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import OrderVector, VectorReference
-from core.blocks import SampleBlock
 from core.condition.bearing_condition import BearingCondition, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import Limits
-from core.machine import Unit
+from core.machine.unit import Unit
+from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD, Reading, Reason, bad, missing
-from core.quantities import CATALOGUE
+from core.samples.blocks import SampleBlock
 
 SECOND = 1_000_000_000
 AT_ONCE = rule_of(0.0, 0.0)

@@ -10,10 +10,10 @@ import pytest
 from core.alarms.alarm import AlarmKind, AlarmState
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.device_clock import StampFault
 from core.limits import AlarmLevel, Limits
-from core.machine import Unit
+from core.machine.unit import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
+from core.samples.device_clock import StampFault
 
 SECOND = 1_000_000_000
 IDS = ("sx", "sy", "bx", "by", "spare")

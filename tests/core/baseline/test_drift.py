@@ -10,7 +10,7 @@ from core.baseline.drift import Drift, drift_within, learning_drift
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.baseline.slope_scatter import slope_scatter
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
 
 FilmLife = Callable[..., StiffnessHistory]
 

@@ -9,7 +9,7 @@ from core.baseline.baseline import BearingBaseline, Origin, Watched
 from core.baseline.exchange import from_json, to_json
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
 
 
 @pytest.fixture(scope="module")

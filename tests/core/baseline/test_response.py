@@ -7,7 +7,7 @@ import pytest
 
 from core.baseline.exchange import response_from_json, response_to_json
 from core.baseline.response import ShaftResponse, learn_response, place_columns
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
 
 N = 3000
 

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.change.operation_history import operation_history
 from core.condition.cells import CellGrid
 from core.condition.film_conditions import FilmConditions
 from core.condition.oil_settling import NOT_AT_SPEED
@@ -14,7 +15,6 @@ from core.condition.operating_state import (
     Operation,
     advance,
 )
-from core.condition.operation_history import operation_history
 
 LIMITS = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0, warm_up_s=1200.0)
 MINUTE_NS = 60_000_000_000

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import structlog
 
-from core.machine import Bearing, Channel, Measurand, Unit
+from core.machine.unit import Bearing, Channel, Measurand, Unit
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 

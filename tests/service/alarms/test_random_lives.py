@@ -34,9 +34,9 @@ from core.alarms.operation import (
 )
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.blocks import SampleBlock
 from core.limits import AlarmLevel, Condition, unknown
 from core.quality import GOOD, Reason, bad
+from core.samples.blocks import SampleBlock
 from service.alarms.engine import AlarmEngine
 from service.live import LiveView
 from service.parked_rows import FILE, ParkedRows

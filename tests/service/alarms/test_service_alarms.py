@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from core.account import SampleAccount
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.operation import Acknowledge
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel
+from core.samples.account import SampleAccount
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms

@@ -16,12 +16,12 @@ from rigs.database_copy import copy_database
 from rigs.described import described_app
 from rigs.probes import Probes
 
-from acquisition.calibration import calibrate
+from acquisition.delivery.calibration import calibrate
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.life_cycle import advance
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.monitor import UnitMonitor
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
 from service.alarms.engine import AlarmEngine
 from service.alarms.start import alarm_engine
 from service.api.access.desk import AccessDesk

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.assessment import Assessment
-from core.quantities import CATALOGUE
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
 from service.api.times import rfc3339
 from service.live import LinkState
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.account import SampleAccount
-from core.blocks import SampleBlock
 from core.quality import GOOD, Reading, Reason, bad, missing
+from core.samples.account import SampleAccount
+from core.samples.blocks import SampleBlock
 from service.live import HELD_S, LinkState
 from service.settings.plant import PlantFile
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.calibration import calibrate
-from acquisition.raw import RawBlock
-from core.account import SampleAccount
-from core.blocks import SampleBlock
+from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.raw import RawBlock
 from core.quality import Reason, bad, missing
+from core.samples.account import SampleAccount
+from core.samples.blocks import SampleBlock
 from service.conversion import calibration_of
 from service.settings.plant import PlantFile
 from service.wiring.recordings import recording_writer

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from core.account import Gap, SampleAccount
-from core.blocks import SampleBlock
-from core.device_clock import DeviceClock, StampFault
+from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD
-from core.quantities import CATALOGUE
+from core.samples.account import Gap, SampleAccount
+from core.samples.blocks import SampleBlock
+from core.samples.device_clock import DeviceClock, StampFault
 from service.store.port import UnitGap
 
 

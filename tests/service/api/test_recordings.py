@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from rigs.capturing import BLOCK, block, recorded_unit
 
-from acquisition.recording.reader import open_recording
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.writer import RecordingWriter
 from core.alarms.alarm import AlarmKind
 
 RECORDINGS = "/api/v1/recordings"

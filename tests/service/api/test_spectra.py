@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.cross_spectrum import CrossSpectrum
-from core.monitor import UnitMonitor
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading
+from core.samples.blocks import SampleBlock
+from core.spectra.cross_spectrum import CrossSpectrum
 from service.api.spectra_views import MAX_NUMBERS
 from service.conversion import analysis_of, machine_of
 from service.settings.plant import PlantFile

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from service.api.alarm_models import AlarmListModel
 from service.api.alarm_views import alarm_list_model
 from service.api.shared import SharedAnswer

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
+from core.monitor.assessment import Assessment
 from service.settings.plant import PlantFile
 
 TRENDS = "/api/v1/units/U1/bearings/UJB/trends"

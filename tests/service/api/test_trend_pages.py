@@ -10,11 +10,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from core.assessment import Assessment
+from core.baseline.stiffness_history import StiffnessHistory
 from core.condition.operating_state import OperatingState
-from core.machine import Estimator
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment
 from core.quality import Reading
-from core.stiffness_history import StiffnessHistory
 from service.api.tables import Column, csv_pieces, parquet_file
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmHistory

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.history_rows import Place
+from core.baseline.history_rows import Place
 from service.back_test.file_columns import ReadingsError
 from service.back_test.parquet_rows import parquet_batches
 from service.back_test.reading import read_histories

@@ -8,16 +8,16 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from core.baseline.stiffness_history import Evidence
+from core.change.decision import UNDECIDED
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmReading, FilmValue
+from core.change.verdict import Verdict
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.decision.decision import UNDECIDED
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmReading, FilmValue
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from core.quality import Reason
-from core.stiffness_history import Evidence
 from service.back_test import stored
 from service.back_test.reading import read_histories
 from service.cli import readings as commands

@@ -11,17 +11,17 @@ import pytest
 from acquisition.simulated.life.life_truth import UnitLife
 from core.baseline.baseline import Origin, Watched
 from core.baseline.exchange import from_json
+from core.baseline.history_rows import BearingRows, Place
 from core.baseline.learning import learn
 from core.baseline.response import learn_response, place_columns
 from core.baseline.settings import BaselineSettings
+from core.baseline.stiffness_history import DIRECTIONS
 from core.baseline.watched import watched_values
+from core.change.attribution import PlaceReadings, attribute
+from core.change.back_test import back_test
+from core.change.operation_history import operation_history
+from core.change.settings import ChangeLimits
 from core.condition.operating_limits import OperatingLimits
-from core.condition.operation_history import operation_history
-from core.decision.attribution import PlaceReadings, attribute
-from core.decision.back_test import back_test
-from core.decision.limits import ChangeLimits
-from core.history_rows import BearingRows, Place
-from core.stiffness_history import DIRECTIONS
 from service.api.times import rfc3339
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines

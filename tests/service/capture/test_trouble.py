@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from rigs.capturing import BLOCK, SETTINGS, Rig, numbers, raised, running, samples
 
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.writer import RecordingWriter
 from service.capture import captures as module
 from service.capture.outcome import Outcome
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rigs.command_line import padwatch
 
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from service.cli import demo
 from service.cli.daq_process import RunningDaq
 from service.films.versions import versions_after

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from acquisition.calibration import SlowCalibration, UnitCalibration
-from acquisition.daq.map_device import MapDevice
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.tcp_server import ModbusTcpServer
-from acquisition.raw import RawBlock
+from acquisition.delivery.calibration import SlowCalibration, UnitCalibration
+from acquisition.delivery.raw import RawBlock
+from acquisition.simulated.devices.map_device import MapDevice
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from service.cli.probe import app
 from service.settings.map_file import load_map_file
 

@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from acquisition.clock import SystemClock
-from acquisition.raw import RawBlock
-from acquisition.recording.manifest import RecordedUnit
-from acquisition.recording.writer import RecordingWriter
+from acquisition.delivery.raw import RawBlock
+from acquisition.recordings.manifest import RecordedUnit
+from acquisition.recordings.writer import RecordingWriter
 from service.cli.commands import app
 from service.settings.loading import load_plant_file
 from service.wiring.recorded_units import recorded_unit

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from rigs.command_line import padwatch, padwatch_program
 
-from acquisition.calibration import calibrate
 from acquisition.clock import SystemClock
+from acquisition.delivery.calibration import calibrate
 from acquisition.errors import LinkError
-from core.blocks import SampleBlock
-from core.monitor import UnitMonitor
+from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
 from service.cli.record import Patience, record_blocks
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.reanalysis import assessment_model, assessments

@@ -8,9 +8,9 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from acquisition.calibration import calibrate
-from acquisition.raw import RawBlock
-from core.blocks import Rejection
+from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.raw import RawBlock
+from core.samples.blocks import Rejection
 from service.cli import recording as commands
 from service.conversion import calibration_of
 from service.settings.loading import load_plant_file

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rigs.command_line import padwatch
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from service.store.highwater.comparison import MAX_BEHIND
 from service.store.sqlite import SqliteStore, checking
 

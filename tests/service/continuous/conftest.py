@@ -10,7 +10,7 @@ from rigs import capturing
 from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
 
-from acquisition.recording.manifest import RecordedUnit
+from acquisition.recordings.manifest import RecordedUnit
 from service.continuous.pieces import Shed, TapeSettings
 from service.continuous.tape import Tape
 

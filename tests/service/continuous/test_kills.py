@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from rigs.capturing import BLOCK, block, numbers, samples
 
-from acquisition.recording.manifest import RecordedUnit
-from acquisition.recording.reader import Recording, open_recording
-from acquisition.recording.summary import summary_of
-from core.blocks import SampleBlock
+from acquisition.recordings.manifest import RecordedUnit
+from acquisition.recordings.reader import Recording, open_recording
+from acquisition.recordings.summary import summary_of
+from core.samples.blocks import SampleBlock
 from service.continuous.joining import clear_unfinished, join, unjoined
 from service.continuous.last import last_end
 from service.continuous.pieces import TapeSettings

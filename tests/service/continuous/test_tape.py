@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from rigs.capturing import numbers, samples
 
-from acquisition.recording.reader import open_recording
-from acquisition.recording.summary import summary_of
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.summary import summary_of
 from service.continuous import tape, unit_tape
 from service.continuous.last import last_end
 from service.continuous.pieces import Shed

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.decision.verdict import JUDGED, Verdict
-from core.machine import Estimator
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
+from core.change.verdict import JUDGED, Verdict
+from core.machine.unit import Estimator
 from core.units import NS_PER_S
 from service.demo.past import fill, without_past
 from service.films.versions import versions_after

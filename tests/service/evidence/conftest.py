@@ -11,8 +11,8 @@ import pytest
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
-from core.assessment import Assessment
 from core.limits import AlarmLevel, Condition
+from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.conversion import machine_of
 from service.evidence.archive import EvidenceArchive

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.recording.manifest import MANIFEST
+from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import AlarmKind
 from core.alarms.event import AlarmEvent
 from core.quality import Reading

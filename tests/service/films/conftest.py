@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.baseline.stiffness_history import Evidence, StiffnessHistory
+from core.change.decision import UNDECIDED
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmReading, FilmValue
+from core.change.operation_history import operation_history
+from core.change.verdict import Verdict
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_limits import OperatingLimits
 from core.condition.operating_state import OperatingState
-from core.condition.operation_history import operation_history
-from core.decision.decision import UNDECIDED
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmReading, FilmValue
-from core.machine import Estimator
+from core.machine.unit import Estimator
 from core.quality import Reason
-from core.stiffness_history import Evidence, StiffnessHistory
 from service.store.sqlite import SqliteStore
 
 OPERATING = OperatingLimits(92.3, 330.0, warm_up_s=3600.0)

@@ -13,16 +13,16 @@ from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.learning import learn
 from core.baseline.response import learn_response
 from core.baseline.settings import BaselineSettings
+from core.baseline.stiffness_history import StiffnessHistory
+from core.change.attribution import Attribution, Cause
+from core.change.decision import Decision
+from core.change.evidence import Finding, GatheredEvidence, ScaleSums
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.verdict import Verdict
 from core.condition.operating_state import OperatingState
-from core.decision.attribution import Attribution, Cause
-from core.decision.decision import Decision
-from core.decision.gathered import Finding, GatheredEvidence, ScaleSums
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
 from core.limits import AlarmLevel
-from core.machine import Estimator
-from core.stiffness_history import StiffnessHistory
+from core.machine.unit import Estimator
 from service.store.film_port import BaselineStep, FilmQuery, StoredStep
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from core.baseline.baseline import BearingBaseline
+from core.baseline.stiffness_history import StiffnessHistory
+from core.change.film_judge import FilmJudge, FilmNews
+from core.change.film_rules import FilmRules
+from core.change.verdict import JUDGED
 from core.condition.cells import CellGrid
-from core.decision.verdict import JUDGED
-from core.films.film_judge import FilmJudge, FilmNews
-from core.films.film_rules import FilmRules
-from core.machine import Bearing, Channel, Estimator, Measurand, Unit
-from core.stiffness_history import StiffnessHistory
+from core.machine.unit import Bearing, Channel, Estimator, Measurand, Unit
 from service.films.actions import Accept, BaselineRefusedError, Freeze, Reject, Renew, Thaw
 from service.films.keeper import FilmKeeper
 from service.films.learning import FilmPlace

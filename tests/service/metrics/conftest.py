@@ -12,14 +12,14 @@ import pytest
 from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
-from acquisition.calibration import calibrate
 from acquisition.clock import Clock, SystemClock
+from acquisition.delivery.calibration import calibrate
 from acquisition.errors import LinkError
 from acquisition.source import SampleSource
-from core.account import SampleAccount
-from core.blocks import Rejection, SampleBlock
-from core.device_clock import DeviceClock
 from core.quality import Reason, bad
+from core.samples.account import SampleAccount
+from core.samples.blocks import Rejection, SampleBlock
+from core.samples.device_clock import DeviceClock
 from service.conversion import calibration_of
 from service.http.listening import listen
 from service.metrics.polls import TimedSource

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import pytest
 
 from acquisition.clock import Clock
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.heartbeats import Unheard
 from service.metrics.acquired import MAX_REASONS, bounded
 from service.metrics.durations import Durations

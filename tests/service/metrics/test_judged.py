@@ -8,10 +8,10 @@ from prometheus_client import Metric
 from core.alarms.operation import Shelve
 from core.alarms.rules import UnitRules
 from core.alarms.unit_alarms import UnitAlarms
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.machine import Bearing, Channel, Measurand, Unit
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.verdict import Verdict
+from core.machine.unit import Bearing, Channel, Measurand, Unit
 from service.alarms.engine import AlarmEngine
 from service.delivery.deliveries import ReceiverView
 from service.delivery.sender import Receiver, SenderStatus

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.raw import RawBlock
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
-from acquisition.recording.writer import RecordingWriter
-from core.machine import Measurand
+from acquisition.delivery.raw import RawBlock
+from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
+from acquisition.recordings.writer import RecordingWriter
+from core.machine.unit import Measurand
 from service.recordings.shelf import Shelf
 from service.store.waveform_port import WaveformKind
 

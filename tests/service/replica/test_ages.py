@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.account import SampleAccount
-from core.assessment import Assessment
-from core.blocks import SampleBlock
+from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
+from core.samples.account import SampleAccount
+from core.samples.blocks import SampleBlock
 from service.live import LinkState, LiveView, UnitStatus
 from service.replica.describing import bearing_state, unit_signs
 from service.replica.live import SILENT_AFTER_S, ReplicaLive

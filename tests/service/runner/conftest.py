@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
+from acquisition.recordings.writer import RecordingWriter
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.blocks import SampleBlock
 from core.limits import Limits
-from core.machine import Bearing, Channel, Measurand, Unit
-from core.monitor import UnitMonitor
-from core.outage import Reach
+from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD
-from core.settings import AnalysisSettings
+from core.samples.blocks import SampleBlock
+from core.samples.outage import Reach
 from service.alarms.engine import AlarmEngine
 from service.capture.captures import Captures
 from service.capture.file import MakeWriter

@@ -17,12 +17,12 @@ from rigs.alarm_runs import PROBE, Make, changes, play
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap
 
-from core.account import Gap
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
-from core.assessment import Assessment
 from core.limits import AlarmLevel, Condition
+from core.monitor.assessment import Assessment
+from core.samples.account import Gap
 from service import recorder as recording
 from service.api.app import create_app
 from service.api.context import Context

@@ -10,8 +10,8 @@ from rigs.alarm_runs import changes
 
 from core.alarms import board, life_cycle
 from core.alarms.alarm import Alarm
-from core.blocks import SampleBlock
 from core.limits import ON
+from core.samples.blocks import SampleBlock
 
 N_BLOCKS = 140
 LOUD = range(40, 80)

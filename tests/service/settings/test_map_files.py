@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.registers.decoding import MapDecoder
-from core.vector_rows import VectorPart, VectorRow
+from acquisition.modbus.decoding import MapDecoder
+from core.spectra.vector_rows import VectorPart, VectorRow
 from service.settings.map_file import load_map_file
 from service.settings.toml_file import TomlFileError
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from acquisition.calibration import calibrate
 from acquisition.clock import SystemClock
-from core.machine import Measurand
-from core.monitor import UnitMonitor
+from acquisition.delivery.calibration import calibrate
+from core.machine.unit import Measurand
+from core.monitor.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file
 from service.settings.plant import PlantFile

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from core.transducer_response import HighPass, Resonance, ResponseChain, ResponseTable
+from core.machine.response import HighPass, Resonance, ResponseChain, ResponseTable
 from service.conversion import machine_of
 from service.settings.calibration_sheet import SheetError, read_calibration_sheet
 from service.settings.loading import PlantFileError, load_plant_file

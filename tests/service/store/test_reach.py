@@ -6,8 +6,8 @@ from typing import Any
 from rigs.assessments import assessment
 from rigs.store_fixtures import at
 
-from core.account import Gap
-from core.outage import Reach
+from core.samples.account import Gap
+from core.samples.outage import Reach
 from service.store.port import UnitGap
 
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap, query
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
-from core.quantities import CATALOGUE
 from service.asker import ASKER, Asker
 from service.store import sql_store, trends
 from service.store.codec import Layout

@@ -13,11 +13,11 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Execute
 
 from core.arrays import FloatArray
-from core.assessment import Assessment
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.cross_spectrum import CrossSpectrum
+from core.monitor.assessment import Assessment
 from core.quality import Level, Reason, missing
+from core.spectra.cross_spectrum import CrossSpectrum
 from service.store.spectra_codec import HIGHEST_UM, LOWEST_UM, decode, encode
 from service.store.spectra_port import Spectra, SpectraLimits, SpectraQuery, Tier, TierLimits
 from service.store.sqlite import SqliteStore

@@ -18,9 +18,9 @@ from harness.stream_rig import found_in
 from rigs.tiers import fast_and_long
 
 from core.arrays import FloatArray, SampleArray
-from core.blocks import Rejection, SampleBlock
-from core.counts import ANEW
 from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
+from core.samples.blocks import Rejection, SampleBlock
+from core.samples.counts import ANEW
 from core.units import NS_PER_S
 from service.live import LinkState
 from service.roles.link_news import LinkNews

@@ -12,8 +12,8 @@ from nats.errors import ConnectionClosedError
 from nats.js.client import JetStreamContext
 
 from acquisition.clock import SystemClock
-from core.blocks import SampleBlock
 from core.quality import GOOD
+from core.samples.blocks import SampleBlock
 from service.live import LinkState
 from service.roles.link_news import LinkNews
 from service.settings.plant import PlantFile

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.blocks import SampleBlock
 from core.quality import GOOD, Reason, bad
+from core.samples.blocks import SampleBlock
 from service.live import LinkState
 from service.roles.link_news import LinkNews
 from service.stream.identity import UnitIdentity, fingerprint

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from acquisition.errors import LinkError
-from core.blocks import SampleBlock
+from core.samples.blocks import SampleBlock
 from service.heartbeats import PATIENCE_S, Heartbeats
 from service.live import LinkState, LiveView
 from service.metrics.polls import TimedSource

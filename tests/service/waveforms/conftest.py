@@ -9,10 +9,10 @@ import pytest
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 from rigs.standing_clock import StandingClock
 
-from acquisition.raw import RawBlock
-from acquisition.recording.manifest import RecordedChannel, RecordedUnit
-from acquisition.recording.writer import RecordingWriter
-from core.machine import Measurand
+from acquisition.delivery.raw import RawBlock
+from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
+from acquisition.recordings.writer import RecordingWriter
+from core.machine.unit import Measurand
 from service.space.disk import DiskSpace
 from service.space.limits import SpaceLimits
 from service.store.sqlite import SqliteStore

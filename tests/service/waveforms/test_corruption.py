@@ -10,8 +10,8 @@ import pytest
 from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError
-from acquisition.recording.reader import open_recording
-from acquisition.recording.summary import summary_of
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.summary import summary_of
 from service.recordings.shelf import Shelf
 from service.store.waveform_port import WaveformKind, WaveformState
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from acquisition.errors import ConfigError
-from acquisition.recording.reader import open_recording
+from acquisition.recordings.reader import open_recording
 from service.store.waveform_port import WaveformKind, WaveformState
 from service.waveforms import inspection
 from service.waveforms.check import Found, RecordingCheck

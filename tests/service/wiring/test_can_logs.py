@@ -8,17 +8,17 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.block_grid import BlockGrid
-from acquisition.calibration import UnitCalibration
 from acquisition.can.settings import CanLinkSettings, CanSettings
-from acquisition.daq.can_dbc import daq_dbc, daq_settings
-from acquisition.daq.can_device import CanDevice
-from acquisition.daq.can_frames import WireFrame
-from acquisition.daq.can_shape import CanShape, DaqSignal
+from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.raw import FeedEndedError, RawBlock
 from acquisition.errors import ConfigError
-from acquisition.importing.job import ImportJob, TimeAxis
-from acquisition.importing.reading import reading
-from acquisition.raw import FeedEndedError, RawBlock
+from acquisition.recordings.imports.job import ImportJob, TimeAxis
+from acquisition.recordings.reading import reading
+from acquisition.simulated.devices.can_dbc import daq_dbc, daq_settings
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_frames import WireFrame
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
 from service.wiring.can_logs import CanLogDecoder
 
 START_S = 1_767_225_600

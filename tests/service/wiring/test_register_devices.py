@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery import Delivery
+from acquisition.delivery.blocks import Delivery
 from acquisition.modbus.transport import ConnectionUse
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.machine import Unit
-from core.monitor import UnitMonitor
-from core.settings import AnalysisSettings
+from core.machine.unit import Unit
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
+from core.samples.blocks import SampleBlock
 from service.conversion import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.modbus_sources import (

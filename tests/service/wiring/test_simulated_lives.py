@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery import Delivery
+from acquisition.delivery.blocks import Delivery
 from acquisition.errors import ConfigError
-from core.assessment import Assessment
+from core.change.film_reading import film_reading
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.films.film_reading import film_reading
-from core.machine import Estimator
-from core.monitor import UnitMonitor
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from core.units import NS_PER_S
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file

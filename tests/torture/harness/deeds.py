@@ -7,25 +7,25 @@ from functools import cache
 
 import numpy as np
 
-from core.account import Gap
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
-from core.assessment import Assessment
+from core.baseline.stiffness_history import Evidence
+from core.change.decision import UNDECIDED
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmReading, FilmValue
+from core.change.verdict import Verdict
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.cross_spectrum import average
-from core.decision.decision import UNDECIDED
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmReading, FilmValue
 from core.limits import AlarmLevel, Condition
-from core.machine import Estimator
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
 from core.quality import Reason, missing
-from core.quantities import CATALOGUE
-from core.stiffness_history import Evidence
+from core.samples.account import Gap
+from core.spectra.cross_spectrum import average
 from service.store.audit_port import AuditQuery
 from service.store.film_port import FilmQuery
 from service.store.outbox_port import Letter

@@ -22,10 +22,10 @@ from typing import IO
 import uvloop
 
 from acquisition.clock import FastClock, SystemClock
-from acquisition.daq.ledger import Ledger
-from acquisition.daq.ring_device import RingDevice
-from acquisition.daq.ring_shape import RingDeviceSettings
-from acquisition.daq.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.feed import Ledger
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.tape import environment, python
 from service.daq_program import run_daq

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from acquisition.calibration import UnitCalibration, calibrate
-from acquisition.raw import RawBlock
-from core.account import Gap
-from core.assessment import Assessment
-from core.monitor import UnitMonitor
-from core.quantities import CATALOGUE
+from acquisition.delivery.calibration import UnitCalibration, calibrate
+from acquisition.delivery.raw import RawBlock
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
+from core.monitor.monitor import UnitMonitor
+from core.samples.account import Gap
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.truth import BEARINGS
 from service.conversion import analysis_of, calibration_of, machine_of

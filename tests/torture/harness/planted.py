@@ -15,10 +15,10 @@ from typing import Any
 
 from acquisition.clock import SystemClock
 from core.alarms.event import AlarmNews
-from core.assessment import Assessment
-from core.blocks import SampleBlock
-from core.monitored_unit import MonitoredUnit
-from core.ring import Ring
+from core.monitor.assessment import Assessment
+from core.monitor.monitored_unit import MonitoredUnit
+from core.samples.blocks import SampleBlock
+from core.samples.ring import Ring
 from core.units import NS_PER_S
 from harness.open_program import main
 from service.alarms.engine import AlarmEngine

@@ -11,9 +11,9 @@ import nats
 import numpy as np
 
 from acquisition.clock import Clock, SystemClock
-from core.blocks import SampleBlock
-from core.monitor import UnitMonitor
+from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer

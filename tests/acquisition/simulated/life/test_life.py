@@ -13,7 +13,7 @@ from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.life_truth import UnitLife
 from core.arrays import FloatArray
-from core.stiffness_history import Evidence
+from core.baseline.stiffness_history import Evidence
 
 Life = Callable[..., UnitLife]
 SEEDS = (0, *fast_and_long(1, 2))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.delivery import Delivery
+from acquisition.delivery.blocks import Delivery
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.held_load import HeldLoad
 from acquisition.simulated.life.inputs import LifeInputs, draw_inputs
@@ -15,13 +15,13 @@ from acquisition.simulated.life.life import live
 from acquisition.simulated.life.life_course import LifeCourse
 from acquisition.simulated.life.moment import scenario_at
 from acquisition.simulated.life.present import LifePlan, course_from, history_until
-from acquisition.simulated.plant import CHUNK_SAMPLES
-from acquisition.simulated.unit import SimulatedUnit
+from acquisition.simulated.plant.plant import CHUNK_SAMPLES
+from acquisition.simulated.plant.unit import SimulatedUnit
 from benchmarks.chain_unit import CALIBRATION, SETTINGS, UNIT, UNKNOWN, WINDOW_SAMPLES
-from core.assessment import Assessment
-from core.films.film_reading import film_reading
-from core.machine import Estimator
-from core.monitor import UnitMonitor
+from core.change.film_reading import film_reading
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from core.units import NS_PER_S, ns_from_s
 
 START_NS = 1_735_689_600 * NS_PER_S

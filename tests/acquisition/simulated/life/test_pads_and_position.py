@@ -14,11 +14,15 @@ from acquisition.simulated.life.moment import row_at, scenario_at
 from acquisition.simulated.life.order1 import order1_um_pk
 from acquisition.simulated.life.thermal import ThermalCourse
 from acquisition.simulated.life.wander import lagged, wander
+from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
+from acquisition.simulated.plant.rotor_parameters import (
+    ForcePlane,
+    RotorParameters,
+    unbalance_force_n,
+)
+from acquisition.simulated.plant.tilting_pad import FilmColumns
 from benchmarks.accuracy_plant import machine
-from core.machine import Measurand
-from core.rotor import bearing_response, forward_force, rotor_matrices
-from core.rotor_parameters import ForcePlane, RotorParameters, unbalance_force_n
-from core.tilting_pad import FilmColumns
+from core.machine.unit import Measurand
 
 Life = Callable[..., UnitLife]
 

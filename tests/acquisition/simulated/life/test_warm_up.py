@@ -16,8 +16,8 @@ from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
 from acquisition.simulated.life.operation import Operation
 from acquisition.simulated.life.order1 import order1_um_pk
 from acquisition.simulated.life.thermal import thermal_course
+from acquisition.simulated.plant.rotor_parameters import RotorParameters
 from core.arrays import FloatArray
-from core.rotor_parameters import RotorParameters
 
 N_MINUTES = 421
 HOURS = np.arange(N_MINUTES) / 60.0

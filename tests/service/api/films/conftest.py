@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.assessment import Assessment
 from core.baseline.baseline import Watched
+from core.baseline.stiffness_history import DIRECTIONS, Evidence, StiffnessHistory
+from core.change.decision import UNDECIDED
+from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmNews
+from core.change.film_reading import FilmReading, FilmValue
+from core.change.operation_history import operation_history
+from core.change.verdict import Verdict
 from core.condition.bearing_condition import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.condition.operation_history import operation_history
-from core.decision.decision import UNDECIDED
-from core.decision.verdict import Verdict
-from core.films.film_finding import FilmFinding
-from core.films.film_judge import FilmNews
-from core.films.film_reading import FilmReading, FilmValue
-from core.machine import Estimator
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment
 from core.quality import GOOD, Quality, Reading, Reason
-from core.stiffness_history import DIRECTIONS, Evidence, StiffnessHistory
 from service.films.learning import FilmPlace, Learner
 from service.live import LinkState
 from service.settings.loading import load_plant_file

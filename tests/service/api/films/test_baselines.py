@@ -8,7 +8,7 @@ from rigs.probes import post
 
 from core.baseline.baseline import Watched
 from core.baseline.exchange import from_json
-from core.stiffness_history import StiffnessHistory
+from core.baseline.stiffness_history import StiffnessHistory
 from service.api.times import rfc3339
 
 BASELINES = "/api/v1/units/U1/bearings/UJB/baselines"

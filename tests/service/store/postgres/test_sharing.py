@@ -13,7 +13,7 @@ from harness.places import PostgresPlace
 from rigs.assessments import assessment
 from rigs.store_fixtures import Build
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from service.audit.entry import Deed
 from service.origin import Origin
 from service.store.audit_port import AuditQuery

@@ -5,7 +5,7 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import plain_and_gathered
 from rigs.varied_results import life
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 
 
 @pytest.fixture(scope="session")

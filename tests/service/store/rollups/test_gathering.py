@@ -12,7 +12,7 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import LATER_NS, gather_all, n_rows, require_same
 from rigs.varied_results import HOUR_NS, MINUTE_NS, T0, WHOLE, N, dump
 
-from core.assessment import Assessment
+from core.monitor.assessment import Assessment
 from service.store.port import StoreError
 from service.store.rollups import rolling
 from service.store.rollups.cells import bins

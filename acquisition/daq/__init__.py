@@ -1,1 +1,0 @@
-"""The simulated DAQ: any raw feed, served over the real protocol."""

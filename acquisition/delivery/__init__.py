@@ -1,0 +1,1 @@
+"""What all wires share once their bytes are decoded: blocks, times, freshness."""

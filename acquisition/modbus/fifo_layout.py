@@ -1,0 +1,137 @@
+"""`FifoLayout`: how samples lie in a device's queues, as function 0x18 reads them."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.errors import FrameError
+from acquisition.modbus.cells import ADDRESS_SPACE, MapError
+from core.arrays import CountArray
+
+MAX_FIFO_REGISTERS = 31
+"""Modbus Application Protocol 1.1b3, 6.18: a longer queue cannot be read."""
+
+
+class FifoKind(StrEnum):
+    """One queue for all channels, or one for each."""
+
+    INTERLEAVED = "interleaved"
+    PER_CHANNEL = "per_channel"
+
+
+@dataclass(frozen=True)
+class FifoPiece:
+    """Consecutive or single records of a queue.
+
+    Parameters
+    ----------
+    counters
+        (n_samples,) of each sample, modulo 65536; None if the device does not count.
+    counts
+        (n_channels, n_samples) int16.
+    """
+
+    counters: npt.NDArray[np.int64] | None
+    counts: CountArray
+
+    @property
+    def n_samples(self) -> int:
+        """Samples per channel."""
+        return int(self.counts.shape[1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class FifoLayout:
+    """Where the queues are and what is in them.
+
+    An interleaved queue holds records: a counter of samples, if the device counts, then one sample
+    of each channel. A queue of one channel holds the counter of its first sample, then samples.
+
+    Parameters
+    ----------
+    addresses
+        Of the queue, or of one queue for each channel; as on the wire, from 0.
+    has_counter
+        Unsigned 16 bit, one more with every sample, wrapping to 0.
+    removes
+        Whether reading takes the samples out of the queue; makers differ.
+    """
+
+    addresses: tuple[int, ...]
+    n_channels: int
+    kind: FifoKind = FifoKind.INTERLEAVED
+    has_counter: bool = True
+    removes: bool = True
+
+    def __post_init__(self) -> None:
+        n_queues = 1 if self.kind is FifoKind.INTERLEAVED else self.n_channels
+        if len(self.addresses) != n_queues:
+            raise MapError(f"must be {n_queues}, got {len(self.addresses)}", "addresses")
+        for n, address in enumerate(self.addresses):
+            if not 0 <= address < ADDRESS_SPACE:
+                raise MapError(f"must be 0 to {ADDRESS_SPACE - 1}, got {address}", "addresses", n)
+        if len(set(self.addresses)) < n_queues:
+            raise MapError("names a queue twice", "addresses")
+        if self.record_registers > MAX_FIFO_REGISTERS:
+            raise MapError(
+                f"makes records of {self.record_registers} registers; a FIFO read has at most"
+                f" {MAX_FIFO_REGISTERS}: use a queue for each channel, or fewer channels",
+                "addresses",
+            )
+        self._require_counter()
+
+    def _require_counter(self) -> None:
+        if self.has_counter:
+            return
+        if self.kind is FifoKind.PER_CHANNEL:
+            raise MapError(
+                "must be true with a queue for each channel: without it nobody knows which samples"
+                " belong together",
+                "has_counter",
+            )
+        if not self.removes:
+            raise MapError(
+                "must be true if reading does not remove: without it nobody knows which samples are"
+                " new",
+                "has_counter",
+            )
+
+    @property
+    def record_registers(self) -> int:
+        """Registers of an interleaved record, or of the shortest useful reading of one channel."""
+        n_samples = self.n_channels if self.kind is FifoKind.INTERLEAVED else 1
+        return n_samples + self.has_counter
+
+    @property
+    def most_samples(self) -> int:
+        """Most samples per channel in one reading."""
+        if self.kind is FifoKind.INTERLEAVED:
+            return MAX_FIFO_REGISTERS // self.record_registers
+        return MAX_FIFO_REGISTERS - 1
+
+    def decode(self, data: bytes) -> FifoPiece:
+        """Take a reading of one queue apart.
+
+        Raises
+        ------
+        FrameError
+            If it does not hold whole records.
+        """
+        words = np.frombuffer(data, ">u2").astype(np.uint16)
+        if self.kind is FifoKind.PER_CHANNEL:
+            return self._decode_channel(words)
+        if words.size % self.record_registers:
+            raise FrameError(
+                f"FIFO of {words.size} registers holds no whole records of {self.record_registers}"
+            )
+        records = words.reshape(-1, self.record_registers)
+        counters = records[:, 0].astype(np.int64) if self.has_counter else None
+        samples = records[:, int(self.has_counter) :].view(np.int16)
+        return FifoPiece(counters, np.ascontiguousarray(samples.T))
+
+    def _decode_channel(self, words: npt.NDArray[np.uint16]) -> FifoPiece:
+        samples = words[1:].view(np.int16)[np.newaxis]
+        first = int(words[0]) if words.size else 0
+        return FifoPiece((first + np.arange(samples.shape[1])) % 65536, samples)

@@ -1,0 +1,285 @@
+"""`RegisterMap`: everything that is read from one device, as its manual describes it."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from acquisition.modbus.cells import (
+    ADDRESS_SPACE,
+    BASES,
+    FLOATS,
+    INTEGERS,
+    N_BYTES,
+    REGISTER_FUNCTIONS,
+    Cell,
+    MapError,
+    NumberType,
+)
+from acquisition.modbus.device_time import DeviceTime
+
+MAX_REGISTERS = 125
+MAX_MASK = 0xFFFF
+
+
+class Meaning(StrEnum):
+    """What it means that bits of a status register are set."""
+
+    BAD = "bad"
+    OK = "ok"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlagCheck:
+    """What a status register says of a value; either by bits or by numbers.
+
+    Parameters
+    ----------
+    mask
+        Bits that count. Numbers are compared after they were shifted to its lowest bit. Of a cell
+        that is a single bit, that one.
+    set_means
+        "bad": the value is bad if any of these bits is set. "ok": it is bad unless all are.
+    ok_values
+        Numbers that mean a good value, instead of `set_means`; all others are bad.
+    clipped_values
+        Numbers that mean a clipped value.
+    """
+
+    cell: Cell
+    mask: int = MAX_MASK
+    set_means: Meaning | None = None
+    ok_values: tuple[int, ...] = ()
+    clipped_values: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0 < self.mask <= MAX_MASK:
+            raise MapError(f"must be 0x0001 to 0xFFFF, got {self.mask:#06x}", "mask")
+        if self.cell.type in FLOATS:
+            raise MapError('must be "uint16" or other whole numbers: a float has no flags', "type")
+        if self.cell.type is NumberType.BIT:
+            if self.mask not in (1, MAX_MASK):
+                raise MapError("must be left out: this is one bit already", "mask")
+            object.__setattr__(self, "mask", 1)
+        if (self.set_means is None) == (not self.ok_values):
+            raise MapError("must be given unless ok_values are, and not with them", "set_means")
+        if self.clipped_values and not self.ok_values:
+            raise MapError("can only be given with ok_values", "clipped_values")
+        self._require_possible("ok_values")
+        self._require_possible("clipped_values")
+
+    @property
+    def lowest_bit(self) -> int:
+        """The lowest bit that counts, alone."""
+        return self.mask & -self.mask
+
+    def _require_possible(self, name: str) -> None:
+        highest = self.mask // self.lowest_bit
+        for number in getattr(self, name):
+            if not 0 <= number <= highest:
+                raise MapError(f"must be numbers of the mask, 0 to {highest}, got {number}", name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaleRegister:
+    """A register that says what a full mantissa stands for: value = raw / divisor * register."""
+
+    cell: Cell
+    divisor: float = 32767.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.divisor) and self.divisor != 0.0):
+            raise MapError(f"must not be 0, got {self.divisor:g}", "divisor")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FullScale:
+    """A range that is mapped linearly onto the raw numbers; a raw number at its end is clipped.
+
+    Parameters
+    ----------
+    minimum, maximum
+        What the ends stand for: numbers, or where the device says so.
+    """
+
+    minimum: float | Cell
+    maximum: float | Cell
+    raw_minimum: float = 0.0
+    raw_maximum: float = 65535.0
+
+    def __post_init__(self) -> None:
+        if not self.raw_minimum < self.raw_maximum:
+            raise MapError(f"must be below raw_maximum {self.raw_maximum:g}", "raw_minimum")
+        if self.minimum == self.maximum:
+            raise MapError("must differ from maximum", "minimum")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapValue:
+    """One value of a device: value = raw * scale + offset, or as scale register or range say.
+
+    Parameters
+    ----------
+    invalid_values
+        Raw numbers that stand for no value; of integers their bits count, so that 0x8000 is -32768.
+        Not-a-number always does.
+    invalid_below, invalid_above
+        Raw numbers beyond these stand for an error.
+    """
+
+    id: str
+    cell: Cell
+    scale: float = 1.0
+    offset: float = 0.0
+    scale_register: ScaleRegister | None = None
+    full_scale: FullScale | None = None
+    flags: tuple[FlagCheck, ...] = ()
+    invalid_values: tuple[float, ...] = ()
+    invalid_below: float = -math.inf
+    invalid_above: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.scale) and self.scale != 0.0):
+            raise MapError(f"must not be 0, got {self.scale:g}", "scale")
+        if self.scale_register is not None and self.full_scale is not None:
+            raise MapError("cannot be had together with full_scale", "scale_register")
+        if not self.invalid_below < self.invalid_above:
+            raise MapError(f"must be below invalid_above {self.invalid_above:g}", "invalid_below")
+        if self.cell.type in INTEGERS:
+            n_bits = 8 * N_BYTES[self.cell.type]
+            for number in self.invalid_values:
+                if number % 1 or not -(1 << n_bits - 1) <= number < 1 << n_bits:
+                    raise MapError(
+                        f"must each be a whole number of {n_bits} bits, got {number:.12g}",
+                        "invalid_values",
+                    )
+
+    def cells(self) -> Iterator[Cell]:
+        """All that has to be read for it, its own number first."""
+        yield self.cell
+        if self.scale_register is not None:
+            yield self.scale_register.cell
+        if self.full_scale is not None:
+            ends = (self.full_scale.minimum, self.full_scale.maximum)
+            yield from (end for end in ends if isinstance(end, Cell))
+        yield from (flag.cell for flag in self.flags)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Together:
+    """Registers that must be read as one block, as the manual demands."""
+
+    address: int
+    count: int
+    function: int = 3
+
+    def __post_init__(self) -> None:
+        if self.function not in REGISTER_FUNCTIONS:
+            raise MapError(f"must be 3 or 4, got {self.function}", "function")
+        if not 1 <= self.count <= MAX_REGISTERS:
+            raise MapError(
+                f"must be 1 to {MAX_REGISTERS}, which is all that one read can have,"
+                f" got {self.count}",
+                "count",
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signature:
+    """A register that tells this device from others: read once on connecting."""
+
+    cell: Cell
+    expected: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegisterMap:
+    """What is read from a device.
+
+    Parameters
+    ----------
+    base
+        Number that the manual gives to the first register: 0, 1, or such as 40001.
+    together
+        Blocks that must not be split.
+    heartbeat
+        A counter that changes whenever the device has measured anew.
+    time
+        When the device measured, by its own clock.
+    signature
+        What must be found before anything is believed.
+    max_registers
+        Most registers in one read, 1 to 125.
+    max_gap
+        Registers that are not configured and may be read along to save a request. One that the
+        device does not have fails the whole read.
+    min_poll_period_s, min_timeout_s
+        What the manual asks for.
+    """
+
+    values: tuple[MapValue, ...]
+    base: int = 0
+    together: tuple[Together, ...] = ()
+    heartbeat: Cell | None = None
+    time: DeviceTime | None = None
+    signature: tuple[Signature, ...] = ()
+    max_registers: int = MAX_REGISTERS
+    max_gap: int = 0
+    min_poll_period_s: float = 0.0
+    min_timeout_s: float = 0.0
+    ids: tuple[str, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.base not in BASES:
+            words = ", ".join(map(str, BASES[:-1]))
+            raise MapError(f"must be {words} or {BASES[-1]}, got {self.base}", "base")
+        if not 1 <= self.max_registers <= MAX_REGISTERS:
+            raise MapError(f"must be 1 to {MAX_REGISTERS}", "max_registers")
+        if not 0 <= self.max_gap < MAX_REGISTERS:
+            raise MapError(f"must be 0 to {MAX_REGISTERS - 1}", "max_gap")
+        object.__setattr__(self, "ids", tuple(value.id for value in self.values))
+        self._require_in_space()
+        self._require_apart()
+
+    def cells(self) -> Iterator[tuple[Cell, tuple[int | str, ...]]]:
+        """Everything that is read in every poll, and where it stands in the map."""
+        for n, value in enumerate(self.values):
+            yield from ((cell, ("value", n)) for cell in value.cells())
+        if self.heartbeat is not None:
+            yield self.heartbeat, ("heartbeat",)
+        if self.time is not None:
+            yield from ((cell, ("time",)) for cell in self.time.cells())
+
+    def _require_in_space(self) -> None:
+        for cell, at in self.cells():
+            cell.require_in_space(self.base, *at)
+        for n, signature in enumerate(self.signature):
+            signature.cell.require_in_space(self.base, "signature", n)
+        for n, block in enumerate(self.together):
+            last = self.base + ADDRESS_SPACE - block.count
+            if not self.base <= block.address <= last:
+                raise MapError(f"must be {self.base} to {last}", "together", n, "address")
+            if block.count > self.max_registers:
+                limit = f"must not be above max_registers, {self.max_registers}"
+                raise MapError(limit, "together", n, "count")
+
+    def _require_apart(self) -> None:
+        """Refuse two values on the same register, unless they are different bits of it."""
+        taken: dict[tuple[int, int], MapValue] = {}
+        for n, value in enumerate(self.values):
+            cell = value.cell
+            for place in range(cell.start(self.base), cell.stop(self.base)):
+                other = taken.setdefault((cell.function, place), value)
+                if other is not value and not _different_bits(cell, other.cell):
+                    raise MapError(
+                        f"lies on a register of value {other.id!r} (address"
+                        f" {other.cell.address}, {other.cell.type}); each register has one value",
+                        *("value", n, "address"),
+                    )
+        if len(set(self.ids)) < len(self.ids):
+            twice = next(id_ for id_ in self.ids if self.ids.count(id_) > 1)
+            raise MapError(f"has {twice!r} twice; each value must be unique", "value")
+
+
+def _different_bits(one: Cell, other: Cell) -> bool:
+    return NumberType.BIT is one.type is other.type and None is not one.bit != other.bit

@@ -1,0 +1,215 @@
+"""Recordings as CSV and Parquet: engineering units, UTC, a row for each sample, gaps in sight."""
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from enum import StrEnum
+from io import RawIOBase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from acquisition.delivery.calibration import calibrate, slow_reading
+from acquisition.delivery.raw import RawBlock
+from acquisition.errors import ConfigError
+from acquisition.recordings.manifest import Manifest
+from acquisition.recordings.reader import Recording
+from acquisition.recordings.tables import foreign_errors_of
+from core.arrays import SampleArray
+from core.machine.unit import Measurand
+from core.quality import Level
+from core.units import NS_PER_S
+
+UNITS = {
+    Measurand.GAP_UM: "um",
+    Measurand.DISPLACEMENT_UM: "um",
+    Measurand.VELOCITY_MM_S: "mm/s",
+    Measurand.ACCELERATION_M_S2: "m/s2",
+    Measurand.KEY_PHASE_V: "V",
+}
+"""Of waveform channels, spelt so that every tool can print them."""
+
+_BLOCKS_AT_ONCE = 512
+_OWN = ("time_utc", "epoch", "index")
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+
+
+class ExportFormat(StrEnum):
+    """What a recording can be exported as."""
+
+    CSV = "csv"
+    PARQUET = "parquet"
+
+
+def export_recording(
+    recording: Recording,
+    kind: ExportFormat,
+    out: Path,
+    advanced: Callable[[int], None] = lambda _: None,
+) -> None:
+    """Write a recording as a file of another format, whole or not at all.
+
+    Parameters
+    ----------
+    out
+        Must not exist yet.
+    advanced
+        Told how many samples per channel have been written since it was last called.
+
+    Raises
+    ------
+    ConfigError
+        If the file exists or cannot be written, a channel has the name of one of its own columns,
+        or the recording cannot be read; nothing is left behind then.
+    """
+    if os.path.lexists(out):
+        raise ConfigError(f"{out}: is there already; nothing is overwritten")
+    aside = out.with_name(out.name + ".incomplete")
+    schema, writer = _FORMATS[kind]
+    try:
+        with foreign_errors_of(out):
+            _export(recording, schema(recording.manifest), writer, aside, advanced)
+            aside.rename(out)
+    finally:
+        with suppress(FileNotFoundError):
+            aside.unlink()
+
+
+def csv_tables(recording: Recording, sink: RawIOBase) -> Iterator[None]:
+    """Write a recording as CSV, some thousands of rows at each step.
+
+    Raises
+    ------
+    ConfigError
+        If a file of the recording cannot be read any more.
+    """
+    schema = csv_schema(recording.manifest)
+    with pyarrow.csv.CSVWriter(sink, schema) as writer:
+        for table in export_tables(recording, schema):
+            writer.write_table(table)
+            yield
+    yield
+
+
+def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
+    """All rows of a recording, some thousands at once.
+
+    Where samples are missing there are no rows: time and index jump. Times are whole microseconds;
+    samples of a bad channel, and slow values that cannot be, are NaN.
+
+    Raises
+    ------
+    ConfigError
+        If a file of the recording cannot be read any more.
+    """
+    waiting: list[RawBlock] = []
+    for raw in recording.raw_blocks():
+        waiting.append(raw)
+        if len(waiting) == _BLOCKS_AT_ONCE:
+            yield _table(waiting, recording.manifest, schema)
+            waiting = []
+    if waiting:
+        yield _table(waiting, recording.manifest, schema)
+
+
+def csv_schema(manifest: Manifest) -> Any:
+    """Headings have the unit in brackets; none can be taken for a formula by a spreadsheet."""
+    names = [f"{id_} [{unit}]" for id_, unit in _columns(manifest)]
+    harmless = [f"'{n}" if n.startswith(_FORMULA_STARTS) else n for n in names]
+    return _schema(manifest, "us", harmless)
+
+
+def parquet_schema(manifest: Manifest) -> Any:
+    """Columns have their unit in their metadata.
+
+    Raises
+    ------
+    ConfigError
+        If a channel has the name of a column that is there anyway.
+    """
+    columns = _columns(manifest)
+    for id_, _ in columns:
+        if id_ in _OWN:
+            raise ConfigError(f"channel {id_!r} has a name that such a file needs itself; take csv")
+    schema = _schema(manifest, "ns", [id_ for id_, _ in columns])
+    for at, (_, unit) in enumerate(columns, start=len(_OWN)):
+        schema = schema.set(at, schema.field(at).with_metadata({"unit": unit}))
+    return schema.with_metadata({"unit": manifest.unit, "made_by": manifest.made_by})
+
+
+def _export(
+    recording: Recording,
+    schema: Any,
+    writer: Callable[[Path, Any], Any],
+    path: Path,
+    advanced: Callable[[int], None],
+) -> None:
+    with writer(path, schema) as file:
+        for table in export_tables(recording, schema):
+            file.write_table(table)
+            advanced(table.num_rows)
+
+
+def _parquet_writer(path: Path, schema: Any) -> Any:
+    return pq.ParquetWriter(path, schema, compression="zstd")
+
+
+_FORMATS: dict[ExportFormat, tuple[Callable[[Manifest], Any], Callable[[Path, Any], Any]]] = {
+    ExportFormat.CSV: (csv_schema, pyarrow.csv.CSVWriter),
+    ExportFormat.PARQUET: (parquet_schema, _parquet_writer),
+}
+
+
+def _columns(manifest: Manifest) -> list[tuple[str, str]]:
+    waveforms = [(c.id, UNITS[c.measurand]) for c in manifest.channels]
+    return waveforms + [(c.id, c.unit) for c in manifest.slow_channels]
+
+
+def _schema(manifest: Manifest, time_unit: str, names: list[str]) -> Any:
+    types = [pa.float32()] * len(manifest.channels) + [pa.float64()] * len(manifest.slow_channels)
+    time, epoch, index = _OWN
+    return pa.schema(
+        [
+            pa.field(time, pa.timestamp(time_unit, tz="UTC")),
+            pa.field(epoch, pa.int64()),
+            pa.field(index, pa.int64()),
+            *map(pa.field, names, types),
+        ]
+    )
+
+
+def _table(blocks: list[RawBlock], manifest: Manifest, schema: Any) -> Any:
+    lengths = [block.n_samples for block in blocks]
+    times_ns = np.concatenate([_times_ns(block) for block in blocks])
+    slow = np.array([_slow(block, manifest) for block in blocks], np.float64)
+    columns = [
+        times_ns // 1000 if schema.field(0).type.unit == "us" else times_ns,
+        np.repeat([block.epoch for block in blocks], lengths),
+        np.concatenate([np.arange(b.first_index, b.stop_index) for b in blocks]),
+        *np.concatenate([_samples(block, manifest) for block in blocks], axis=1),
+        *np.repeat(slow.reshape(len(blocks), -1).T, lengths, axis=1),
+    ]
+    arrays = [pa.array(c, type=field.type) for c, field in zip(columns, schema, strict=True)]
+    return pa.table(arrays, schema=schema)
+
+
+def _times_ns(block: RawBlock) -> np.ndarray:
+    since_ns = np.rint(np.arange(block.n_samples) * (NS_PER_S / block.rate_hz)).astype(np.int64)
+    return np.asarray((block.start_ns + since_ns) // 1000 * 1000)
+
+
+def _samples(block: RawBlock, manifest: Manifest) -> SampleArray:
+    calibrated = calibrate(block, manifest.calibration)
+    bad = [quality.level is Level.BAD for quality in calibrated.channel_quality]
+    return np.where(np.array(bad)[:, np.newaxis], np.float32(np.nan), calibrated.samples)
+
+
+def _slow(block: RawBlock, manifest: Manifest) -> list[float]:
+    channels = manifest.calibration.slow
+    readings = [slow_reading(v, c) for v, c in zip(block.slow, channels, strict=True)]
+    return [math.nan if reading.value is None else reading.value for reading in readings]

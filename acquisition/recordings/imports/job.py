@@ -1,0 +1,151 @@
+"""`ImportJob`: which column of a file is which channel, and how its time is to be read."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from acquisition.delivery.calibration import BLOCK_SAMPLES
+
+Format: TypeAlias = Literal["mdf4", "tdms", "hdf5", "csv", "candump", "blf"]
+TimeKind: TypeAlias = Literal["file", "column", "start"]
+TimeForm: TypeAlias = Literal[
+    "iso8601",
+    "epoch_s",
+    "epoch_ms",
+    "epoch_us",
+    "epoch_ns",
+    "elapsed_s",
+    "elapsed_ms",
+    "elapsed_us",
+    "elapsed_ns",
+    "timestamp",
+]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a column is.
+
+    Parameters
+    ----------
+    name
+        Heading of a CSV column, path of an HDF5 dataset, name of an MDF or TDMS channel.
+    group
+        Group of a TDMS channel; name or number of an MDF channel group. Empty where the name says
+        enough.
+    """
+
+    name: str
+    group: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.group}/{self.name}" if self.group else self.name
+
+
+@dataclass(frozen=True)
+class TimeAxis:
+    """How the samples of a file lie in time.
+
+    Parameters
+    ----------
+    kind
+        "file": by what the format itself has. "column": by a column. "start": from a given time on
+        at the unit's rate, without a gap.
+    form
+        What a column has: text, seconds since 1970, seconds since the start, or the format's own
+        time stamps.
+    start_ns
+        Start in UTC; None if the file has it.
+    utc_offset_s
+        Time zone of what has none of its own: local time minus UTC.
+    tolerance
+        How far a stamp may be from its place at the unit's rate, in samples.
+    """
+
+    kind: TimeKind
+    utc_offset_s: int
+    place: Place | None = None
+    form: TimeForm = "elapsed_s"
+    start_ns: int | None = None
+    tolerance: float = 0.4
+
+
+@dataclass(frozen=True)
+class ChannelColumn:
+    """A waveform channel.
+
+    Parameters
+    ----------
+    unit
+        Of the values in the file.
+    factor
+        Engineering unit of the channel per unit of the file.
+    calibrated_per_count
+        Engineering units per count by the channel's calibration: only counts of just this scale
+        are taken over as counts.
+    per_count
+        The file's unit per count, if the column has counts and the file does not say so itself.
+    """
+
+    id: str
+    place: Place
+    unit: str
+    factor: float
+    calibrated_per_count: float
+    per_count: float | None = None
+
+
+@dataclass(frozen=True)
+class SlowColumn:
+    """A slow channel: value = factor × what the file has + offset.
+
+    Parameters
+    ----------
+    time
+        Its own time column, of the same form as that of the waveforms; None for their time.
+    """
+
+    id: str
+    place: Place
+    unit: str
+    factor: float
+    offset: float = 0.0
+    time: Place | None = None
+
+
+@dataclass(frozen=True)
+class CsvLayout:
+    """How a CSV file is written.
+
+    Parameters
+    ----------
+    header_line
+        Number of the line with the headings, counted from 1; what is before it is skipped.
+    """
+
+    delimiter: str = ","
+    decimal: str = "."
+    header_line: int = 1
+
+
+@dataclass(frozen=True)
+class ImportJob:
+    """Everything a reader needs to know.
+
+    Parameters
+    ----------
+    rate_hz, block_samples
+        Of the unit: see :class:`acquisition.delivery.calibration.UnitCalibration`.
+    channels, slow
+        In the order of the unit.
+    bus
+        Whose frames are read, of a CAN log of several; empty if it must be of one.
+    """
+
+    format: Format
+    rate_hz: float
+    time: TimeAxis
+    channels: tuple[ChannelColumn, ...] = ()
+    slow: tuple[SlowColumn, ...] = ()
+    block_samples: int = BLOCK_SAMPLES
+    csv: CsvLayout = CsvLayout()
+    bus: str = ""

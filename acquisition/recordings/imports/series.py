@@ -1,0 +1,207 @@
+"""Files whose columns can be read from anywhere: one way to rows for HDF5, TDMS and MDF."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.errors import ConfigError
+from acquisition.recordings.imports.job import ImportJob, Place, SlowColumn
+from acquisition.recordings.imports.rows import Rows, SlowValues
+from acquisition.recordings.imports.scaling import counts_are_kept, engineering_units
+from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
+from acquisition.recordings.imports.units import require_unit
+from core.arrays import RawArray
+
+MAX_SAMPLES = 2**29
+"""Per channel, as in a recording."""
+
+_ROWS = 65_536
+_SLOW_ROWS = 4096
+
+
+class Series(Protocol):
+    """A column of a file."""
+
+    unit: str | None
+    """As the file has it."""
+
+    n_samples: int
+
+    per_count: float | None
+    """Unit of the file per count, where the column has int16 counts and says so."""
+
+    time_key: object
+    """Columns of the same key have the same times."""
+
+    def values(self, start: int, stop: int) -> npt.NDArray[Any]:
+        """Counts where `per_count` is given, else values in the file's unit."""
+        ...
+
+    def times_ns(self, start: int, stop: int) -> TimeArray:
+        """By what the format itself has; raises ConfigError where it has nothing."""
+        ...
+
+
+class SeriesFile(Protocol):
+    """An opened file."""
+
+    start_ns: int | None
+    """What its times count from, where it says so."""
+
+    def series(self, place: Place) -> Series:
+        """Find a column; raises ConfigError if it is not there, or there twice."""
+        ...
+
+
+class SeriesTable:
+    """The columns of a job as rows; see :class:`acquisition.recordings.imports.rows.Table`."""
+
+    def __init__(self, file: SeriesFile, job: ImportJob) -> None:
+        self._file, self._job = file, job
+        self._channels = [file.series(channel.place) for channel in job.channels]
+        for channel, series in zip(job.channels, self._channels, strict=True):
+            require_unit(channel.place, series.unit, channel.unit)
+        self._n_samples = self._common_length()
+        found = [series.per_count for series in self._channels]
+        self.sample_type = (
+            "int16" if counts_are_kept(job, found) and self._are_int16() else "float32"
+        )
+        self._slow = [self._slow_feed(column) for column in job.slow]
+
+    def rows(self) -> Iterator[Rows]:
+        """All rows."""
+        for start in range(0, self._n_samples, _ROWS):
+            stop = min(start + _ROWS, self._n_samples)
+            times_ns = self._times_ns(start, stop)
+            yield Rows(
+                times_ns=times_ns,
+                samples=self._samples(start, stop),
+                slow=tuple(feed.up_to(int(times_ns[-1])) for feed in self._slow),
+                done=stop / self._n_samples,
+            )
+
+    def _are_int16(self) -> bool:
+        return all(series.values(0, 1).dtype == np.int16 for series in self._channels)
+
+    def _common_length(self) -> int:
+        lengths = [series.n_samples for series in self._channels]
+        for channel, length in zip(self._job.channels, lengths, strict=True):
+            if length != lengths[0]:
+                raise ConfigError(
+                    f"column {str(channel.place)!r} has {length} samples, column"
+                    f" {str(self._job.channels[0].place)!r} has {lengths[0]}; waveform channels"
+                    " are sampled together"
+                )
+        if not 1 <= lengths[0] <= MAX_SAMPLES:
+            raise ConfigError(f"{lengths[0]} samples per channel; 1 to {MAX_SAMPLES} can be read")
+        return lengths[0]
+
+    def _times_ns(self, start: int, stop: int) -> TimeArray:
+        axis, rate_hz = self._job.time, self._job.rate_hz
+        if axis.kind == "start":
+            return from_start(axis.start_ns or 0, start, stop, rate_hz)
+        if axis.place is not None:
+            return times_in_column(self._file, self._job, axis.place, start, stop)
+        first = self._channels[0].times_ns(start, stop)
+        seen = {self._channels[0].time_key}
+        for channel, series in zip(self._job.channels, self._channels, strict=True):
+            if series.time_key not in seen:
+                seen.add(series.time_key)
+                if np.any(np.abs(series.times_ns(start, stop) - first) > 1000):
+                    raise ConfigError(
+                        f"column {str(channel.place)!r} was not sampled at the times of column"
+                        f" {str(self._job.channels[0].place)!r}"
+                    )
+        return first
+
+    def _samples(self, start: int, stop: int) -> RawArray:
+        pairs = list(zip(self._job.channels, self._channels, strict=True))
+        found = [_complete(s.values(start, stop), stop - start, c.place) for c, s in pairs]
+        if self.sample_type == "int16":
+            return np.stack(found).astype(np.int16, copy=False)
+        return np.stack(
+            [engineering_units(v, c, s.per_count) for v, (c, s) in zip(found, pairs, strict=True)]
+        )
+
+    def _slow_feed(self, column: SlowColumn) -> "_SlowFeed":
+        series = self._file.series(column.place)
+        require_unit(column.place, series.unit, column.unit)
+        return _SlowFeed(self._file, self._job, column, series, self._n_samples)
+
+
+class _SlowFeed:
+    """Values of a slow channel in the order of time, a few thousand at once."""
+
+    def __init__(
+        self, file: SeriesFile, job: ImportJob, column: SlowColumn, series: Series, n_rows: int
+    ) -> None:
+        self._file, self._job, self._column, self._series = file, job, column, series
+        self._next = 0
+        own_time = column.time is not None or job.time.kind == "file"
+        if not own_time and series.n_samples != n_rows:
+            raise ConfigError(
+                f"slow channel {column.id} has {series.n_samples} values, the waveforms {n_rows}:"
+                " it needs a time column of its own"
+            )
+
+    def up_to(self, time_ns: int) -> SlowValues:
+        """What follows, at least up to this time."""
+        times: list[TimeArray] = [np.empty(0, np.int64)]
+        values: list[npt.NDArray[Any]] = [np.empty(0)]
+        while self._next < self._series.n_samples and not (
+            len(times[-1]) and times[-1][-1] > time_ns
+        ):
+            start, stop = self._next, min(self._next + _SLOW_ROWS, self._series.n_samples)
+            times.append(self._times_ns(start, stop))
+            found = _complete(self._series.values(start, stop), stop - start, self._column.place)
+            scale = (self._series.per_count or 1.0) * self._column.factor
+            values.append(found.astype(np.float64) * scale + self._column.offset)
+            self._next = stop
+        return SlowValues(np.concatenate(times), np.concatenate(values))
+
+    def _times_ns(self, start: int, stop: int) -> TimeArray:
+        axis = self._job.time
+        if self._column.time is not None:
+            return times_in_column(self._file, self._job, self._column.time, start, stop)
+        if axis.kind == "start":
+            return from_start(axis.start_ns or 0, start, stop, self._job.rate_hz)
+        if axis.place is not None:
+            return times_in_column(self._file, self._job, axis.place, start, stop)
+        return self._series.times_ns(start, stop)
+
+
+def times_in_column(
+    file: SeriesFile, job: ImportJob, place: Place, start: int, stop: int
+) -> TimeArray:
+    """Times out of a column of numbers, or of the format's own time stamps."""
+    series = file.series(place)
+    if job.time.form == "timestamp":
+        return _complete(series.values(start, stop), stop - start, place).astype(np.int64)
+    values = _complete(series.values(start, stop), stop - start, place)
+    return numbers_to_ns(values, job.time, job.time.start_ns or file.start_ns)
+
+
+def _complete(values: npt.NDArray[Any], n_values: int, place: Place) -> npt.NDArray[Any]:
+    if values.shape != (n_values,) or values.dtype.kind not in "iuf":
+        raise ConfigError(
+            f"column {str(place)[:200]!r}: {values.dtype} of shape {values.shape} where"
+            f" {n_values} numbers are needed"
+        )
+    return values
+
+
+def require_one(found: Sequence[Any], place: Place, known: Sequence[str]) -> Any:
+    """The only one of what was found.
+
+    Raises
+    ------
+    ConfigError
+        If there is none, or more than one.
+    """
+    if len(found) != 1:
+        words = f"there {len(found)} times: name its group" if found else "not there"
+        names = ", ".join(known[:12])[:300]
+        raise ConfigError(f"column {str(place)[:200]!r} is {words}; the file has {names}")
+    return found[0]

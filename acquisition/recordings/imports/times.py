@@ -1,0 +1,98 @@
+"""Time as files have it, to UTC nanoseconds in whole microseconds."""
+
+from datetime import UTC, datetime, timedelta, timezone
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.errors import ConfigError
+from acquisition.recordings.imports.job import TimeAxis
+
+TimeArray = npt.NDArray[np.int64]
+
+_US_PER = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+_MAX_US = 2**53
+"""285 years; beyond it seconds in a double are not exact to a microsecond, and nanoseconds since
+1970 do not fit 64 bits."""
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
+
+
+def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None) -> TimeArray:
+    """Turn the numbers of a time column into UTC.
+
+    Parameters
+    ----------
+    start_ns
+        What "elapsed" counts from, in UTC.
+
+    Raises
+    ------
+    ConfigError
+        If a value is no time, or a start is missing.
+    """
+    origin, _, unit = axis.form.partition("_")
+    if unit not in _US_PER:
+        raise ConfigError(f"a time column of numbers cannot be of form {axis.form!r}")
+    if values.dtype.kind not in "iuf":
+        raise ConfigError(f"a time column of type {values.dtype}; it must be numbers")
+    if origin == "epoch":
+        start_ns = -axis.utc_offset_s * 1_000_000_000
+    if start_ns is None:
+        raise ConfigError("time counts from a start that neither file nor mapping gives")
+    return utc_ns(_whole_us(values, _US_PER[unit]), start_ns)
+
+
+def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
+    """Turn whole microseconds since a start into UTC.
+
+    Raises
+    ------
+    ConfigError
+        If one is further from 1970 than nanoseconds can count.
+    """
+    found = us + np.int64(start_ns // 1000)
+    wrong = np.abs(found) >= _MAX_US
+    if wrong.any():
+        raise ConfigError(f"a time of {found[wrong][0] / 1e6:.6g} s since 1970 is none")
+    return found * 1000
+
+
+def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
+    if values.dtype.kind in "iu" and us_per_unit < 1.0:  # nanoseconds are beyond a double
+        return np.asarray(values // 1000 + (values % 1000 >= 500)).astype(np.int64)
+    exact = np.rint(values.astype(np.float64) * us_per_unit)
+    wrong = ~(np.abs(exact) < _MAX_US)  # written so that NaN is wrong, too
+    if wrong.any():
+        raise ConfigError(f"{values[wrong][0]} in the time column is no time")
+    return exact.astype(np.int64)
+
+
+def text_to_ns(texts: list[str], axis: TimeAxis) -> TimeArray:
+    """Turn ISO 8601 texts into UTC; one without a time zone has that of the mapping.
+
+    Raises
+    ------
+    ConfigError
+        If one is no time.
+    """
+    zone = timezone(timedelta(seconds=axis.utc_offset_s))
+    return utc_ns(np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64), 0)
+
+
+def _text_to_us(text: str, zone: timezone) -> int:
+    try:
+        time = datetime.fromisoformat(text.strip())
+    except ValueError as error:
+        raise ConfigError(f"{text[:40]!r} in the time column is no time of ISO 8601") from error
+    if time.tzinfo is None:
+        time = time.replace(tzinfo=zone)
+    return (time - _EPOCH) // _MICROSECOND
+
+
+def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArray:
+    """Times of the samples from one index to another, without a gap."""
+    number = np.arange(first, stop, dtype=np.float64)
+    return utc_ns(np.floor(number * (1e6 / rate_hz)).astype(np.int64), start_ns)

@@ -1,0 +1,108 @@
+"""Units as files write them, and what they are in the units of channels; nothing is guessed."""
+
+import re
+from collections.abc import Iterable
+
+from acquisition.errors import ConfigError
+from core.machine.unit import Measurand
+from core.units import STANDARD_GRAVITY_M_S2
+
+_SAME = {
+    "um": ("um", "\u00b5m", "\u03bcm", "micrometer", "micrometre"),
+    "mm": ("mm",),
+    "m": ("m",),
+    "mil": ("mil", "mils"),
+    "mm/s": ("mm/s", "mm s-1"),
+    "m/s": ("m/s",),
+    "in/s": ("in/s", "ips"),
+    "m/s2": ("m/s2", "m/s\u00b2", "m/s^2", "m s-2"),
+    "g": ("g", "g_n"),
+    "V": ("V", "volt", "Volts"),
+    "mV": ("mV",),
+    "r/min": ("r/min", "rpm", "1/min", "min-1"),
+    "Hz": ("Hz",),
+    "MW": ("MW",),
+    "kW": ("kW",),
+    "degC": ("degC", "\u00b0C", "\u2103"),
+    "K": ("K",),
+}
+_CANONICAL = {spelling: unit for unit, spellings in _SAME.items() for spelling in spellings}
+
+_LENGTH_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "mil": 25.4}
+_WAVEFORMS = {
+    Measurand.GAP_UM: _LENGTH_UM,
+    Measurand.DISPLACEMENT_UM: _LENGTH_UM,
+    Measurand.VELOCITY_MM_S: {"mm/s": 1.0, "m/s": 1e3, "in/s": 25.4},
+    Measurand.ACCELERATION_M_S2: {"m/s2": 1.0, "g": STANDARD_GRAVITY_M_S2},
+    Measurand.KEY_PHASE_V: {},
+}
+_VOLTS = {"V": 1.0, "mV": 1e-3}
+
+_SLOW: dict[str, dict[str, tuple[float, float]]] = {
+    "r/min": {"r/min": (1.0, 0.0), "Hz": (60.0, 0.0)},
+    "MW": {"MW": (1.0, 0.0), "kW": (1e-3, 0.0)},
+    "degC": {"degC": (1.0, 0.0), "K": (1.0, -273.15)},
+    "mm": {"mm": (1.0, 0.0), "um": (1e-3, 0.0)},
+}
+
+
+def canonical(unit: str) -> str:
+    """The one spelling of a unit that padwatch knows; any other text stays what it is."""
+    return _CANONICAL.get(unit.strip(), unit.strip())
+
+
+def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float:
+    """Engineering units of a channel per unit of a file.
+
+    Parameters
+    ----------
+    unit_per_v
+        Of the channel's calibration: what a volt is.
+
+    Raises
+    ------
+    ConfigError
+        If the unit is not one in which such a quantity is measured.
+    """
+    known = _WAVEFORMS[measurand] | {volt: v * unit_per_v for volt, v in _VOLTS.items()}
+    if canonical(unit) not in known:
+        raise _misfit(unit, measurand.value, known)
+    return known[canonical(unit)]
+
+
+def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
+    """Factor and offset from the unit of a file to that of a slow channel.
+
+    Raises
+    ------
+    ConfigError
+        If there is none.
+    """
+    known = _SLOW[channel_unit]
+    if canonical(unit) not in known:
+        raise _misfit(unit, channel_unit, known)
+    return known[canonical(unit)]
+
+
+def unit_in(heading: str) -> str | None:
+    """The unit that a heading states behind its name, as in ``shaft x [um]``; else None."""
+    found = re.search(r"\[([^\[\]]{1,16})\]\s*$", heading)
+    return found[1] if found and found[1].strip() in _CANONICAL else None
+
+
+def require_unit(place: object, found: str | None, mapped: str) -> None:
+    """Refuse a column whose own unit is not the one it is mapped with; one without any passes.
+
+    Raises
+    ------
+    ConfigError
+        With both units.
+    """
+    if found and found.strip() and canonical(found) != canonical(mapped):
+        raise ConfigError(
+            f"column {str(place)[:200]!r} is in {found[:40]!r}, the mapping says {mapped!r}"
+        )
+
+
+def _misfit(unit: str, wanted: str, known: Iterable[str]) -> ConfigError:
+    return ConfigError(f"unit {unit[:40]!r} is none for {wanted}; known are {', '.join(known)}")

@@ -1,0 +1,214 @@
+"""The manifest of a recording: what was recorded, how to read it, and what its files must be."""
+
+import hashlib
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+from pydantic import model_validator as validated
+
+from acquisition.delivery.calibration import (
+    BLOCK_SAMPLES,
+    ChannelCalibration,
+    SlowCalibration,
+    UnitCalibration,
+)
+from acquisition.errors import ConfigError
+from acquisition.recordings.limits import (
+    MAX_BLOCK_SAMPLES,
+    MAX_CHANNELS,
+    MAX_MANIFEST_BYTES,
+    MAX_SAMPLES,
+    MAX_SLOW_CHANNELS,
+)
+from core.machine.unit import Measurand
+from core.units import NS_PER_S
+
+FORMAT = "padwatch-recording"
+VERSION = 3
+MANIFEST = "manifest.json"
+SAMPLES = "samples.parquet"
+BLOCKS = "blocks.parquet"
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
+Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+FileName = Literal["samples.parquet", "blocks.parquet"]
+SampleType = Literal["int16", "float32"]
+
+
+class ManifestPart(BaseModel):
+    """Frozen, no unknown keys, no NaN or infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RecordedChannel(ManifestPart):
+    """A waveform channel; the measurand names its engineering unit."""
+
+    id: Name
+    measurand: Measurand
+    full_scale_v: Annotated[float, Field(gt=0.0)]
+    unit_per_v: float
+    ok_min_v: float
+    ok_max_v: float
+
+
+class RecordedSlowChannel(ManifestPart):
+    """A slow channel with the unit and the plausible range of its values."""
+
+    id: Name
+    unit: Annotated[str, StringConstraints(min_length=1, max_length=16)]
+    minimum: float
+    maximum: float
+
+
+class RecordedUnit(ManifestPart):
+    """The unit whose samples are recorded; channels in the order of the columns.
+
+    Parameters
+    ----------
+    sample_type
+        "int16": counts of the converter. "float32": engineering units from a device that has no
+        counts, not a number where it has no sample.
+    block_samples
+        Grid of the blocks; see :class:`acquisition.delivery.calibration.UnitCalibration`.
+
+    Raises
+    ------
+    ValueError
+        If two channels have the same id, or a value is out of its limits.
+    """
+
+    unit: Name
+    rate_hz: Annotated[float, Field(gt=0.0, le=1e6)]
+    channels: Annotated[tuple[RecordedChannel, ...], Field(min_length=1, max_length=MAX_CHANNELS)]
+    slow_channels: Annotated[tuple[RecordedSlowChannel, ...], Field(max_length=MAX_SLOW_CHANNELS)]
+    sample_type: SampleType = "int16"
+    block_samples: Annotated[int, Field(ge=1, le=MAX_BLOCK_SAMPLES)] = BLOCK_SAMPLES
+
+    @validated(mode="after")
+    def _check(self) -> Self:
+        ids = [c.id for c in self.channels] + [c.id for c in self.slow_channels]
+        twice = {id_ for id_ in ids if ids.count(id_) > 1}
+        if twice:
+            raise ValueError(f"channel {min(twice)!r} is there twice")
+        return self
+
+    @property
+    def calibration(self) -> UnitCalibration:
+        """How the samples were read when they were recorded."""
+        return UnitCalibration(
+            unit=self.unit,
+            rate_hz=self.rate_hz,
+            channels=tuple(
+                ChannelCalibration(c.full_scale_v, c.unit_per_v, c.ok_min_v, c.ok_max_v)
+                for c in self.channels
+            ),
+            slow=tuple(SlowCalibration(c.id, c.minimum, c.maximum) for c in self.slow_channels),
+            block_samples=self.block_samples,
+        )
+
+
+class RecordedFile(ManifestPart):
+    """What a file beside the manifest must be."""
+
+    size: Annotated[int, Field(ge=1, le=2**50)]
+    sha256: Sha256
+
+
+class Manifest(RecordedUnit):
+    """All of a manifest.
+
+    Parameters
+    ----------
+    start
+        Time of the first sample, for people; the blocks have it exactly.
+    made_by
+        Program and person.
+    n_samples
+        Per channel.
+    checksum
+        SHA-256 of all else in it, so that no number of it changes unnoticed; see `manifest_text`.
+    """
+
+    format: Literal["padwatch-recording"]
+    version: Literal[3]
+    made_by: Annotated[str, StringConstraints(max_length=200)]
+    start: Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{9}Z$")]
+    n_blocks: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
+    n_samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
+    files: Annotated[dict[FileName, RecordedFile], Field(min_length=2)]
+    checksum: Sha256 | None = None
+
+
+class _Head(BaseModel):
+    """What every version of the format has."""
+
+    format: str
+    version: int
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Read and check the manifest of a recording.
+
+    Raises
+    ------
+    ConfigError
+        If there is none, or anything about it is wrong; the message names the first mistake.
+    """
+    path = folder / MANIFEST
+    text = _read(path)
+    try:
+        head = _Head.model_validate_json(text, strict=True)
+        if head.format != FORMAT or head.version != VERSION:
+            raise ConfigError(
+                f"{path}: {head.format[:40]!r} version {head.version},"
+                f" this padwatch reads {FORMAT!r} version {VERSION}"
+            )
+        found = Manifest.model_validate_json(text, strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = "".join(f".{part}"[:60] for part in first["loc"]).lstrip(".")
+        words = f"{place}: {first['msg']}" if place else first["msg"]
+        raise ConfigError(f"{path}: {words}") from error
+    if found.checksum != checksum_of(json.loads(text)):
+        raise ConfigError(f"{path}: damaged, or edited by hand: not what its checksum says")
+    return found
+
+
+def manifest_text(manifest: Manifest) -> str:
+    """The manifest as its file has it: what it is comes first, its checksum last."""
+    values = manifest.model_dump(mode="json", exclude={"checksum"})
+    first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
+    checksum = checksum_of(first | values)
+    return json.dumps(first | values | {"checksum": checksum}, indent=1) + "\n"
+
+
+def start_text(start_ns: int) -> str:
+    """Time with all its nanoseconds, for people."""
+    seconds, ns = divmod(start_ns, NS_PER_S)
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{ns:09d}Z"
+
+
+def checksum_of(document: dict[str, object]) -> str:
+    """Of all but the checksum itself, whatever the order and the spaces."""
+    rest = {name: value for name, value in document.items() if name != "checksum"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _read(path: Path) -> bytes:
+    if not path.parent.is_dir():
+        raise ConfigError(f"{path.parent}: no such folder")
+    if not path.is_file():
+        raise ConfigError(f"{path.parent}: no {MANIFEST}, so no recording or an unfinished one")
+    try:
+        with path.open("rb") as file:
+            text = file.read(MAX_MANIFEST_BYTES + 1)
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror}") from error
+    if len(text) > MAX_MANIFEST_BYTES:
+        raise ConfigError(f"{path}: larger than {MAX_MANIFEST_BYTES} bytes, not a manifest")
+    return text

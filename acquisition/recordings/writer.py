@@ -1,0 +1,287 @@
+"""`RecordingWriter`: raw blocks in, a finished recording out, or nothing that looks like one."""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.raw import RawBlock
+from acquisition.errors import ConfigError
+from acquisition.recordings.inversion import raw_of
+from acquisition.recordings.limits import BLOCKS_PER_GROUP, MAX_SAMPLES, ROWS_PER_GROUP
+from acquisition.recordings.manifest import (
+    BLOCKS,
+    FORMAT,
+    MANIFEST,
+    SAMPLES,
+    VERSION,
+    Manifest,
+    RecordedFile,
+    RecordedUnit,
+    SampleType,
+    manifest_text,
+    start_text,
+)
+from acquisition.recordings.progress import Progress
+from acquisition.recordings.tables import (
+    blocks_table,
+    blocks_writer,
+    foreign_errors_of,
+    samples_table,
+    samples_writer,
+)
+from core.arrays import RawArray
+from core.samples.blocks import SampleBlock
+
+INCOMPLETE = ".incomplete"
+"""Ending of the folder's name while it is being written."""
+
+
+class RecordingWriter:
+    """Writes a recording aside and gives it its name when it is complete and on the disk.
+
+    As a context manager it finishes on a regular end, and leaves nothing behind on an exception.
+
+    Parameters
+    ----------
+    folder
+        The recording to be; must not exist yet.
+    made_by
+        Program and person, for the manifest.
+    first_decides
+        Whether the first block decides about the sample type, instead of the unit: counts if it is
+        exactly counts, else engineering units.
+
+    Raises
+    ------
+    ConfigError
+        If the folder exists, is being written by another, or cannot be made.
+    """
+
+    def __init__(
+        self, folder: Path, unit: RecordedUnit, made_by: str, *, first_decides: bool = False
+    ) -> None:
+        self.unit = unit
+        self.n_samples = 0
+        self.n_blocks = 0
+        self._folder = folder
+        self._aside = folder.with_name(folder.name + INCOMPLETE)
+        self._made_by = made_by
+        self._calibration = unit.calibration
+        self._progress = Progress()
+        self._start_ns = 0
+        self._first_decides = first_decides
+        self._samples_file: Any = None
+        self._counts: list[RawArray] = []
+        self._n_waiting = 0
+        self._blocks: list[RawBlock] = []
+        if os.path.lexists(folder):
+            raise ConfigError(f"{folder}: is there already; a recording is never overwritten")
+        if os.path.lexists(self._aside):
+            raise ConfigError(
+                f"{self._aside}: is there already: being written, or left by a program that was"
+                " killed; delete it then"
+            )
+        with self._renamed_errors():
+            self._aside.mkdir()
+            self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is not None:
+            self.abandon()
+            return
+        try:
+            self.finish()
+        except ConfigError:
+            with suppress(ConfigError):
+                self.abandon()
+            raise
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first sample to the last, gaps within an epoch included."""
+        return self._progress.n_passed / self.unit.rate_hz
+
+    def write(self, raw: RawBlock) -> None:
+        """Append a block exactly as a device delivered it.
+
+        Raises
+        ------
+        ConfigError
+            If it is not of this unit's shape and rate or beyond the format's limits, or if the
+            disk refuses it.
+        """
+        if self._first_decides:
+            self._decide(_type_of(raw))
+        _require_fit(raw, self.unit)
+        n_samples = raw.counts.shape[1]
+        progress = self._progress.after(raw.epoch, raw.first_index, n_samples, raw.rejected)
+        if self.n_samples + n_samples > MAX_SAMPLES:
+            raise ConfigError(f"more than {MAX_SAMPLES} samples per channel: begin another one")
+        self._progress = progress
+        if self.n_blocks == 0:
+            self._start_ns = raw.start_ns
+        self.n_blocks += 1
+        self.n_samples += n_samples
+        self._counts.append(raw.counts)
+        self._n_waiting += n_samples
+        self._blocks.append(raw)
+        with self._renamed_errors():
+            if self._n_waiting >= ROWS_PER_GROUP:
+                self._write_counts(ROWS_PER_GROUP)
+            if len(self._blocks) >= BLOCKS_PER_GROUP:
+                self._write_blocks()
+
+    def write_calibrated(self, block: SampleBlock) -> None:
+        """Append a block as an adapter hands it out.
+
+        Raises
+        ------
+        ConfigError
+            As :meth:`write`, and if the block is not exactly samples of the recorded type with this
+            calibration.
+        """
+        if self._first_decides:
+            self._decide(_type_behind(block, self._calibration))
+        self.write(raw_of(block, self._calibration, np.dtype(self.unit.sample_type)))
+
+    def finish(self) -> Manifest:
+        """Bring everything to the disk and give the recording its name.
+
+        Raises
+        ------
+        ConfigError
+            If there is nothing to record, or the disk refuses.
+        """
+        if self.n_blocks == 0:
+            self.abandon()
+            raise ConfigError(f"{self._folder}: no samples arrived, nothing was recorded")
+        with self._renamed_errors():
+            self._write_counts(self._n_waiting)
+            self._write_blocks()
+            self._close()
+            manifest = self._manifest()
+            (self._aside / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")
+            for name in (SAMPLES, BLOCKS, MANIFEST):
+                _sync(self._aside / name)
+            _sync(self._aside)
+            self._aside.rename(self._folder)
+            _sync(self._folder.parent)
+        return manifest
+
+    def abandon(self) -> None:
+        """Remove what was written.
+
+        Raises
+        ------
+        ConfigError
+            If the disk refuses.
+        """
+        with suppress(ConfigError), self._renamed_errors():  # a full disk may refuse the footer
+            self._close()
+        with self._renamed_errors():
+            for name in (SAMPLES, BLOCKS, MANIFEST):
+                (self._aside / name).unlink(missing_ok=True)
+            self._aside.rmdir()
+
+    def _decide(self, sample_type: SampleType) -> None:
+        self.unit = self.unit.model_copy(update={"sample_type": sample_type})
+        self._first_decides = False
+
+    def _write_counts(self, n_samples: int) -> None:
+        if n_samples == 0:
+            return
+        if self._samples_file is None:
+            self._samples_file = samples_writer(self._aside / SAMPLES, self.unit)
+        counts: Any = np.concatenate(self._counts, axis=1)
+        self._samples_file.write_table(samples_table(counts[:, :n_samples], self.unit))
+        rest = counts[:, n_samples:].copy()
+        self._counts, self._n_waiting = [rest], rest.shape[1]
+
+    def _write_blocks(self) -> None:
+        if self._blocks:
+            self._blocks_file.write_table(blocks_table(self._blocks, self.unit))
+            self._blocks = []
+
+    def _close(self) -> None:
+        for file in (self._samples_file, self._blocks_file):
+            if file is not None:
+                file.close()
+
+    def _manifest(self) -> Manifest:
+        return Manifest(
+            **dict(self.unit),
+            format=FORMAT,
+            version=VERSION,
+            made_by=self._made_by,
+            start=start_text(self._start_ns),
+            n_blocks=self.n_blocks,
+            n_samples=self.n_samples,
+            files={
+                SAMPLES: recorded_file(self._aside / SAMPLES),
+                BLOCKS: recorded_file(self._aside / BLOCKS),
+            },
+        )
+
+    @contextmanager
+    def _renamed_errors(self) -> Iterator[None]:
+        with foreign_errors_of(self._aside):
+            yield
+
+
+def recorded_file(path: Path) -> RecordedFile:
+    """Size and checksum of a file."""
+    with path.open("rb") as file:
+        return RecordedFile(
+            size=os.fstat(file.fileno()).st_size,
+            sha256=hashlib.file_digest(file, "sha256").hexdigest(),
+        )
+
+
+def _type_of(raw: RawBlock) -> SampleType:
+    return "int16" if raw.counts.dtype == np.int16 else "float32"
+
+
+def _type_behind(block: SampleBlock, calibration: UnitCalibration) -> SampleType:
+    try:
+        return _type_of(raw_of(block, calibration))
+    except ConfigError:
+        return "float32"
+
+
+def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
+    shape = (len(unit.channels), len(unit.channels), len(unit.slow_channels))
+    if (
+        len(raw.counts),
+        len(raw.ok),
+        len(raw.slow),
+    ) != shape or raw.counts.dtype != unit.sample_type:
+        raise ConfigError(
+            f"a block of {len(raw.counts)} channels and {len(raw.slow)} slow values as"
+            f" {raw.counts.dtype}, to be recorded are {shape[0]} and {shape[2]} as"
+            f" {unit.sample_type}"
+        )
+    if raw.rate_hz != unit.rate_hz:
+        raise ConfigError(f"a block at {raw.rate_hz} Hz in a recording at {unit.rate_hz} Hz")
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,1 @@
+"""Simulated measuring devices: any samples, served over the real protocols."""

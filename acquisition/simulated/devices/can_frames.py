@@ -1,0 +1,110 @@
+"""A block of samples as the frames that carry it."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from acquisition.delivery.raw import RawBlock
+from acquisition.simulated.devices.can_shape import CanShape, MessageShape
+
+_NS_PER_US = 1000
+_US_PER_S = 1_000_000
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+"""Bytes that a frame can have; classic ones up to eight."""
+
+_U16, _U32 = 1 << 16, 1 << 32
+
+
+class FrameKind(Enum):
+    """What lies on the wire."""
+
+    DATA = "data"
+    REMOTE = "remote"
+    ERROR = "error"
+    BUS_OFF = "bus_off"
+
+
+@dataclass(frozen=True, slots=True)
+class WireFrame:
+    """A frame on its way.
+
+    Parameters
+    ----------
+    wave
+        Whether it carries samples.
+    """
+
+    frame_id: int
+    extended: bool
+    fd: bool
+    data: bytes
+    kind: FrameKind = FrameKind.DATA
+    wave: bool = False
+
+
+class FrameEncoder:
+    """Encodes raw blocks."""
+
+    def __init__(self, shape: CanShape) -> None:
+        self._heads = [m for m in shape.messages if m.first_channel is None]
+        self._waves = shape.waves
+        self._shape = shape
+
+    def frames(self, raw: RawBlock) -> list[WireFrame]:
+        """All frames of a block, in the order in which they are sent."""
+        values = self._head_values(raw)
+        frames = [self._head(message, values) for message in self._heads]
+        columns = [self._wave(message, raw) for message in self._waves]
+        frames += [frame for instant in zip(*columns, strict=True) for frame in instant]
+        return frames
+
+    def _head_values(self, raw: RawBlock) -> dict[str, float]:
+        seconds, microseconds = divmod(raw.start_ns // _NS_PER_US, _US_PER_S)
+        values: dict[str, float] = {
+            "index": raw.first_index % _U32,
+            "counter": raw.first_index % _U16,
+            "epoch": raw.epoch % _U32,
+            "n_samples": raw.n_samples,
+            "ok": sum(1 << c for c, ok in enumerate(raw.ok) if ok),
+            "seconds": seconds,
+            "microseconds": microseconds,
+        }
+        names = [f.name for m in self._heads for f in m.fields if f.name not in values]
+        return values | dict(zip(names, raw.slow, strict=True))
+
+    def _head(self, message: MessageShape, values: dict[str, float]) -> WireFrame:
+        record = message.records(1)
+        for field in message.fields:
+            record[field.name] = values[field.name]
+        return self._frame(message, record.tobytes(), wave=False)
+
+    def _wave(self, message: MessageShape, raw: RawBlock) -> list[WireFrame]:
+        n_per_frame = self._shape.samples_per_frame
+        n_frames = -(-raw.n_samples // n_per_frame)
+        first = np.arange(n_frames) * n_per_frame
+        records = message.records(n_frames)
+        records["counter"] = (raw.first_index + first) % _U16
+        if self._shape.fd:
+            records["valid"] = np.minimum(raw.n_samples - first, n_per_frame)
+        channels = range(message.first_channel or 0, len(self._shape.channels))
+        names = [f.name for f in message.fields if f.name not in ("counter", "valid")]
+        for channel, start in zip(channels, range(0, len(names), n_per_frame), strict=False):
+            for n, name in enumerate(names[start : start + n_per_frame]):
+                samples = raw.counts[channel, n::n_per_frame]
+                records[name][: len(samples)] = samples
+        data, length = records.tobytes(), message.length
+        return [
+            self._frame(message, data[n * length : (n + 1) * length], wave=True)
+            for n in range(n_frames)
+        ]
+
+    @staticmethod
+    def _frame(message: MessageShape, data: bytes, wave: bool) -> WireFrame:
+        return WireFrame(message.frame_id, message.extended, message.fd, data, wave=wave)
+
+
+def shortened(frame: WireFrame) -> WireFrame:
+    """The frame as its message's next shorter length would have it."""
+    length = max(n for n in FD_LENGTHS if n < len(frame.data))
+    return replace(frame, data=frame.data[:length])

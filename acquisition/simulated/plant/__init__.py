@@ -1,0 +1,1 @@
+"""The 10-DOF machine, its excitation, transducers and converter."""

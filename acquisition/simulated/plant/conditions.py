@@ -1,0 +1,113 @@
+"""What changes slowly while the machine runs: where shafts are, how warm, how well it is read."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from acquisition.simulated.plant.scenario import ChannelScenario, Scenario
+from core.arrays import FloatArray
+from core.machine.unit import Unit
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Slow quantities at one instant.
+
+    Parameters
+    ----------
+    centre_um, position_error_um
+        (n_bearings, 2) shaft centre from bearing centre, and what gaps tell beyond it.
+    oil_temperature_c, oil_temperature_error_c
+        (n_bearings,) of the oil, and what thermometers tell beyond it.
+    gap_growth_um
+        (n_bearings,) what all gaps of a bearing have in common.
+    gain
+        (n_channels,) true sensitivity over the nominal one.
+    """
+
+    centre_um: FloatArray
+    position_error_um: FloatArray
+    oil_temperature_c: FloatArray
+    oil_temperature_error_c: FloatArray
+    gap_growth_um: FloatArray
+    gain: FloatArray
+    active_power_mw: float
+
+
+def between(start: Conditions, stop: Conditions, fraction: float) -> Conditions:
+    """Conditions part of the way from one instant to another."""
+
+    def part(name: str) -> FloatArray:
+        a, b = getattr(start, name), getattr(stop, name)
+        return np.asarray(a + fraction * (b - a))
+
+    values = {field.name: part(field.name) for field in fields(Conditions)}
+    power_mw = float(values.pop("active_power_mw"))
+    return Conditions(**values, active_power_mw=power_mw)
+
+
+class SlowWander:
+    """First-order Gauss-Markov wander about a scenario's means, step by step.
+
+    Parameters
+    ----------
+    random, growth_random
+        Where the wander of everything but the gaps' growth, and that of the growth, comes from.
+    scenario
+        That of the first step; how much everything wanders stays as it says.
+    """
+
+    def __init__(
+        self,
+        random: np.random.Generator,
+        growth_random: np.random.Generator,
+        machine: Unit,
+        scenario: Scenario,
+        step_s: float,
+    ) -> None:
+        self._machine = machine
+        bearings = [scenario.bearings[b.id] for b in machine.bearings]
+        rms = [b.centre_wander_um_rms for b in bearings for _ in "xy"]
+        rms += [b.oil_temperature_wander_c_rms for b in bearings]
+        rms += [scenario.active_power_wander_mw_rms]
+        growth_rms = [b.gap_growth_wander_um_rms for b in bearings]
+        memory = math.exp(-step_s / scenario.wander_time_s)
+        self._rest = _Wander(random, memory, np.array(rms))
+        self._growth = _Wander(growth_random, memory, np.array(growth_rms))
+
+    def now(self, scenario: Scenario) -> Conditions:
+        """Conditions at the present step, about the means of a scenario."""
+        bearings = [scenario.bearings[b.id] for b in self._machine.bearings]
+        mean = [centre for b in bearings for centre in (b.centre_x_um, b.centre_y_um)]
+        mean += [b.oil_temperature_c for b in bearings] + [scenario.active_power_mw]
+        values = self._rest.about(np.array(mean))
+        channels = (scenario.channels.get(c.id, ChannelScenario()) for c in self._machine.channels)
+        n_bearings = len(bearings)
+        return Conditions(
+            centre_um=values[: 2 * n_bearings].reshape(-1, 2),
+            position_error_um=np.array([b.position_error_um for b in bearings]),
+            oil_temperature_c=values[2 * n_bearings : -1],
+            oil_temperature_error_c=np.array([b.oil_temperature_error_c for b in bearings]),
+            gap_growth_um=self._growth.about(np.array([b.gap_growth_um for b in bearings])),
+            gain=np.array([channel.gain for channel in channels]),
+            active_power_mw=float(values[-1]),
+        )
+
+    def advance(self) -> None:
+        """Move on by one step."""
+        self._rest.advance()
+        self._growth.advance()
+
+
+class _Wander:
+    def __init__(self, random: np.random.Generator, memory: float, rms: FloatArray) -> None:
+        self._random, self._memory, self._rms = random, memory, rms
+        self._deviation = np.zeros_like(rms)
+
+    def about(self, mean: FloatArray) -> FloatArray:
+        return np.asarray(mean + self._rms * self._deviation)
+
+    def advance(self) -> None:
+        fresh = self._random.standard_normal(self._rms.size)
+        self._deviation = self._memory * self._deviation + math.sqrt(1 - self._memory**2) * fresh

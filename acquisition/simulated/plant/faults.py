@@ -1,0 +1,103 @@
+"""What becomes of a channel whose transducer, cable or amplifier fails."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE
+from core.arrays import CountArray
+
+RAIL_HIT_SPACING = 997
+"""Samples from one hit to the next; a prime, so that they fall everywhere in blocks."""
+
+RAILS = (COUNTS_FULL_SCALE - 1, -COUNTS_FULL_SCALE)
+
+
+class FaultKind(StrEnum):
+    """What goes wrong."""
+
+    DEAD = "dead"
+    """No voltage at all: 0 counts."""
+    STUCK = "stuck"
+    """The last value for ever, give or take a count."""
+    CLIPPED = "clipped"
+    """The bias has drifted to the positive rail, where the upper half of the signal is cut off."""
+    RAIL_HITS = "rail_hits"
+    """A loose contact: now and then a single sample on one rail or the other."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One channel fails.
+
+    Parameters
+    ----------
+    from_sample
+        Index of the first sample that is wrong; from there on the fault stays.
+    """
+
+    kind: FaultKind
+    from_sample: int = 0
+
+
+class FaultInjector:
+    """Breaks the counts of some channels of one stream.
+
+    Parameters
+    ----------
+    faults
+        By row of the counts; later ones work on what earlier ones leave.
+    """
+
+    def __init__(self, random: np.random.Generator, faults: Mapping[int, Sequence[Fault]]) -> None:
+        self._random = random
+        self._running = [(row, _Running(fault)) for row, found in faults.items() for fault in found]
+
+    def spoil(self, counts: CountArray, first_index: int) -> None:
+        """Break the next counts of the stream, (n_channels, n_samples), where they stand."""
+        for row, running in self._running:
+            jitter = self._random.integers(-1, 2, (counts.shape[1],))
+            running.spoil(counts[row], first_index, jitter)
+
+
+@dataclass
+class _Running:
+    fault: Fault
+    last: int | None = None
+    """The sample before the fault; of a channel that never worked, its first."""
+
+    def spoil(self, counts: CountArray, first_index: int, jitter: npt.NDArray[np.int64]) -> None:
+        healthy = min(max(self.fault.from_sample - first_index, 0), counts.size)
+        if healthy:
+            self.last = int(counts[healthy - 1])
+        if healthy < counts.size:
+            last = int(counts[0]) if self.last is None else self.last
+            since = np.arange(healthy, counts.size) + first_index - self.fault.from_sample
+            broken = _broken(self.fault.kind, counts[healthy:], since, last, jitter[healthy:])
+            counts[healthy:] = broken
+            self.last = last
+
+
+def _broken(
+    kind: FaultKind,
+    counts: CountArray,
+    since: npt.NDArray[np.int64],
+    last: int,
+    jitter: npt.NDArray[np.int64],
+) -> CountArray:
+    upper, lower = RAILS
+    wide = counts.astype(np.int64)
+    match kind:
+        case FaultKind.DEAD:
+            wide = np.zeros_like(wide)
+        case FaultKind.STUCK:
+            wide = last + jitter
+        case FaultKind.CLIPPED:
+            wide = wide + (upper - last)
+        case FaultKind.RAIL_HITS:
+            hit, turn = since % RAIL_HIT_SPACING == 0, since // RAIL_HIT_SPACING % 2
+            wide[hit] = np.array(RAILS)[turn[hit]]
+    return wide.clip(lower, upper).astype(np.int16)

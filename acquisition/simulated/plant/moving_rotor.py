@@ -1,0 +1,130 @@
+"""The rotor of a unit on films and brackets that change while it moves."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields, replace
+
+import numpy as np
+
+from acquisition.errors import ConfigError
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.forces import force_planes
+from acquisition.simulated.plant.rotor import force_map, rotor_matrices
+from acquisition.simulated.plant.rotor_discrete import Hold, discretize
+from acquisition.simulated.plant.rotor_simulation import LiftedRotor, lift, simulate
+from acquisition.simulated.plant.scenario import Scenario
+from acquisition.simulated.plant.transducers import output_map
+from core.arrays import FloatArray
+from core.machine.unit import Unit
+
+LIFTED_STEPS = 32
+
+LEAST_CHANGE = 1e-4
+"""Relative change of a film or bracket that is worth a new rotor."""
+
+LARGEST_STEP, MOST_PIECES = 1e-3, 16
+"""Relative change within one piece of a chunk, above which it is cut into more, up to so many. The
+motion goes on from where it is: a step so small is lost in the noise of accelerometers, the only
+ones that could see it."""
+
+
+class MovingRotor:
+    """Motion of a rotor as its transducers see it.
+
+    Raises
+    ------
+    ConfigError
+        If machine and scenario do not fit together.
+    """
+
+    def __init__(self, machine: Unit, scenario: Scenario) -> None:
+        self._machine = machine
+        self._rotor = _lifted_rotor(machine, scenario)
+        self._coefficients = _coefficients(scenario)
+        self._state = np.zeros(self._rotor.transition.shape[0])
+
+    def advance(self, forces: FloatArray, start: Scenario, stop: Scenario) -> FloatArray:
+        """Move under the next forces, while one scenario goes over into another.
+
+        Parameters
+        ----------
+        forces
+            (n_forces, n_samples), n_samples a multiple of `MOST_PIECES` times `LIFTED_STEPS`.
+
+        Returns
+        -------
+        (n_channels, n_samples) in each channel's engineering unit.
+        """
+        change = _change(_coefficients(start), _coefficients(stop))
+        n_pieces = min(MOST_PIECES, 2 ** max(0, math.ceil(math.log2(change / LARGEST_STEP + 1e-9))))
+        readings = []
+        for number, piece in enumerate(np.split(forces, n_pieces, axis=1)):
+            self._follow(_between(start, stop, (number + 0.5) / n_pieces))
+            part, self._state = simulate(self._rotor, self._state, piece)
+            readings.append(part)
+        return np.concatenate(readings, axis=1)
+
+    def _follow(self, scenario: Scenario) -> None:
+        """Take the films, brackets and speed of a scenario from the next sample on."""
+        wanted = _coefficients(scenario)
+        if _change(self._coefficients, wanted) > LEAST_CHANGE:
+            self._rotor, self._coefficients = _lifted_rotor(self._machine, scenario), wanted
+
+
+def _coefficients(scenario: Scenario) -> FloatArray:
+    """(n_bearings + 1, 5) of every film with its bracket, and the speed."""
+    return np.array([*_rows(scenario), 5 * (scenario.speed_rpm,)])
+
+
+def _rows(scenario: Scenario) -> Iterator[tuple[float, ...]]:
+    for bearing in scenario.bearings.values():
+        film = bearing.film
+        k_n_per_m = max(abs(film.k_xx_n_per_m), abs(film.k_yy_n_per_m))
+        yield (
+            *(film.k_xx_n_per_m, film.k_xy_n_per_m, film.k_yx_n_per_m, film.k_yy_n_per_m),
+            k_n_per_m * bearing.bracket_stiffness_factor,
+        )
+
+
+def _change(before: FloatArray, after: FloatArray) -> float:
+    """Largest change relative to what is largest in the same row."""
+    scale = np.maximum(np.max(np.abs(before), axis=1), np.max(np.abs(after), axis=1))
+    change = np.max(np.abs(after - before), axis=1)
+    return float(np.max(np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0)))
+
+
+def _between(start: Scenario, stop: Scenario, share: float) -> Scenario:
+    """Films, brackets and speed part of the way from one scenario to another."""
+    if start is stop:
+        return start
+    bearings = {
+        name: replace(
+            bearing,
+            film=_film_between(bearing.film, stop.bearings[name].film, share),
+            bracket_stiffness_factor=(1.0 - share) * bearing.bracket_stiffness_factor
+            + share * stop.bearings[name].bracket_stiffness_factor,
+        )
+        for name, bearing in start.bearings.items()
+    }
+    speed_rpm = (1.0 - share) * start.speed_rpm + share * stop.speed_rpm
+    return replace(start, bearings=bearings, speed_rpm=speed_rpm)
+
+
+def _film_between(start: Film, stop: Film, share: float) -> Film:
+    mixed = (
+        (1.0 - share) * getattr(start, f.name) + share * getattr(stop, f.name) for f in fields(Film)
+    )
+    return Film(*mixed)
+
+
+def _lifted_rotor(machine: Unit, scenario: Scenario) -> LiftedRotor:
+    missing = {b.bearing for b in scenario.rotor.brackets} - scenario.bearings.keys()
+    if missing:
+        raise ConfigError(f"the scenario of {machine.id!r} lacks {', '.join(sorted(missing))}")
+    films = {name: bearing.film for name, bearing in scenario.bearings.items()}
+    parameters = scenario.true_rotor
+    matrices = rotor_matrices(parameters, films, scenario.speed_rpm)
+    forces = np.hstack([force_map(parameters, plane) for plane in force_planes(scenario)])
+    outputs = output_map(machine, parameters, matrices)
+    rotor = discretize(matrices, forces, outputs, machine.rate_hz, Hold.RAMP)
+    return lift(rotor, LIFTED_STEPS)

@@ -1,0 +1,129 @@
+"""Simulation of a linear rotor as matrix products over blocks of steps.
+
+Writing out many steps at once ("lifting") turns the recursion into a few large matrix products: the
+same numbers to rounding, at a hundred times the speed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.simulated.plant.rotor_discrete import DiscreteRotor
+from core.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class LiftedRotor:
+    """`n_steps` steps of a :class:`DiscreteRotor` written out as one.
+
+    Parameters
+    ----------
+    transition
+        (n_states, n_states) over the whole block.
+    input_map
+        (n_states, n_forces * n_steps)
+    output_map, feedthrough
+        (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); in both,
+        time runs fastest. The second maps the block's forces to its outputs.
+    """
+
+    n_steps: int
+    n_forces: int
+    n_outputs: int
+    transition: FloatArray
+    input_map: FloatArray
+    output_map: FloatArray
+    feedthrough: FloatArray
+
+
+def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
+    """Write out `n_steps` steps as one.
+
+    Raises
+    ------
+    ValueError
+        If `n_steps` is less than 1.
+    """
+    if n_steps < 1:
+        raise ValueError(f"a block needs at least 1 step, got {n_steps}")
+    powers = [np.eye(rotor.transition.shape[0])]
+    for _ in range(n_steps):
+        powers.append(rotor.transition @ powers[-1])
+    observed = np.stack([rotor.output_map @ power for power in powers[:-1]], axis=1)
+    driven = np.stack([power @ rotor.input_map for power in powers[:-1]][::-1], axis=2)
+    return LiftedRotor(
+        n_steps=n_steps,
+        n_forces=rotor.input_map.shape[1],
+        n_outputs=rotor.output_map.shape[0],
+        transition=powers[-1],
+        input_map=driven.reshape(len(powers[0]), -1),
+        output_map=observed.reshape(-1, len(powers[0])),
+        feedthrough=_feedthrough(observed, rotor),
+    )
+
+
+def simulate(
+    rotor: LiftedRotor, state: FloatArray, forces: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Move the rotor under given forces.
+
+    Parameters
+    ----------
+    state
+        (n_states,) at the first sample, in the terms of :class:`DiscreteRotor`.
+    forces
+        (n_forces, n_samples) in newtons, n_samples a multiple of the block's steps.
+
+    Returns
+    -------
+    outputs, state
+        (n_outputs, n_samples) and the state at the sample that follows.
+
+    Raises
+    ------
+    ValueError
+        If the forces do not fill whole blocks.
+    """
+    if forces.shape[0] != rotor.n_forces or forces.shape[1] % rotor.n_steps:
+        raise ValueError(
+            f"forces of shape {forces.shape} do not fill blocks of"
+            f" {rotor.n_forces} forces and {rotor.n_steps} steps"
+        )
+    blocks = _time_to_blocks(forces, rotor.n_steps)
+    states, state = _block_states(rotor, state, blocks @ rotor.input_map.T)
+    outputs = states @ rotor.output_map.T + blocks @ rotor.feedthrough.T
+    return _blocks_to_time(outputs, rotor.n_outputs), state
+
+
+def _block_states(
+    rotor: LiftedRotor, state: FloatArray, driven: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """States at the start of each block, (n_blocks, n_states), and after the last."""
+    states = np.empty_like(driven)
+    for index, push in enumerate(driven):
+        states[index] = state
+        state = rotor.transition @ state + push
+    return states, state
+
+
+def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
+    """Outputs of a block caused by its own forces: a lower-triangular Toeplitz block matrix."""
+    n_outputs, n_steps, _ = observed.shape
+    driven = (observed @ rotor.input_map).swapaxes(0, 1)
+    impulse = [rotor.feedthrough, *driven[:-1]]
+    matrix = np.zeros((n_outputs, n_steps, rotor.input_map.shape[1], n_steps))
+    for delay, response in enumerate(impulse):
+        pushed = np.arange(n_steps - delay)
+        matrix[:, pushed + delay, :, pushed] = response
+    return matrix.reshape(n_outputs * n_steps, -1)
+
+
+def _time_to_blocks(signals: FloatArray, n_steps: int) -> FloatArray:
+    n_signals, n_samples = signals.shape
+    blocks = signals.reshape(n_signals, n_samples // n_steps, n_steps).swapaxes(0, 1)
+    return blocks.reshape(n_samples // n_steps, n_signals * n_steps)
+
+
+def _blocks_to_time(blocks: FloatArray, n_signals: int) -> FloatArray:
+    signals = blocks.reshape(len(blocks), n_signals, -1).swapaxes(0, 1)
+    return signals.reshape(n_signals, -1)

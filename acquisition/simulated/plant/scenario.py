@@ -1,0 +1,194 @@
+"""What a simulated unit goes through: its films, what shakes it, how well it is measured."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from acquisition.simulated.plant.faults import Fault
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.rotor_parameters import ForcePlane, RotorParameters
+from core.machine.response import Response
+
+
+@dataclass(frozen=True)
+class BearingScenario:
+    """One bearing: its oil film and where the shaft sits in it.
+
+    Parameters
+    ----------
+    centre_x_um, centre_y_um
+        Mean position of the shaft centre from the bearing centre.
+    centre_wander_um_rms
+        Slow wander of that position, for each direction.
+    gap_growth_um, gap_growth_wander_um_rms
+        By how much all gaps of the bearing are wider than with the shaft centred at reference
+        temperature, and its slow wander: positive where the housing grows more than the shaft.
+    runout_um_pk
+        Runout of the shaft under the probes, 1×, 2×, …: phasors at the x probe, locked to the
+        shaft; the other probes see the same surface later. Towards a probe is positive.
+    bracket_stiffness_factor
+        True stiffness of the bracket over the one of `Scenario.rotor`, which monitors are told.
+    position_error_um
+        Displacement (x, y) that the gaps tell and that is not there: drift of probes, before their
+        gain. It does not move the film.
+    oil_temperature_error_c
+        By how much the thermometer reads high.
+    """
+
+    film: Film
+    centre_x_um: float = 0.0
+    centre_y_um: float = 0.0
+    centre_wander_um_rms: float = 0.0
+    oil_temperature_c: float = 45.0
+    oil_temperature_wander_c_rms: float = 0.0
+    gap_growth_um: float = 0.0
+    gap_growth_wander_um_rms: float = 0.0
+    runout_um_pk: tuple[complex, ...] = ()
+    bracket_stiffness_factor: float = 1.0
+    position_error_um: tuple[float, float] = (0.0, 0.0)
+    oil_temperature_error_c: float = 0.0
+
+
+@dataclass(frozen=True)
+class HydraulicNoise:
+    """Broadband hydraulic force on the rotor, Gaussian, independent in x and y.
+
+    Parameters
+    ----------
+    rms_n
+        Of the force in each direction.
+    cutoff_hz
+        The spectrum is flat below and falls steeply above; ``None`` is white up to half the
+        sampling rate.
+    """
+
+    rms_n: float = 0.0
+    cutoff_hz: float | None = None
+    plane: ForcePlane = ForcePlane.RUNNER
+
+
+@dataclass(frozen=True)
+class VortexRope:
+    """Rotating force of the part-load vortex on the runner; not locked to the shaft.
+
+    Parameters
+    ----------
+    order
+        Mean frequency as a multiple of the running speed; nominally 0.25.
+    line_width_hz
+        Width of the line at half its power: how fast the phase wanders.
+    """
+
+    force_n: float = 0.0
+    order: float = 0.25
+    line_width_hz: float = 0.002
+
+
+@dataclass(frozen=True)
+class KeyPhasePulse:
+    """What a key-phase pick-up gives once a turn.
+
+    Parameters
+    ----------
+    mark_turns
+        Angle from where it passes the pick-up to the zero that unbalance and runout count from.
+    height_v
+        Above `rest_v`, or below it on a channel whose direction is -1.
+    """
+
+    width_turns: float = 6.0 / 360.0
+    mark_turns: float = 0.0
+    rest_v: float = 0.5
+    height_v: float = 5.0
+
+
+@dataclass(frozen=True)
+class TransducerNoise:
+    """Noise of each kind of transducer.
+
+    Parameters
+    ----------
+    gap_um_rms, displacement_um_rms, velocity_mm_s_rms, acceleration_m_s2_rms, key_phase_v_rms
+        White over the whole band, behind the transducer: its response does not touch it.
+    accelerometer_g_per_sqrt_hz
+        One-sided density of the accelerometers' own noise, before their response; a velocity
+        channel is an accelerometer whose charge amplifier integrates.
+    accelerometer_corner_hz
+        Below here it rises as 1/f in power: at the corner itself the power is twice the density's.
+    """
+
+    gap_um_rms: float = 0.0
+    displacement_um_rms: float = 0.0
+    velocity_mm_s_rms: float = 0.0
+    acceleration_m_s2_rms: float = 0.0
+    accelerometer_g_per_sqrt_hz: float = 0.0
+    accelerometer_corner_hz: float = 2.0
+    key_phase_v_rms: float = 0.0
+
+
+@dataclass(frozen=True)
+class ChannelScenario:
+    """What one transducer really is like, whatever the monitor is told.
+
+    Parameters
+    ----------
+    response
+        Complex response; none is flat. Must be a model, not a table.
+    gain
+        True sensitivity over the nominal one. A probe's reference gap was read with the probe
+        itself, so that the gain acts on what differs from it.
+    runout_um_pk
+        What this probe alone sees besides the runout of the shaft, 1×, 2×, …: phasors of motion
+        along its axis.
+    """
+
+    response: Response | None = None
+    gain: float = 1.0
+    runout_um_pk: tuple[complex, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One unit in steady operation.
+
+    Parameters
+    ----------
+    bearings
+        One for each bracket of `rotor`, by bearing.
+    unbalance_grade_mm_s
+        ISO grade at 92.3 r/min, as in the paper: G4.25 is 75.6 kN there.
+    wander_time_s
+        How slowly shaft centres, temperatures and power wander, and the speed.
+    speed_wander
+        Largest departure of the running speed from `speed_rpm`, as a share of it; 0.003 is 0.3 %.
+        The film and the gyroscopic forces stay those of `speed_rpm`.
+    channels
+        Transducers that differ from perfect ones, by channel.
+    exchanged
+        Pairs of channels whose cables are swapped.
+    """
+
+    bearings: Mapping[str, BearingScenario]
+    speed_rpm: float = 92.3
+    active_power_mw: float = 700.0
+    active_power_wander_mw_rms: float = 0.0
+    unbalance_grade_mm_s: float = 4.25
+    hydraulic: HydraulicNoise = field(default_factory=HydraulicNoise)
+    rope: VortexRope = field(default_factory=VortexRope)
+    noise: TransducerNoise = field(default_factory=TransducerNoise)
+    wander_time_s: float = 600.0
+    rotor: RotorParameters = field(default_factory=RotorParameters)
+    speed_wander: float = 0.0
+    channels: Mapping[str, ChannelScenario] = field(default_factory=dict)
+    exchanged: tuple[tuple[str, str], ...] = ()
+    key_phase: KeyPhasePulse = field(default_factory=KeyPhasePulse)
+
+    @property
+    def true_rotor(self) -> RotorParameters:
+        """The rotor on its brackets as they are."""
+        factors = {id_: bearing.bracket_stiffness_factor for id_, bearing in self.bearings.items()}
+        brackets = tuple(
+            replace(b, stiffness_n_per_m=factors.get(b.bearing, 1.0) * b.stiffness_n_per_m)
+            for b in self.rotor.brackets
+        )
+        return replace(self.rotor, brackets=brackets)

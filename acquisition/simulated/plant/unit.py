@@ -1,0 +1,153 @@
+"""`SimulatedUnit`: a generating unit with its converter, read like a device."""
+
+import math
+
+import numpy as np
+
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.raw import RawBlock
+from acquisition.errors import ConfigError
+from acquisition.simulated.plant.conditions import Conditions, between
+from acquisition.simulated.plant.converter import to_counts
+from acquisition.simulated.plant.course import Course
+from acquisition.simulated.plant.faults import FaultInjector
+from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
+from acquisition.simulated.plant.scenario import Scenario
+from acquisition.simulated.plant.slow_values import slow_values
+from acquisition.simulated.plant.truth import UnitTruth, unit_truth
+from core.machine.unit import Unit
+from core.units import NS_PER_S
+
+
+class SimulatedUnit:
+    """Raw feed of one simulated unit.
+
+    The same seed gives the same counts, however the samples are asked for.
+
+    Parameters
+    ----------
+    machine
+        Its bearings are called UJB, LJB and TJB; it need not have all three.
+    scenario
+        One for ever, or a course of them.
+    start_ns
+        Time of sample 0; in whole seconds it is also the epoch of the blocks.
+
+    Raises
+    ------
+    ConfigError
+        If machine, calibration and scenario do not fit together.
+    """
+
+    def __init__(
+        self,
+        machine: Unit,
+        calibration: UnitCalibration,
+        scenario: Scenario | Course,
+        seed: int,
+        start_ns: int,
+    ) -> None:
+        _check(machine, calibration)
+        self._machine = machine
+        self._calibration = calibration
+        first = scenario if isinstance(scenario, Scenario) else scenario.at(0.0)
+        self._start_ns = start_ns
+        self._plant = SimulatedPlant(machine, scenario, seed)
+        self._faults = _faults(machine, first, seed)
+        self._exchanged = _exchanged(machine, calibration, first)
+        self._index = 0
+        self._next_chunk()
+
+    def advance(self, n_samples: int) -> RawBlock:
+        """Produce the next samples, following directly on the previous ones.
+
+        Raises
+        ------
+        ValueError
+            If less than one sample is asked for.
+        """
+        if n_samples < 1:
+            raise ValueError(f"a block needs at least 1 sample, got {n_samples}")
+        first_index, slow = self._index, self._slow()
+        parts = []
+        while n_samples:
+            offset = self._index % CHUNK_SAMPLES
+            part = self._counts[:, offset : offset + n_samples]
+            parts.append(part)
+            n_samples -= part.shape[1]
+            self._index += part.shape[1]
+            if self._index % CHUNK_SAMPLES == 0:
+                self._next_chunk()
+        return RawBlock(
+            epoch=self._start_ns // NS_PER_S,
+            first_index=first_index,
+            start_ns=self._start_ns + round(first_index * NS_PER_S / self._machine.rate_hz),
+            rate_hz=self._machine.rate_hz,
+            counts=np.concatenate(parts, axis=1),
+            ok=(True,) * len(self._machine.channels),
+            slow=slow,
+        )
+
+    def begin_at(self, start_ns: int) -> None:
+        """Move the time of sample 0, because making a plant of many machines takes its time."""
+        self._start_ns = start_ns
+
+    def truth(self) -> UnitTruth:
+        """Tell what is really so at the next sample."""
+        return unit_truth(
+            self._machine, self._chunk.scenario, self._conditions(), self._speed_rpm()
+        )
+
+    def _next_chunk(self) -> None:
+        self._chunk = self._plant.advance()
+        self._counts = to_counts(self._chunk.readings, self._calibration)
+        self._faults.spoil(self._counts, self._index)
+        for rows in self._exchanged:
+            self._counts[rows] = self._counts[rows[::-1]]
+
+    def _speed_rpm(self) -> float:
+        offset = self._index % CHUNK_SAMPLES
+        return self._plant.speed_rpm(self._chunk, offset)
+
+    def _conditions(self) -> Conditions:
+        fraction = self._index % CHUNK_SAMPLES / CHUNK_SAMPLES
+        return between(self._chunk.start, self._chunk.stop, fraction)
+
+    def _slow(self) -> tuple[float, ...]:
+        values = slow_values(self._machine, self._conditions(), self._speed_rpm())
+        return tuple(values.get(channel.id, math.nan) for channel in self._calibration.slow)
+
+
+def _check(machine: Unit, calibration: UnitCalibration) -> None:
+    if len(calibration.channels) != len(machine.channels):
+        raise ConfigError(
+            f"unit {machine.id!r} has {len(machine.channels)} channels,"
+            f" its calibration {len(calibration.channels)}"
+        )
+    if calibration.rate_hz != machine.rate_hz:
+        raise ConfigError(
+            f"unit {machine.id!r} samples at {machine.rate_hz} Hz,"
+            f" its calibration says {calibration.rate_hz} Hz"
+        )
+
+
+def _faults(machine: Unit, scenario: Scenario, seed: int) -> FaultInjector:
+    rows = {channel.id: row for row, channel in enumerate(machine.channels)}
+    return FaultInjector(
+        np.random.default_rng(seed),
+        {rows[id_]: channel.faults for id_, channel in scenario.channels.items()},
+    )
+
+
+def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) -> list[list[int]]:
+    """Pairs of rows whose cables are swapped."""
+    rows = {channel.id: row for row, channel in enumerate(machine.channels)}
+    pairs = []
+    for pair in scenario.exchanged:
+        if not rows.keys() >= set(pair):
+            raise ConfigError(f"unit {machine.id!r} has no channels {pair} to be exchanged")
+        first, second = (calibration.channels[rows[id_]].full_scale_v for id_ in pair)
+        if first != second:
+            raise ConfigError(f"channels {pair} cannot be exchanged: {first} V and {second} V")
+        pairs.append([rows[id_] for id_ in pair])
+    return pairs

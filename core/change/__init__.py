@@ -1,0 +1,1 @@
+"""Whether a film has changed, compared with its baseline, and why."""

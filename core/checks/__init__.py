@@ -1,0 +1,1 @@
+"""Checks of transducers and signals."""

@@ -1,0 +1,169 @@
+"""Two axes of shaft probes, one or two probes each: displacement told from thermal growth.
+
+A gap that differs from its reference by d holds the shaft's displacement u and what shaft and
+housing grew together, g: d_near = g − u on the positive axis, d_far = g + u across the shaft.
+"""
+
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.machine.unit import GapAccuracy
+from core.quality import Quality, Reading, Reason, uncertain, worst
+from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
+
+NEAR_X, FAR_X, NEAR_Y, FAR_Y, GROWTH, ASYMMETRY = range(6)
+"""What a displacement is made of, in order; all are lengths in µm."""
+
+NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth", "uneven growth")
+
+
+@dataclass(frozen=True)
+class ProbeAxis:
+    """Gaps along one axis.
+
+    Parameters
+    ----------
+    near, far
+        Mean gaps in µm of the probe on the positive axis and of the one across the shaft; `far` is
+        none where there is no such probe.
+    """
+
+    near: Reading
+    near_reference_um: float
+    far: Reading | None = None
+    far_reference_um: float = 0.0
+
+    @property
+    def has_both(self) -> bool:
+        """Whether both gaps are known."""
+        return self.near.value is not None and self.far is not None and self.far.value is not None
+
+    @property
+    def changes_um(self) -> tuple[float, float]:
+        """What the gaps differ from their references; zero where not known."""
+        near, far = self.near.value, self.far.value if self.far is not None else None
+        return (
+            0.0 if near is None else near - self.near_reference_um,
+            0.0 if far is None else far - self.far_reference_um,
+        )
+
+    @property
+    def quality(self) -> Quality:
+        """Of a displacement from these gaps; one that lost one of its two probes is uncertain."""
+        if self.far is None:
+            return self.near.quality
+        if self.near.value is None and self.far.value is None:
+            return worst((self.near.quality, self.far.quality))
+        if self.has_both:
+            return worst((self.near.quality, self.far.quality))
+        left = self.far if self.near.value is None else self.near
+        return worst((left.quality, uncertain(Reason.REDUCED_PROBES)))
+
+
+@dataclass(frozen=True)
+class Growth:
+    """By how much all gaps of a bearing have widened, when it was last measured with four probes.
+
+    Parameters
+    ----------
+    half_width_um
+        Limits of what it may have been.
+    """
+
+    value_um: float
+    half_width_um: float
+
+
+class ProbeAxes:
+    """Displacement along both axes, as sums over everything that is known or limited.
+
+    Attributes
+    ----------
+    values_um
+        (6,) gap changes, external growth and its asymmetry.
+    weights
+        (2, 6) share of each in the displacement along x and y; zero where it is not known.
+    """
+
+    def __init__(
+        self, x: ProbeAxis, y: ProbeAxis, accuracy: GapAccuracy, last: Growth | None
+    ) -> None:
+        self._axes = (x, y)
+        self._accuracy = accuracy
+        self._last = last
+        outside_um = 0.0 if last is None else last.value_um
+        self.values_um: FloatArray = np.array([*x.changes_um, *y.changes_um, outside_um, 0.0])
+        self.weights: FloatArray = np.array([self._displacement(0), self._displacement(1)])
+
+    @property
+    def growth_quality(self) -> Quality:
+        """Of the growth that is measured now."""
+        return worst(axis.quality for axis in self._axes if axis.has_both)
+
+    def growth_budget(self) -> Budget | None:
+        """Growth as four probes, or the two of one axis, measure it now; None if none can."""
+        both = [axis for axis in (0, 1) if self._axes[axis].has_both]
+        if not both:
+            return None
+        weights = np.mean([self._own_growth(axis) for axis in both], axis=0)
+        return Budget(float(weights @ self.values_um), self.lines(weights))
+
+    def lines(self, weights: FloatArray) -> tuple[BudgetLine, ...]:
+        """Uncertainty of a weighted sum of `values_um` (GUM, equation 10)."""
+        return tuple(
+            chain.from_iterable(
+                self._lines(source, float(weight))
+                for source, weight in enumerate(weights)
+                if weight != 0.0
+            )
+        )
+
+    def _lines(self, source: int, weight: float) -> list[BudgetLine]:
+        accuracy, name = self._accuracy, NAMES[source]
+        if source == GROWTH:
+            return [systematic_line(name, self._growth_half_width_um(), weight)]
+        if source == ASYMMETRY:
+            return [systematic_line(name, accuracy.growth_asymmetry_um, weight)]
+        gain_um = accuracy.gain * abs(float(self.values_um[source]))
+        axis = self._axes[source // 2]
+        gap = axis.far if source % 2 else axis.near
+        noise_um = 0.0 if gap is None else gap.u_random or 0.0
+        return [
+            systematic_line(f"gain of {name}", gain_um, weight),
+            systematic_line(f"reference of {name}", accuracy.reference_um, weight),
+            random_line(f"scatter of {name}", abs(weight) * noise_um),
+        ]
+
+    def _growth_half_width_um(self) -> float:
+        if self._last is None:
+            return self._accuracy.growth_um
+        return self._last.half_width_um + self._accuracy.growth_change_um
+
+    def _displacement(self, axis: int) -> FloatArray:
+        near, far = _unit(2 * axis), _unit(2 * axis + 1)
+        probes = self._axes[axis]
+        if probes.has_both:
+            return (far - near) / 2.0
+        if probes.near.value is not None:
+            return self._growth_of(axis) - near
+        if probes.far is not None and probes.far.value is not None:
+            return far - self._growth_of(axis)
+        return np.zeros(len(NAMES))
+
+    def _growth_of(self, axis: int) -> FloatArray:
+        """Growth along an axis that cannot tell it itself: the other's now, else the last known."""
+        if self._axes[1 - axis].has_both:
+            return self._own_growth(1 - axis) + _unit(ASYMMETRY)
+        return _unit(GROWTH) + axis * _unit(ASYMMETRY)
+
+    def _own_growth(self, axis: int) -> FloatArray:
+        return (_unit(2 * axis) + _unit(2 * axis + 1)) / 2.0
+
+
+def _unit(source: int) -> FloatArray:
+    unit = np.zeros(len(NAMES))
+    unit[source] = 1.0
+    return unit

@@ -1,0 +1,144 @@
+"""Where the shaft ran during the averaged segments, from the gaps of two or four probes."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.condition.probe_axes import Growth, ProbeAxis
+from core.condition.shaft_centre import locate_shaft
+from core.machine.unit import Bearing, GapAccuracy, Measurand, Unit
+from core.quality import NOT_TOLD, Reading, Reason, current_mean, missing
+from core.spectra.segments import Segment
+from core.uncertainty import SHAFT_GAIN, Budget, mean_budget, numbers, systematic_line, with_budgets
+
+
+def position_results(
+    unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Growth | None
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
+
+    Parameters
+    ----------
+    segments
+        Oldest first, at least one.
+    last_growth
+        Thermal growth of the gaps when it was last measured.
+    """
+    measured = {
+        "gap_x_um": _gap(unit, segments, bearing.shaft_x, bearing.gap_x),
+        "gap_y_um": _gap(unit, segments, bearing.shaft_y, bearing.gap_y),
+        "opposite_gap_x_um": _gap(unit, segments, bearing.opposite_x, bearing.opposite_gap_x),
+        "opposite_gap_y_um": _gap(unit, segments, bearing.opposite_y, bearing.opposite_gap_y),
+    }
+    gaps, gap_budgets = with_budgets(
+        {name: reading for name, (reading, _) in measured.items()},
+        {
+            name: _gap_budget(reading, values, bearing.gap_accuracy)
+            for name, (reading, values) in measured.items()
+        },
+    )
+    near, far = tuple(gaps.values())[:2], tuple(gaps.values())[2:]
+    x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
+    centre = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth)
+    readings = {
+        **gaps,
+        "gap_growth_um": centre.gap_growth_um,
+        "shaft_centre_x_um": centre.x_um,
+        "shaft_centre_y_um": centre.y_um,
+        "eccentricity_ratio": centre.eccentricity_ratio,
+        "attitude_angle_deg": centre.attitude_angle_deg,
+    }
+    names = {"x_um": "shaft_centre_x_um", "y_um": "shaft_centre_y_um"}
+    budgets = {names.get(key, key): budget for key, budget in centre.budgets.items()}
+    known = {name: b for name, b in budgets.items() if readings[name].value is not None}
+    return readings, {**gap_budgets, **known}
+
+
+def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
+    """Thermal growth for later, when it can no longer be measured."""
+    growth = readings["gap_growth_um"]
+    if growth.value is None or growth.interval_95 is None:
+        return None
+    return Growth(growth.value, (growth.interval_95[1] - growth.interval_95[0]) / 2.0)
+
+
+def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
+    """Slow channel of the quantities that a bearing has from one."""
+    return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
+
+
+def slow_results(
+    segments: Sequence[Segment], channels: Mapping[str, str | None]
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Means of slow channels over the segments, by quantity, with their scatter.
+
+    How well the plant's own transmitters are calibrated is not known here.
+
+    Parameters
+    ----------
+    channels
+        Slow channel of each quantity, None where it is not measured.
+    """
+    readings: dict[str, Reading] = {}
+    found: dict[str, Budget | None] = {}
+    for name, channel in channels.items():
+        mean, values = _mean_slow(segments, channel)
+        readings[name] = mean
+        found[name] = None if mean.value is None else mean_budget(mean.value, values)
+    return with_budgets(readings, found)
+
+
+def probe_axis(
+    bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
+) -> ProbeAxis:
+    """The probes of an axis (0 is x) with their references.
+
+    Parameters
+    ----------
+    near, far
+        Mean gaps (x, y), µm; of the probes on the positive axes, and of those across the shaft.
+    """
+    has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
+    if not has_far or bearing.opposite_reference_um is None:
+        return ProbeAxis(near[axis], bearing.gap_reference_um[axis])
+    return ProbeAxis(
+        near[axis], bearing.gap_reference_um[axis], far[axis], bearing.opposite_reference_um[axis]
+    )
+
+
+def _mean_slow(segments: Sequence[Segment], channel: str | None) -> tuple[Reading, FloatArray]:
+    if channel is None:
+        return missing(Reason.NOT_MEASURED), np.empty(0)
+    parts = [segment.slow.get(channel, NOT_TOLD) for segment in segments]
+    return current_mean(parts), numbers(parts)
+
+
+def _gap(
+    unit: Unit, segments: Sequence[Segment], channel: str | None, slow_channel: str | None
+) -> tuple[Reading, FloatArray]:
+    """Mean gap, µm, by the slow channel or a DC-coupled probe, and what it is the mean of."""
+    if slow_channel is not None:
+        gap_mm, values_mm = _mean_slow(segments, slow_channel)
+        if gap_mm.value is None:
+            return gap_mm, values_mm
+        return Reading(1e3 * gap_mm.value, gap_mm.quality), 1e3 * values_mm
+    rows = [row for row, c in enumerate(unit.channels) if c.id == channel]
+    if not rows or unit.channels[rows[0]].measurand is not Measurand.GAP_UM:
+        return missing(Reason.NOT_MEASURED), np.empty(0)
+    gaps = [_segment_gap(segment, rows[0]) for segment in segments]
+    mean = current_mean(gaps, is_grazed=segments[-1].is_grazed(rows[0]))
+    return mean, numbers(gaps)
+
+
+def _gap_budget(gap: Reading, values_um: FloatArray, accuracy: GapAccuracy) -> Budget | None:
+    if gap.value is None:
+        return None
+    lines = (systematic_line(SHAFT_GAIN, accuracy.gain, gap.value),)
+    return mean_budget(gap.value, values_um, lines)
+
+
+def _segment_gap(segment: Segment, row: int) -> Reading:
+    if not segment.usable[row]:
+        return missing(segment.channel_quality[row].reason)
+    return Reading(float(segment.mean[row]), segment.channel_quality[row])

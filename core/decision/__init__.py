@@ -1,1 +1,0 @@
-"""Whether a film has changed, compared with its baseline, and what changed."""

@@ -1,1 +1,0 @@
-"""Films watched reading by reading: what is measured of each, and what is said of it."""

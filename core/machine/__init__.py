@@ -1,0 +1,1 @@
+"""The unit as an engineer describes it: bearings, channels, transducers, brackets."""

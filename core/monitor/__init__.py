@@ -1,0 +1,1 @@
+"""Blocks of one unit in, assessments of its bearings out."""

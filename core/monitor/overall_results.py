@@ -1,0 +1,171 @@
+"""Broad-band vibration and 1× phases of one bearing over some segments."""
+
+import cmath
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from core.machine.unit import Bearing
+from core.quality import Quality, Reading, Reason, current_mean, missing, worst
+from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from core.spectra.recent import RecentReadings
+from core.spectra.segments import ORDER1, Segment
+from core.stiffness.channel_budget import amplitude_lines
+from core.stiffness.line_results import PHASES, Vectors, phase_readings
+from core.uncertainty import Budget, mean_budget, numbers, with_budgets
+from core.units import ns_from_s
+
+SHAFT_SPANS = {
+    "overall_shaft_x_um_pp": SHAFT_X,
+    "overall_shaft_y_um_pp": SHAFT_Y,
+}
+SHAFTS = {SHAFT_X: "shaft_x", SHAFT_Y: "shaft_y"}
+BEARING_SPEEDS = {
+    "overall_bearing_x_mm_s_rms": BEARING_X,
+    "overall_bearing_y_mm_s_rms": BEARING_Y,
+}
+ORBIT = "overall_shaft_um_pk"
+
+OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
+"""Broad-band quantities of the catalogue."""
+
+
+def overall_results(
+    segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
+
+    Peak-to-peak values and the farthest excursions are averaged as they are, velocities as power.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    number
+        The bearing's place in the unit.
+    """
+    readings: dict[str, Reading] = {}
+    found: dict[str, Budget | None] = {}
+    grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
+    for name, place in SHAFT_SPANS.items():
+        spans = [_span(segment, rows[place]) for segment in segments]
+        readings[name] = current_mean(spans, is_grazed=grazed[place])
+        found[name] = _mean_budget(readings[name], spans, bearing, place)
+    orbits = [_orbit(segment, rows[:2], number) for segment in segments]
+    readings[ORBIT] = current_mean(orbits, is_grazed=all(grazed[:2]))
+    found[ORBIT] = _mean_budget(readings[ORBIT], orbits, bearing, SHAFT_X)
+    for name, place in BEARING_SPEEDS.items():
+        speeds = [_speed(segment, rows[place]) for segment in segments]
+        squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in speeds]
+        readings[name] = _root(current_mean(squares, is_grazed=grazed[place]))
+        found[name] = _mean_budget(readings[name], squares, bearing, place, is_root=True)
+    return with_budgets(readings, found)
+
+
+def recent_results(
+    segment: Segment, rows: Sequence[int], rate_hz: float
+) -> tuple[RecentReadings, ...]:
+    """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    """
+    recent, found = segment.recent, []
+    if recent is None:
+        return ()
+    for part, stop in enumerate(recent.stop.tolist()):
+        behind_ns = ns_from_s((segment.stop_index - segment.first_index - stop) / rate_hz)
+        readings = {}
+        for place, name in SHAFTS.items():
+            row = rows[place]
+            is_span = not math.isnan(segment.overall.peak_to_peak_um[row])
+            span = recent.peak_to_peak_um[part, row] if is_span else math.nan
+            readings[f"overall_{name}_um_pp"] = _reading(segment, (row,), span)
+            readings[f"order1_{name}_um_pk"] = _turning(
+                segment, _reading(segment, (row,), recent.order1_um_pk[part, row])
+            )
+        found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
+    speeds = {name: _speed(segment, rows[place]) for name, place in BEARING_SPEEDS.items()}
+    newest = found[-1]
+    return (*found[:-1], RecentReadings(newest.time_ns, {**newest.readings, **speeds}))
+
+
+def _turning(segment: Segment, amplitude: Reading) -> Reading:
+    """An amplitude at 1×, as far as the speed is known."""
+    speed = segment.speed.rpm
+    if speed.value is None or amplitude.value is None:
+        return speed if speed.value is None else amplitude
+    return Reading(amplitude.value, worst((amplitude.quality, speed.quality)))
+
+
+def phase_results(
+    segments: Sequence[Segment],
+    rows: Sequence[int],
+    quality: Callable[..., Quality | Reading],
+    runout_um_pk: Callable[[int], float],
+) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+    """Phase of each channel's mean 1× vector when the mark passes the pick-up, 0 to 360°.
+
+    Parameters
+    ----------
+    quality
+        Of what is read from a channel at 1×; without a number, why.
+    runout_um_pk
+        What is left of the runout in a channel.
+    """
+    return phase_readings(
+        {
+            name: _vectors(segments, rows[place], quality(place), runout_um_pk(place))
+            for name, place in PHASES.items()
+        }
+    )
+
+
+def _vectors(
+    segments: Sequence[Segment], row: int, quality: Quality | Reading, runout_um_pk: float
+) -> Vectors:
+    if not isinstance(quality, Reading) and segments[-1].shaft_angle_rad is None:
+        quality = missing(Reason.NOT_MEASURED)
+    turned = [
+        complex(s.order_phasors_um_pk[row, ORDER1]) * cmath.exp(-1j * s.shaft_angle_rad)
+        for s in segments
+        if s.shaft_angle_rad is not None and s.usable[row]
+    ]
+    return Vectors(np.array(turned, np.complex128), quality, runout_um_pk)
+
+
+def _mean_budget(
+    reading: Reading, parts: Sequence[Reading], bearing: Bearing, place: int, is_root: bool = False
+) -> Budget | None:
+    if not reading.value:
+        return None
+    lines = amplitude_lines(bearing, place, reading.value)
+    sensitivity = 0.5 / reading.value if is_root else 1.0
+    return mean_budget(reading.value, numbers(parts), lines, sensitivity)
+
+
+def _span(segment: Segment, row: int) -> Reading:
+    return _reading(segment, (row,), segment.overall.peak_to_peak_um[row])
+
+
+def _speed(segment: Segment, row: int) -> Reading:
+    return _reading(segment, (row,), segment.overall.velocity_mm_s_rms[row])
+
+
+def _orbit(segment: Segment, rows: Sequence[int], bearing: int) -> Reading:
+    return _reading(segment, rows, segment.overall.orbit_um_pk[bearing])
+
+
+def _reading(segment: Segment, rows: Sequence[int], value: float) -> Reading:
+    if not segment.usable[list(rows)].all():
+        return missing(worst(segment.channel_quality[row] for row in rows).reason)
+    if math.isnan(value):
+        return missing(Reason.NOT_MEASURED)
+    return Reading(float(value), worst(segment.channel_quality[row] for row in rows))
+
+
+def _root(mean: Reading) -> Reading:
+    return mean if mean.value is None else Reading(math.sqrt(max(mean.value, 0.0)), mean.quality)

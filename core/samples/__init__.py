@@ -1,0 +1,1 @@
+"""Samples of one unit as they come, exact to the gap."""

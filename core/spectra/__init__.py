@@ -1,0 +1,1 @@
+"""One stretch of time, transformed once: lines, speed, vortex, orbit."""

@@ -1,0 +1,172 @@
+"""Spectral lines: transforms of one segment, and amplitudes at exact frequencies.
+
+Amplitudes are zero-to-peak; the taper is Hann's, periodic, as in the paper (Brito et al., 3.1).
+"""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from scipy import fft
+
+from core.arrays import ComplexArray, FloatArray, SampleArray
+from core.checks.sensor_checks import SensorLimits
+
+
+@dataclass(frozen=True)
+class SegmentSettings:
+    """How samples are cut into segments and what is read off one; defaults after Brito et al., 3.1.
+
+    Parameters
+    ----------
+    segment_samples
+        Points of one Hann-tapered segment.
+    overlap
+        Share of a segment that the next one repeats.
+    n_segments
+        Segments that are averaged; 24 at 600 Hz are about five minutes.
+    max_frequency_hz
+        Spectra are kept up to here.
+    vortex_order
+        Nominal frequency of the part-load vortex in multiples of the running speed.
+    vortex_band
+        Orders within which its peak is looked for.
+    min_line_to_floor
+        Power of a line over the median of its surroundings from which it stands out.
+    min_speed_fraction
+        Share of the rated speed below which the machine counts as standing.
+    velocity_low_order, velocity_high_hz
+        Band of a bearing's broad-band velocity: from this multiple of the rated speed (a quarter
+        takes in everything down to the vortex) to this frequency.
+    sensors
+        What counts as a failed transducer or an unsteady record.
+    """
+
+    segment_samples: int = 8192
+    overlap: float = 0.125
+    n_segments: int = 24
+    max_frequency_hz: float = 25.0
+    vortex_order: float = 0.25
+    vortex_band: tuple[float, float] = (0.2, 0.4)
+    min_line_to_floor: float = 10.0
+    min_speed_fraction: float = 0.2
+    velocity_low_order: float = 0.25
+    velocity_high_hz: float = 1000.0
+    sensors: SensorLimits = field(default_factory=SensorLimits)
+
+    @property
+    def hop_samples(self) -> int:
+        """Samples from one segment's start to the next one's."""
+        return self.segment_samples - round(self.segment_samples * self.overlap)
+
+
+FINE_STEPS = 64
+"""Samples of one run in a Fourier sum at any frequency."""
+
+
+@lru_cache(maxsize=8)
+def hann(n_samples: int) -> FloatArray:
+    """Periodic Hann taper, (n_samples,), read-only."""
+    taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n_samples) / n_samples)
+    taper.setflags(write=False)
+    return taper
+
+
+def tapered(samples: SampleArray | FloatArray) -> FloatArray:
+    """Remove each channel's mean and apply the taper, scaled so that a line reads 0-to-peak.
+
+    Parameters
+    ----------
+    samples : (n_channels, n_samples)
+
+    Returns
+    -------
+    (n_channels, n_samples)
+    """
+    centred = np.asarray(samples, dtype=np.float64)
+    centred = centred - centred.mean(axis=1, keepdims=True)
+    taper = hann(centred.shape[1])
+    weighted: FloatArray = centred * (2.0 * taper / taper.sum())
+    return weighted
+
+
+def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
+    """Phasors at the first bins above zero of the discrete Fourier transform.
+
+    Returns
+    -------
+    (n_channels, n_lines), line 0 being bin 1.
+    """
+    phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
+    return phasors
+
+
+def exact_phasors(
+    tapered_samples: FloatArray, rate_hz: float, frequency_hz: FloatArray
+) -> ComplexArray:
+    """Phasors at any frequencies, on or off the bins: one discrete Fourier sum each.
+
+    Parameters
+    ----------
+    tapered_samples : (n_channels, n_samples)
+    frequency_hz : (n_lines,)
+        Between zero and ``rate_hz / 2``, both excluded.
+
+    Returns
+    -------
+    (n_channels, n_lines)
+
+    Raises
+    ------
+    ValueError
+        If a frequency is out of range.
+    """
+    if np.any(frequency_hz <= 0.0) or np.any(frequency_hz >= rate_hz / 2.0):
+        raise ValueError(f"frequencies {frequency_hz} must lie between 0 and {rate_hz / 2.0} Hz")
+    n_channels, n_samples = tapered_samples.shape
+    n_coarse = -(-n_samples // FINE_STEPS)
+    padded = np.zeros((n_channels, n_coarse * FINE_STEPS))
+    padded[:, :n_samples] = tapered_samples
+    # the exponential of a sum of steps: a fine table within each run and a coarse one over runs
+    turn_rad = -2j * np.pi * frequency_hz / rate_hz
+    fine = np.exp(np.outer(np.arange(FINE_STEPS), turn_rad))
+    coarse = np.exp(np.outer(FINE_STEPS * np.arange(n_coarse), turn_rad))
+    runs = padded.reshape(n_channels, n_coarse, FINE_STEPS) @ fine
+    phasors: ComplexArray = (runs * coarse).sum(axis=1)
+    return phasors
+
+
+def peak_frequency_hz(
+    power: FloatArray, frequency_hz: FloatArray, band_hz: tuple[float, float]
+) -> float | None:
+    """Frequency of the strongest line in a band, between the bins.
+
+    A tone that falls between two bins of a Hann spectrum at ``k + d`` shows them in the amplitude
+    ratio ``a = (1 + d) / (2 - d)``, so ``d = (2a - 1) / (a + 1)`` (Grandke 1983, eq. 10).
+
+    Parameters
+    ----------
+    power : (n_lines,)
+    frequency_hz : (n_lines,)
+        Evenly spaced.
+    band_hz
+        Lowest and highest frequency of interest.
+
+    Returns
+    -------
+    None when the strongest line of the band is no peak but the flank of one outside it.
+    """
+    inside = np.flatnonzero((frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1]))
+    inside = inside[(inside > 0) & (inside < power.size - 1)]
+    if inside.size == 0:
+        return None
+    top = int(inside[np.argmax(power[inside])])
+    if power[top] < max(power[top - 1], power[top + 1]):
+        return None
+    left = top - 1 if power[top - 1] >= power[top + 1] else top
+    if power[left] <= 0.0 or power[left + 1] <= 0.0:
+        return float(frequency_hz[top])
+    ratio = float(np.sqrt(power[left + 1] / power[left]))
+    offset = np.clip((2.0 * ratio - 1.0) / (ratio + 1.0), 0.0, 1.0)
+    found = float(frequency_hz[left] + offset * (frequency_hz[1] - frequency_hz[0]))
+    return found if band_hz[0] <= found <= band_hz[1] else None

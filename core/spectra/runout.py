@@ -1,0 +1,72 @@
+"""Runout of the shaft under its probes, measured at slow roll and taken off the 1× line.
+
+At slow roll the shaft does not vibrate; what a probe reads at 1× then is the surface. It can be
+taken off at speed only by a phase that both have in common: that of a mark on the shaft.
+"""
+
+import cmath
+from dataclasses import dataclass
+from enum import StrEnum
+
+from core.machine.unit import MAX_SLOW_ROLL_FRACTION, SlowRollVector
+
+
+class RunoutVerdict(StrEnum):
+    """Whether a slow-roll vector was taken off, else why not."""
+
+    APPLIED = "applied"
+    NO_VECTOR = "no_vector"
+    OTHER_PROBE = "other_probe"
+    NOT_SLOW_ROLL = "not_slow_roll"
+    NO_PHASE_REFERENCE = "no_phase_reference"
+
+
+@dataclass(frozen=True)
+class CompensatedLine:
+    """A 1× phasor with or without runout, and which of the two it is."""
+
+    phasor_um_pk: complex
+    verdict: RunoutVerdict
+
+
+def take_off_runout(
+    phasor_um_pk: complex,
+    vector: SlowRollVector | None,
+    probe: str,
+    rated_speed_rpm: float,
+    shaft_angle_rad: float | None,
+) -> CompensatedLine:
+    """Take the slow-roll vector off a probe's 1× phasor; leave it as it is where that is no use.
+
+    Only for 1×: nothing is known of the surface at other orders, and the vortex has no runout.
+
+    Parameters
+    ----------
+    phasor_um_pk
+        1× phasor of one segment, relative to its first sample.
+    probe
+        The probe that is there now.
+    shaft_angle_rad
+        Angle that the shaft has turned at the first sample since the mark passed the pick-up; none
+        without a key-phase.
+    """
+    verdict = runout_verdict(vector, probe, rated_speed_rpm, shaft_angle_rad is not None)
+    if vector is None or shaft_angle_rad is None or verdict is not RunoutVerdict.APPLIED:
+        return CompensatedLine(phasor_um_pk, verdict)
+    surface = vector.phasor_um_pk * cmath.exp(1j * shaft_angle_rad)
+    return CompensatedLine(phasor_um_pk - surface, verdict)
+
+
+def runout_verdict(
+    vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
+) -> RunoutVerdict:
+    """Whether a vector may be taken off the readings of a probe, else the first reason why not."""
+    if vector is None:
+        return RunoutVerdict.NO_VECTOR
+    if vector.probe != probe:
+        return RunoutVerdict.OTHER_PROBE
+    if not 0.0 < vector.speed_rpm <= MAX_SLOW_ROLL_FRACTION * rated_speed_rpm:
+        return RunoutVerdict.NOT_SLOW_ROLL
+    if not has_key_phase:
+        return RunoutVerdict.NO_PHASE_REFERENCE
+    return RunoutVerdict.APPLIED

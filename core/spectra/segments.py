@@ -1,0 +1,308 @@
+"""Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import ComplexArray, FloatArray
+from core.checks.sensor_checks import (
+    MAX_CLIPPED_SHARE,
+    clipped_share,
+    level_quality,
+    quietest_rms,
+    signal_quality,
+)
+from core.machine.transducers import displacement_factor
+from core.machine.unit import Channel, Unit
+from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
+from core.samples.blocks import SampleBlock
+from core.spectra.cross_spectrum import average
+from core.spectra.key_phase import KeyPhase, read_key_phase
+from core.spectra.lines import SegmentSettings, bin_phasors, exact_phasors, tapered
+from core.spectra.overall import Overall, OverallTransform
+from core.spectra.recent import RecentVibration, parts_of
+from core.spectra.runout import RunoutVerdict
+from core.spectra.segment_runout import shaft_angle_rad, without_runout
+from core.spectra.speed import Speed, running_speed
+from core.spectra.vortex import vortex_frequency_hz
+from core.units import hz_from_rpm
+
+OUTSIDE = uncertain(Reason.SENSOR_FAILURE)
+"""Of a channel with a block whose mean lies outside its OK limits."""
+
+CLIPPED = bad(Reason.CLIPPED)
+
+ORDER1, VORTEX = range(2)
+"""Where the two order lines stand in `Segment.order_phasors_um_pk`."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One transformed segment of a unit.
+
+    Parameters
+    ----------
+    channel_quality
+        One for each channel, throughout the segment.
+    mean
+        (n_channels,) mean of the samples, engineering units of each channel.
+    bin_phasors_um_pk
+        (n_channels, n_lines) displacement phasors at the bins above zero.
+    order_frequency_hz
+        (2,) exact frequencies of 1× and of the vortex; of its nominal order where there is no peak.
+    has_vortex_peak
+        Whether a line that bearings share has its peak in the vortex band, up to this segment.
+    order_phasors_um_pk
+        (n_channels, 2) displacement phasors at exactly these, 1× without runout where that can be
+        taken off.
+    runout
+        Whether it was, by shaft channel.
+    overall
+        Broad-band vibration.
+    clipped_share
+        (n_channels,) share of the samples at an end of the converter's range.
+    shaft_angle_rad
+        Angle that the shaft has turned at the first sample since its mark passed the pick-up; None
+        where no key-phase says so.
+    recent
+        Vibration of the newest parts; None without waveforms.
+    """
+
+    epoch: int
+    first_index: int
+    stop_index: int
+    stop_ns: int
+    channel_quality: tuple[Quality, ...]
+    slow: Mapping[str, Reading]
+    mean: FloatArray
+    speed: Speed
+    bin_phasors_um_pk: ComplexArray
+    order_frequency_hz: FloatArray
+    has_vortex_peak: bool
+    order_phasors_um_pk: ComplexArray
+    runout: Mapping[str, RunoutVerdict]
+    overall: Overall
+    clipped_share: FloatArray
+    shaft_angle_rad: float | None = None
+    recent: RecentVibration | None = None
+
+    @property
+    def usable(self) -> npt.NDArray[np.bool_]:
+        """(n_channels,) whether each channel may be believed."""
+        return _usable(self.channel_quality)
+
+    def is_grazed(self, row: int) -> bool:
+        """Whether a channel is left out for a few clipped samples alone."""
+        few = 0.0 < self.clipped_share[row] <= MAX_CLIPPED_SHARE
+        return bool(few) and self.channel_quality[row] == CLIPPED
+
+
+class SegmentTransform:
+    """Transforms windows of one unit and keeps the ones that are averaged.
+
+    Parameters
+    ----------
+    unit
+        Gives sampling rate, channels and rated speed.
+    """
+
+    def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
+        self._unit = unit
+        self._settings = settings
+        bin_hz = unit.rate_hz / settings.segment_samples
+        n_lines = min(int(settings.max_frequency_hz / bin_hz), settings.segment_samples // 2 - 1)
+        self.frequency_hz: FloatArray = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
+        self._overall = OverallTransform(unit, settings)
+        self._bin_factor = _factors(unit.channels, self.frequency_hz)
+        shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
+        self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
+        ids = [channel.id for channel in unit.channels]
+        self._key_phase_row = ids.index(unit.key_phase) if unit.key_phase else None
+        self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
+        self.segments: deque[Segment] = deque(maxlen=settings.n_segments)
+
+    def clear(self) -> None:
+        """Forget all segments: the device counts anew."""
+        self.segments.clear()
+
+    def add(self, window: SampleBlock) -> Segment:
+        """Transform a window, keep it, and drop what has left the averaging time.
+
+        Nothing older than the averaging time counts, also not for where its vortex is looked for:
+        behind a gap it may be of any time.
+        """
+        self._drop_before(window.first_index - self._span)
+        finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
+        quality = tuple(
+            q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
+            for q, good in zip(window.channel_quality, finite, strict=True)
+        )
+        samples = np.where(finite[:, np.newaxis], window.samples, 0.0).astype(np.float64)
+        prepared = tapered(samples)
+        lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
+        bins = lines[:, : self.frequency_hz.size] * self._bin_factor
+        mean = samples.mean(axis=1)
+        key_phase = self._key_phase(samples, window.rate_hz, _usable(quality))
+        speed = self._speed(window, bins, _usable(quality), key_phase)
+        clipped = self._clipped(quality, samples)
+        quality = self._judged(quality, samples, mean, speed)
+        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        vortex_hz = self._vortex_hz(turn_hz, bins, _usable(quality))
+        order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
+        orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
+        segment = Segment(
+            epoch=window.epoch,
+            first_index=window.first_index,
+            stop_index=window.stop_index,
+            stop_ns=window.stop_ns,
+            channel_quality=quality,
+            slow=window.slow,
+            mean=mean,
+            speed=speed,
+            bin_phasors_um_pk=bins,
+            order_frequency_hz=order_hz,
+            has_vortex_peak=vortex_hz is not None,
+            order_phasors_um_pk=orders,
+            runout=runout,
+            overall=self._overall.of(samples, lines),
+            clipped_share=clipped,
+            recent=self._recent(samples, window.rate_hz, turn_hz, speed, key_phase),
+            shaft_angle_rad=shaft_angle_rad(speed, key_phase),
+        )
+        self.segments.append(segment)
+        self._drop_before(window.first_index - self._span + 1)
+        return segment
+
+    @property
+    def _span(self) -> int:
+        return self._settings.n_segments * self._settings.hop_samples
+
+    def _drop_before(self, first_index: int) -> None:
+        while self.segments and self.segments[0].first_index < first_index:
+            self.segments.popleft()
+
+    def _judged(
+        self,
+        quality: tuple[Quality, ...],
+        samples: FloatArray,
+        mean: FloatArray,
+        speed: Speed,
+    ) -> tuple[Quality, ...]:
+        """Take out channels that do not move although the machine turns, or have lost contact."""
+        turning, limits = speed.rpm.value is not None, self._settings.sensors
+        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        turn_samples = round(self._unit.rate_hz / turn_hz)
+        found = []
+        moved = zip(quality, self._unit.channels, quietest_rms(samples), mean, samples, strict=True)
+        for before, channel, rms, at, own in moved:
+            signal = signal_quality(rms, at, channel.unit_per_count, turning, limits)
+            if before in (OUTSIDE, CLIPPED):
+                # a cable that breaks clips first: that it is lost counts for more
+                level = level_quality(own, turn_samples, channel.ok_limits)
+                found.append(worst((signal, level, GOOD if before == OUTSIDE else before)))
+            else:
+                found.append(worst((before, signal)))
+        return tuple(found)
+
+    def _clipped(self, quality: tuple[Quality, ...], samples: FloatArray) -> FloatArray:
+        return np.array(
+            [
+                clipped_share(own, c.unit_per_count) if q == CLIPPED and c.unit_per_count else 0.0
+                for q, c, own in zip(quality, self._unit.channels, samples, strict=True)
+            ]
+        )
+
+    def _key_phase(
+        self, samples: FloatArray, rate_hz: float, usable: npt.NDArray[np.bool_]
+    ) -> KeyPhase | None:
+        row = self._key_phase_row
+        if row is None or not usable[row]:
+            return None
+        found = read_key_phase(self._unit.channels[row].direction * samples[row], rate_hz)
+        return found if isinstance(found, KeyPhase) else None
+
+    def _speed(
+        self,
+        window: SampleBlock,
+        bins: ComplexArray,
+        usable: npt.NDArray[np.bool_],
+        key_phase: KeyPhase | None,
+    ) -> Speed:
+        power = _power(bins, usable & self._is_shaft)
+        return running_speed(
+            self._unit, window.slow, self.frequency_hz, power, self._settings, key_phase
+        )
+
+    def _orders(
+        self,
+        prepared: FloatArray,
+        rate_hz: float,
+        order_hz: FloatArray,
+        speed: Speed,
+        key_phase: KeyPhase | None,
+    ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
+        phasors = exact_phasors(prepared, rate_hz, order_hz)
+        phasors *= _factors(self._unit.channels, order_hz)
+        rows = np.flatnonzero(self._is_shaft).tolist()
+        phasors[:, ORDER1], runout = without_runout(
+            phasors[:, ORDER1], self._unit, rows, speed, key_phase
+        )
+        return phasors, runout
+
+    def _recent(
+        self,
+        samples: FloatArray,
+        rate_hz: float,
+        turn_hz: float,
+        speed: Speed,
+        key_phase: KeyPhase | None,
+    ) -> RecentVibration:
+        starts, stops = parts_of(samples.shape[1], self._settings.hop_samples, rate_hz / turn_hz)
+        order_hz, rows = np.array([turn_hz]), np.flatnonzero(self._is_shaft).tolist()
+        factor = _factors(self._unit.channels, order_hz)[:, 0]
+        amplitudes, spans = [], []
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            part = samples[:, start:stop]
+            phasors = factor * exact_phasors(tapered(part), rate_hz, order_hz)[:, 0]
+            phasors *= np.exp(-2j * np.pi * turn_hz * start / rate_hz)  # of the segment's first
+            clean, _ = without_runout(phasors, self._unit, rows, speed, key_phase)
+            amplitudes.append(np.abs(clean))
+            spans.append(np.ptp(part, axis=1))
+        return RecentVibration(stops, np.array(amplitudes), np.array(spans))
+
+    def _vortex_hz(
+        self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
+    ) -> float | None:
+        """Where the bearings share a line: over all segments, for one resolves a rope poorly."""
+        low, high = self._settings.vortex_band
+        band_hz = (low * turn_hz, high * turn_hz)
+        # a bin more on each side, to tell a peak from the flank of one outside
+        margin_hz = 1.5 * self.frequency_hz[0]
+        near = np.flatnonzero(
+            (self.frequency_hz > band_hz[0] - margin_hz)
+            & (self.frequency_hz < band_hz[1] + margin_hz)
+        )
+        phasors = np.array([*(s.bin_phasors_um_pk[:, near] for s in self.segments), bins[:, near]])
+        counted = np.array([*(s.usable for s in self.segments), usable])
+        spectra = [
+            average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
+            for rows in self._bearing_rows
+        ]
+        return vortex_frequency_hz(spectra, band_hz)
+
+
+def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
+    return np.array([quality.level is not Level.BAD for quality in qualities])
+
+
+def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
+    power: FloatArray = (np.abs(phasors[counted]) ** 2).sum(axis=0)
+    return power
+
+
+def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
+    """(n_channels, n_lines) displacement per engineering unit."""
+    return np.array([displacement_factor(channel, frequency_hz) for channel in channels])

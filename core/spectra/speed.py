@@ -1,0 +1,134 @@
+"""The running speed, and how it is known."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.checks.sensor_checks import checked_speed
+from core.machine.unit import Unit
+from core.quality import Reading, Reason, missing, uncertain
+from core.spectra.key_phase import KeyPhase
+from core.spectra.lines import SegmentSettings, peak_frequency_hz
+from core.units import hz_from_rpm, rpm_from_hz
+
+LINE_SEARCH = (0.85, 1.15)
+"""Where the 1× line is looked for, in multiples of the speed that is expected."""
+
+
+KEY_PHASE_TOLERANCE = 0.02
+"""Relative difference of key-phase and speed channel, which is often no better than this."""
+
+LINE_SPREAD = 0.35
+"""Standard uncertainty of an interpolated line in bins, for a floor as strong as the line; it falls
+with the root of their powers' ratio. Found on simulated machines: 0.28 to 0.38."""
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Speed that the 1× line shows, with its relative standard uncertainty."""
+
+    rpm: float
+    u_relative: float
+
+
+class SpeedSource(StrEnum):
+    """Where the running speed came from; shown with every result."""
+
+    KEY_PHASE = "key_phase"
+    SLOW_CHANNEL = "slow_channel"
+    LINE = "line"
+    RATED = "rated"
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Running speed in r/min; without a value when the machine stands."""
+
+    rpm: Reading
+    source: SpeedSource
+
+
+def running_speed(
+    unit: Unit,
+    slow: Mapping[str, Reading],
+    frequency_hz: FloatArray,
+    shaft_power: FloatArray,
+    settings: SegmentSettings,
+    key_phase: KeyPhase | None = None,
+) -> Speed:
+    """Take the best speed there is: key-phase, else speed channel, else 1× line, else rated value.
+
+    One that the 1× line contradicts is doubted, and so is a key-phase that the speed channel
+    contradicts; one that no machine reaches is not used.
+
+    Parameters
+    ----------
+    slow
+        Slow readings of the same time.
+    frequency_hz, shaft_power : (n_lines,)
+        Power of the shaft channels together, in which the 1× line is looked for.
+    key_phase
+        What the pulses say, if they are one a turn.
+    """
+    slow_rpm = slow.get(unit.speed_channel) if unit.speed_channel else None
+    for source, measured in (
+        (SpeedSource.KEY_PHASE, _pulsed(key_phase, slow_rpm)),
+        (SpeedSource.SLOW_CHANNEL, slow_rpm),
+    ):
+        if measured is None or measured.value is None:
+            continue
+        if 0.0 <= measured.value < settings.min_speed_fraction * unit.rated_speed_rpm:
+            return Speed(missing(Reason.STANDSTILL), source)
+        line = _line(measured.value, frequency_hz, shaft_power, settings)
+        checked = checked_speed(
+            measured,
+            line.rpm if line else None,
+            unit.rated_speed_rpm,
+            settings.sensors,
+            line.u_relative if line else 0.0,
+        )
+        if checked.value is not None:
+            return Speed(checked, source)
+    doubtful = uncertain(Reason.SPEED_UNKNOWN)
+    line = _line(unit.rated_speed_rpm, frequency_hz, shaft_power, settings)
+    if line is not None:
+        return Speed(Reading(line.rpm, doubtful), SpeedSource.LINE)
+    return Speed(Reading(unit.rated_speed_rpm, doubtful), SpeedSource.RATED)
+
+
+def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | None:
+    """Speed by the key-phase, doubted where a speed channel says otherwise."""
+    if key_phase is None:
+        return None
+    other_rpm = slow_rpm.value if slow_rpm is not None else None
+    if other_rpm is None or abs(other_rpm - key_phase.speed_rpm) <= (
+        KEY_PHASE_TOLERANCE * key_phase.speed_rpm
+    ):
+        return Reading(key_phase.speed_rpm)
+    return Reading(key_phase.speed_rpm, uncertain(Reason.SPEED_IMPLAUSIBLE))
+
+
+def _line(
+    about_rpm: float,
+    frequency_hz: FloatArray,
+    shaft_power: FloatArray,
+    settings: SegmentSettings,
+) -> _Line | None:
+    """The 1× line near an expected speed, if it stands above its surroundings."""
+    about_hz = hz_from_rpm(about_rpm)
+    band_hz = (LINE_SEARCH[0] * about_hz, LINE_SEARCH[1] * about_hz)
+    line_hz = peak_frequency_hz(shaft_power, frequency_hz, band_hz)
+    if line_hz is None:
+        return None
+    around = (frequency_hz > 0.5 * about_hz) & (frequency_hz < 1.5 * about_hz)
+    top = shaft_power[np.argmin(np.abs(frequency_hz - line_hz))]
+    floor = float(np.median(shaft_power[around]))
+    if top <= settings.min_line_to_floor * floor:
+        return None
+    bin_hz = float(frequency_hz[1] - frequency_hz[0])
+    spread_hz = LINE_SPREAD * bin_hz * math.sqrt(floor / float(top))
+    return _Line(rpm_from_hz(line_hz), spread_hz / line_hz)

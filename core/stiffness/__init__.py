@@ -1,0 +1,1 @@
+"""The estimators of film stiffness and damping, their evidence and uncertainty."""

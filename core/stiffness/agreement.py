@@ -1,0 +1,143 @@
+"""Whether the estimators of one bearing agree on its film.
+
+Gains and the bracket's stiffness act on all estimators alike and cannot make them differ; what does
+not, and is stated, may.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.spectra.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
+from core.stiffness.dynamic import DynamicStiffness
+from core.stiffness.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, STATISTICS
+from core.stiffness.transfer import motion_across
+from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line
+
+FALSE_ALARM = 1e-6
+"""Probability that chance alone makes two estimates differ. A bearing has some 100,000 independent
+averages of five minutes a year with eight comparisons each: about one a year."""
+
+COMMON = frozenset({SHAFT_GAIN, BEARING_GAIN, BRACKET})
+
+
+def disagree(first: Budget, second: Budget) -> bool:
+    """Whether two results of one quantity differ by more than chance and stated limits explain."""
+    lines = [line for line in (*first.lines, *second.lines) if line.name not in COMMON]
+    random = [line for line in lines if line.kind is Kind.RANDOM]
+    spread = math.hypot(*(line.contribution for line in random))
+    limits = sum(
+        abs(line.sensitivity) * line.width for line in lines if line.kind is Kind.SYSTEMATIC
+    )
+    allowed = coverage_factor(random, 1.0 - FALSE_ALARM) * spread + limits
+    return abs(first.value - second.value) > allowed
+
+
+def contradicting(
+    budgets: Mapping[str, Budget],
+    found: DynamicStiffness | None,
+    orders: CrossSpectrum,
+    lines: Mapping[str, int],
+) -> set[str]:
+    """Names of the results of estimators that do not agree.
+
+    Where `dynamic` has found a film, `transfer` is compared with what it should find at its line;
+    without, the lines are compared with each other.
+
+    Parameters
+    ----------
+    budgets
+        Of all stiffnesses and dampings, by quantity.
+    orders
+        Cross-spectrum at the order lines.
+    lines
+        Where each stands in it, by the prefix of its quantities.
+    """
+    doubted: set[str] = set()
+    for row, (axes, along) in enumerate((("xx", SHAFT_X), ("yy", SHAFT_Y))):
+        at_lines = {
+            prefix: (budgets[f"{prefix}_transfer_k_{axes}_n_per_m"], budgets[c_name])
+            for prefix in lines
+            if (c_name := f"{prefix}_transfer_c_{axes}_n_s_per_m") in budgets
+        }
+        names = {
+            prefix: {name for name in budgets if name.startswith(prefix) and f"_{axes}_" in name}
+            for prefix in lines
+        }
+        if found is None:
+            if len(at_lines) > 1 and any(
+                itertools.starmap(disagree, zip(*at_lines.values(), strict=True))
+            ):
+                doubted = doubted.union(*names.values())
+            continue
+        of_row = list(_coefficients(row))
+        if not all(name in budgets for name in of_row):
+            continue
+        for prefix, measured in at_lines.items():
+            across = motion_across(orders, lines[prefix], along)
+            frequency_hz = float(orders.frequency_hz[lines[prefix]])
+            film = [budgets[name] for name in of_row]
+            expected = expected_transfer(found, film, row, frequency_hz, across)
+            if any(map(disagree, expected, map(_without_cross_coupling, measured))):
+                doubted |= names[prefix] | set(of_row)
+    return doubted
+
+
+def _coefficients(row: int) -> Iterator[str]:
+    for letter, unit in (("k", "n_per_m"), ("c", "n_s_per_m")):
+        for column in "xy":
+            yield f"dynamic_{letter}_{'xy'[row]}{column}_{unit}"
+
+
+def _without_cross_coupling(budget: Budget) -> Budget:
+    known = (line for line in budget.lines if line.name != CROSS_COUPLING)
+    return replace(budget, lines=tuple(known))
+
+
+def expected_transfer(
+    found: DynamicStiffness,
+    budgets: Sequence[Budget],
+    row: int,
+    frequency_hz: float,
+    across: complex,
+) -> tuple[Budget, Budget]:
+    """Stiffness and damping that `transfer` finds at a line if the film is that of `dynamic`.
+
+    Parameters
+    ----------
+    budgets
+        Of k_i1, k_i2, c_i1 and c_i2 of the row.
+    row
+        Direction of the force, 0 is x.
+    across
+        Shaft motion across this direction per motion along it.
+    """
+    omega = 2.0 * math.pi * frequency_hz
+    along = [1.0 + 0.0j, across] if row == 0 else [across, 1.0 + 0.0j]
+    film = np.array([*along, *(1j * omega * motion for motion in along)])
+    return (
+        _combined(budgets, film.real, found.covariance[row]),
+        _combined(budgets, film.imag / omega, found.covariance[row]),
+    )
+
+
+def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray) -> Budget:
+    """Budget of a sum of coefficients with their factors."""
+    random = math.sqrt(float(factors @ covariance @ factors))
+    systematic = zip(
+        *([line for line in b.lines if line.kind is Kind.SYSTEMATIC] for b in budgets), strict=True
+    )
+    return Budget(
+        float(factors @ [budget.value for budget in budgets]),
+        (
+            random_line(STATISTICS, random),
+            *(
+                replace(lines[0], sensitivity=float(factors @ [line.sensitivity for line in lines]))
+                for lines in systematic
+            ),
+        ),
+    )

@@ -1,0 +1,91 @@
+"""Whether a line carries enough of the machine's own motion to read a stiffness from."""
+
+from dataclasses import dataclass
+
+from core.quality import Reason
+from core.spectra.cross_spectrum import CrossSpectrum
+from core.spectra.lines import SegmentSettings
+
+CHANCE = 1e-6
+"""Probability with which noise alone may be as coherent as what a stiffness is read from."""
+
+
+def chance_coherence(n_segments: float) -> float:
+    """Squared coherence that two independent noises exceed once in a million averages.
+
+    Carter, Knapp and Nuttall (1973): without overlap, P(γ² > c) = (1 - c)^(n - 1).
+
+    Parameters
+    ----------
+    n_segments
+        Independent segments that are averaged, more than 1.
+    """
+    return float(1.0 - CHANCE ** (1.0 / (n_segments - 1.0)))
+
+
+@dataclass(frozen=True)
+class EvidenceSettings(SegmentSettings):
+    """Also what counts as evidence of a stiffness.
+
+    Parameters
+    ----------
+    min_segments
+        Below this number of segments a result is marked uncertain.
+    min_coherence
+        Squared coherence of shaft and bearing motion below which there is no stiffness. At 0.9, a
+        bearing line that is noise to the rest makes equation (5) read 5 % high.
+    min_coverage
+        Share of the wanted segments below which a result is marked uncertain.
+    """
+
+    min_segments: int = 4
+    min_coherence: float = 0.9
+    min_coverage: float = 0.5
+
+
+@dataclass(frozen=True)
+class LineLimits:
+    """What counts as excitation at one line.
+
+    Parameters
+    ----------
+    min_coherence
+        Squared coherence of shaft and bearing motion. At 0.9, a bearing line that is noise to the
+        rest makes equation (5) read 5 % high.
+    runout_um_pk
+        Largest runout that the shaft's surface may have at this line and that is not taken off;
+        zero away from the harmonics of the running speed. It is as coherent as motion, so that
+        amplitude alone can tell.
+    max_runout_share
+        Of the shaft's amplitude.
+    """
+
+    min_coherence: float = 0.9
+    runout_um_pk: float = 0.0
+    max_runout_share: float = 0.25
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.min_coherence <= 1.0:
+            raise ValueError(f"coherence lies between 0 and 1, got {self.min_coherence}")
+        if not (self.runout_um_pk >= 0.0 and self.max_runout_share > 0.0):
+            raise ValueError(
+                f"runout of {self.runout_um_pk} µm and share of {self.max_runout_share}"
+                " must be at least 0 and above 0"
+            )
+
+
+def line_excitation(
+    spectrum: CrossSpectrum, line: int, shaft: int, bearing: int, limits: LineLimits
+) -> Reason:
+    """Say whether `ratio` and `transfer` may speak at a line, and if not, why.
+
+    Returns
+    -------
+    OK, FEW_SEGMENTS or INSUFFICIENT_EXCITATION.
+    """
+    if spectrum.n_segments[shaft, bearing] < 2:
+        return Reason.FEW_SEGMENTS  # one segment is coherent with anything
+    shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
+    hidden = limits.runout_um_pk > limits.max_runout_share * shaft_um_pk
+    incoherent = float(spectrum.coherence(shaft, bearing)[line]) < limits.min_coherence
+    return Reason.INSUFFICIENT_EXCITATION if hidden or incoherent else Reason.OK

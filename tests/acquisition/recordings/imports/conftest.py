@@ -1,0 +1,188 @@
+"""A run of two waveform channels and a slow one, and jobs that read it back."""
+
+import gc
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from acquisition.delivery.raw import RawBlock
+from acquisition.recordings import reading as reading_module
+from acquisition.recordings.child import answer
+from acquisition.recordings.confined import printable
+from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
+from acquisition.recordings.reading import reading
+
+START_NS = 1_767_225_600_000_000_000
+PER_COUNT = 12.0 / 32768 * 250.0
+
+
+class _ReadingHere:
+    """Stands in for the reading process, and for its pipes: reads as soon as the job is closed."""
+
+    def __init__(self, path: Path, found: IO[bytes]) -> None:
+        self._path, self.found = path, found
+        self._job, self._last_words = b"", ""
+
+    @property
+    def job(self) -> "_ReadingHere":
+        return self
+
+    def write(self, job: bytes) -> None:
+        self._job += job
+
+    def close(self) -> None:
+        gc.freeze()  # only what the reader leaves behind is collected below
+        try:
+            with _without_warnings():
+                self._answer()
+                gc.collect()
+        finally:
+            gc.unfreeze()
+        self.found.seek(0)
+
+    def _answer(self) -> None:
+        try:
+            answer(self._path, TypeAdapter(ImportJob).validate_json(self._job), self.found)
+        except Exception as error:  # as the end of a process
+            self._last_words = traceback.format_exception_only(error)[-1].strip()
+
+    def last_words(self) -> str:
+        return printable(self._last_words)
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """A process that has read its file ends without closing it, and without a test to fail."""
+    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
+        warnings.simplefilter("ignore")
+        patch.setattr(sys, "unraisablehook", lambda _: None)
+        yield
+
+
+@contextmanager
+def _reads_here(_module: str, path: Path, _environment: object) -> Iterator[_ReadingHere]:
+    with tempfile.TemporaryFile() as found:
+        yield _ReadingHere(path.absolute(), found)
+
+
+@pytest.fixture
+def confined() -> None:
+    """Read in a process of its own, as in a plant; the other tests read within their own."""
+
+
+@pytest.fixture(autouse=True)
+def _reading_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if "confined" not in request.fixturenames:
+        monkeypatch.setattr(reading_module, "reading_process", _reads_here)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is in the file: a gap of 37 samples after 500, slow values once a second."""
+
+    index: np.ndarray = field(
+        default_factory=lambda: np.concatenate([np.arange(500), np.arange(537, 1300)])
+    )
+
+    @property
+    def since_start_s(self) -> np.ndarray:
+        """Of each sample, in whole microseconds."""
+        return np.floor(self.index * (1e6 / 600.0)) / 1e6
+
+    @property
+    def counts(self) -> np.ndarray:
+        return np.stack([self.index % 2**14, -self.index]).astype(np.int16)
+
+    @property
+    def units_um(self) -> np.ndarray:
+        """As float32 of full resolution."""
+        return (self.counts * PER_COUNT + 1 / 3).astype(np.float32)
+
+    slow_s = np.array([0.0, 1.0, 2.0])
+    slow_degc = np.array([40.5, 41.5, np.nan])
+
+
+@pytest.fixture
+def run() -> Run:
+    return Run()
+
+
+@pytest.fixture
+def job() -> ImportJob:
+    """Names are those of the files that the tests write; the time is elapsed seconds."""
+    return ImportJob(
+        format="csv",
+        rate_hz=600.0,
+        time=TimeAxis("column", 0, Place("time"), "elapsed_s", START_NS),
+        channels=(
+            ChannelColumn("x", Place("shaft x"), "um", 1.0, PER_COUNT),
+            ChannelColumn("y", Place("shaft y"), "um", 1.0, PER_COUNT),
+        ),
+        slow=(SlowColumn("oil", Place("oil"), "degC", 1.0, time=Place("oil time")),),
+    )
+
+
+@dataclass(frozen=True)
+class Found:
+    """All blocks of a file, put together."""
+
+    sample_type: str
+    blocks: list[RawBlock]
+
+    @property
+    def index(self) -> np.ndarray:
+        return np.concatenate([np.arange(b.first_index, b.stop_index) for b in self.blocks])
+
+    @property
+    def samples(self) -> np.ndarray:
+        return np.concatenate([b.counts for b in self.blocks], axis=1)
+
+
+@pytest.fixture
+def read() -> Callable[[Path, ImportJob], Found]:
+    def read_all(path: Path, job: ImportJob) -> Found:
+        with reading(path, job) as found:
+            return Found(found.sample_type, list(found.blocks()))
+
+    return read_all
+
+
+@pytest.fixture
+def read_text(
+    tmp_path: Path, job: ImportJob, read: Callable[[Path, ImportJob], Found]
+) -> Callable[..., Found]:
+    """Reads a text without slow values as CSV; keywords change the job."""
+
+    def read_it(text: str, **changes: Any) -> Found:
+        (tmp_path / "run.mf4").write_text(text)
+        return read(tmp_path / "run.mf4", replace(job, slow=(), **changes))
+
+    return read_it
+
+
+@pytest.fixture
+def placed() -> Callable[[ImportJob, str], ImportJob]:
+    """The same job with waveforms and slow values in groups."""
+
+    def in_groups(job: ImportJob, waveforms: str = "waveforms", slow: str = "slow") -> ImportJob:
+        return replace(
+            job,
+            time=replace(job.time, place=Place("time", waveforms)),
+            channels=tuple(replace(c, place=Place(c.place.name, waveforms)) for c in job.channels),
+            slow=tuple(
+                replace(c, place=Place(c.place.name, slow), time=Place("oil time", slow))
+                for c in job.slow
+            ),
+        )
+
+    return in_groups

@@ -1,0 +1,314 @@
+"""A file that is damaged, or means harm, ends in one sentence and in bounded memory."""
+
+import pickle
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import can
+import h5py
+import nptdms
+import numpy as np
+import pytest
+from rigs.hostile_files import Placed, Read, measured, refusal, write_hdf5
+
+from acquisition.errors import ConfigError
+from acquisition.recordings.imports.job import ImportJob, Place, TimeAxis
+from acquisition.recordings.reading import reading
+
+
+@pytest.fixture
+def csv_job(job: ImportJob) -> ImportJob:
+    return replace(job, slow=())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "column 'shaft x' is not there"),
+        (b"time,shaft x,shaft y\n0,1,2\n0.001,\x00,2\n", "line 3: has a NUL byte"),
+        (b"time,shaft x,shaft y\n0,1,2\n1,2\n", "line 3: 2 columns where the header has 3"),
+        (b"time,shaft x,shaft y\n0,1,2,3\n", "line 2: 4 columns where the header has 3"),
+        (b"time,shaft x,shaft y\n" + b"0" * 5_000_000, "line 2: longer than 1000000 bytes"),
+        (b"a" * 5_000_000, "line 1: longer than 1000000 bytes"),
+        (b"time,shaft x,shaft y\n0,eleven,2\n", "no number 'eleven'"),
+        (b"time,shaft x,shaft y\n0,=1+1,2\n", "no number '=1+1'"),
+        (b"time,shaft x,shaft y\nnan,1,2\n", "nan in the time column is no time"),
+        (b"time,shaft x,shaft y\n1e300,1,2\n", "in the time column is no time"),
+        (b"time,shaft x,shaft y\n9007199254,1,2\n", "a time of 1.07744e+10 s since 1970 is none"),
+        (b"time,shaft x,shaft y\n0,1_000,2\n", "line 2: or one of those before it: '_' in number"),
+        (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' is there 2 times"),
+        (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: not UTF-8 text"),
+        (b'time,shaft x,shaft y\n"0,1,2\n' * 2, "line 4: "),
+        (b'time,shaft x,shaft y\n"' + b"0,1,2\n" * 50_000, "field larger than field limit"),
+        (b"x," * 400_000 + b"\n", "400001 columns; at most 4096 are read"),
+    ],
+    ids=range(17),
+)
+def test_wrong_text_is_refused_naming_the_line(
+    tmp_path: Path, read: Read, csv_job: ImportJob, content: bytes, words: str
+) -> None:
+    (tmp_path / "run").write_bytes(content)
+    says = refusal(read, tmp_path / "run", csv_job)
+    assert words in says
+    assert "not readable as" not in says
+
+
+def test_a_file_that_is_none_is_refused(tmp_path: Path, read: Read, csv_job: ImportJob) -> None:
+    assert "No such file" in refusal(read, tmp_path / "absent", csv_job)
+    assert "not a regular file" in refusal(read, tmp_path, csv_job)
+
+
+@pytest.mark.long
+def test_a_million_columns_are_refused_or_read_in_bounded_memory(
+    tmp_path: Path, job: ImportJob, placed: Placed
+) -> None:
+    names = [f"channel {n}" for n in range(1_000_000)]
+    segment = b"".join(
+        struct.pack("<I", len(path)) + path + struct.pack("<II", 0xFFFFFFFF, 0)
+        for path in (f"/'g'/'{name}'".encode() for name in names)
+    )
+    meta = struct.pack("<I", len(names)) + segment
+    lead = b"TDSm" + struct.pack("<IIQQ", 0x6, 4713, len(meta), len(meta))
+    (tmp_path / "run.tdms").write_bytes(lead + meta)
+    tdms_job = replace(placed(job), format="tdms", slow=())
+    own_mb, child_mb, (said,) = measured(tdms_job, tmp_path / "run.tdms")
+    assert "is not there" in said or "needs more than 2 GiB" in said
+    assert own_mb < 200
+    assert child_mb < 2200
+
+
+def test_objects_that_were_pickled_are_never_loaded(
+    tmp_path: Path, read: Read, job: ImportJob
+) -> None:
+    class Evil:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return (Path.touch, (tmp_path / "harmed",))
+
+    (tmp_path / "run").write_bytes(pickle.dumps(Evil()))
+    for kind in ("csv", "hdf5", "tdms", "mdf4", "candump", "blf"):
+        assert refusal(read, tmp_path / "run", replace(job, format=kind))
+    array = np.array([Evil()], dtype=object)
+    np.save(tmp_path / "run.npy", array, allow_pickle=True)
+    for kind in ("csv", "hdf5", "tdms", "mdf4", "blf"):
+        assert refusal(read, tmp_path / "run.npy", replace(job, format=kind))
+    assert not (tmp_path / "harmed").exists()
+
+
+def test_an_archive_is_not_unpacked(tmp_path: Path, read: Read, job: ImportJob) -> None:
+    with zipfile.ZipFile(tmp_path / "run.mf4", "w") as archive:
+        archive.writestr("../../escaped.mf4", b"MDF     4.10    " + bytes(100))
+    says = refusal(read, tmp_path / "run.mf4", replace(job, format="mdf4"))
+    assert "not an MDF file of version 4" in says
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mf4"]
+
+
+@pytest.mark.usefixtures("confined")
+def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
+    lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
+    (tmp_path / "run").write_bytes(lead + struct.pack("<II", 1, 64) + b"\xff" * 64)
+    says = refusal(read, tmp_path / "run", replace(job, format="tdms", slow=()))
+    assert ": not readable as tdms: " in says
+
+
+def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: ImportJob) -> None:
+    with nptdms.TdmsWriter(tmp_path / "run") as file:
+        for group in ("a", "b"):
+            file.write_segment([nptdms.ChannelObject(group, "shaft x", np.zeros(5))])
+    one = replace(job.channels[0], place=Place("shaft x"))
+    start = TimeAxis("start", 0, start_ns=0)
+    both = replace(job, format="tdms", channels=(one,), slow=(), time=start)
+    assert "'shaft x' is there 2 times: name its group" in refusal(read, tmp_path / "run", both)
+
+
+@pytest.fixture
+def hdf5_job(job: ImportJob) -> ImportJob:
+    return replace(job, format="hdf5", slow=())
+
+
+def test_hdf5_links_to_elsewhere_are_not_followed(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob
+) -> None:
+    write_hdf5(tmp_path / "other")
+    write_hdf5(tmp_path / "external", shaft_x=h5py.ExternalLink("other", "/shaft x"))
+    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "external", hdf5_job)
+    write_hdf5(tmp_path / "soft", shaft_x=h5py.SoftLink("/shaft y"))
+    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "soft", hdf5_job)
+
+
+def test_hdf5_values_in_other_files_are_not_read(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob
+) -> None:
+    secret = tmp_path / "secret"
+    secret.write_bytes(bytes(800))
+    with h5py.File(tmp_path / "external", "w") as file:
+        file["time"] = file["shaft y"] = np.arange(100) / 600.0
+        file.create_dataset("shaft x", (100,), "f8", external=[(str(secret), 0, 800)])
+    says = "dataset 'shaft x' has its values in another file"
+    assert says in refusal(read, tmp_path / "external", hdf5_job)
+    write_hdf5(tmp_path / "other")
+    layout = h5py.VirtualLayout((100,), "f8")
+    layout[:] = h5py.VirtualSource(str(tmp_path / "other"), "shaft x", (100,))
+    with h5py.File(tmp_path / "virtual", "w") as file:
+        file["time"] = file["shaft y"] = np.arange(100) / 600.0
+        file.create_virtual_dataset("shaft x", layout)
+    assert says in refusal(read, tmp_path / "virtual", hdf5_job)
+
+
+@pytest.mark.parametrize("chunks", [None, (30,)])
+def test_hdf5_values_that_nobody_has_written_are_not_zeros(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob, chunks: tuple[int, ...] | None
+) -> None:
+    with h5py.File(tmp_path / "run", "w") as file:
+        file["time"] = file["shaft x"] = np.arange(100) / 600.0
+        begun = file.create_dataset("shaft y", (100,), "f4", chunks=chunks)
+        if chunks:
+            begun[:90] = 1.0
+    says = refusal(read, tmp_path / "run", hdf5_job)
+    assert "dataset 'shaft y' is longer than what was written of it" in says
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (np.zeros((100, 2)), "has shape (100, 2) of float64"),
+        (np.array([b"a"] * 100), "has shape (100,) of |S1"),
+        (np.zeros(100, np.complex128), "has shape (100,) of complex128"),
+        (np.zeros(0), "0 samples, column"),
+    ],
+    ids=["matrix", "text", "complex", "empty"],
+)
+def test_hdf5_values_that_are_no_numbers_in_a_row_are_refused(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob, values: np.ndarray, words: str
+) -> None:
+    write_hdf5(tmp_path / "run", shaft_y=values)
+    assert words in refusal(read, tmp_path / "run", hdf5_job)
+
+
+def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(
+    tmp_path: Path, hdf5_job: ImportJob
+) -> None:
+    packed = zlib.compress(bytes(2**20), 1)
+    with h5py.File(tmp_path / "declared", "w") as file:
+        for name in ("time", "shaft x", "shaft y"):
+            made = file.create_dataset(name, (2**30,), "i1", chunks=(2**25,), compression="gzip")
+            for n in range(32):
+                made.id.write_direct_chunk((n * 2**25,), packed)
+    with h5py.File(tmp_path / "packed", "w") as file:
+        for name in ("time", "shaft x", "shaft y"):
+            n_rows = 2**29 - 1
+            made = file.create_dataset(name, (n_rows,), "f4", chunks=(n_rows,), compression="gzip")
+            made.id.write_direct_chunk((0,), packed)
+    own_mb, child_mb, said = measured(hdf5_job, tmp_path / "declared", tmp_path / "packed")
+    assert "1073741824 samples per channel; 1 to 536870912 can be read" in said[0]
+    assert "'shaft x' has chunks of 2147483644 bytes; up to 67108864 can be read" in said[1]
+    assert max(own_mb, child_mb) < 200
+
+
+HEADER = 144
+OBJECT = struct.Struct("<4sHHLL")
+CONTAINER = struct.Struct("<H6xL4x")
+
+
+@pytest.fixture
+def blf_job(job: ImportJob) -> ImportJob:
+    return replace(job, format="blf", time=TimeAxis("file", 0), channels=(), slow=())
+
+
+@pytest.fixture
+def objects(tmp_path: Path) -> bytes:
+    """A hundred frames, as they are in a container."""
+    with can.BLFWriter(tmp_path / "sound", compression_level=0) as log:
+        for n in range(100):
+            log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes(8)))
+    return (tmp_path / "sound").read_bytes()[HEADER + OBJECT.size + CONTAINER.size :]
+
+
+def container(content: bytes, *, method: int = 0, n_bytes: int | None = None) -> bytes:
+    size = OBJECT.size + CONTAINER.size + len(content)
+    unpacked = len(content) if n_bytes is None else n_bytes
+    head = OBJECT.pack(b"LOBJ", OBJECT.size, 1, size, 10) + CONTAINER.pack(method, unpacked)
+    return head + content + bytes(size % 4)
+
+
+def write(path: Path, content: bytes, n_objects: int = 100, n_bytes: int | None = None) -> None:
+    size = HEADER + len(content) if n_bytes is None else n_bytes
+    head = struct.pack("<4sL8xQQL", b"LOGG", HEADER, size, size, n_objects)
+    path.write_bytes(head.ljust(HEADER, b"\0") + content)
+
+
+def n_frames(path: Path, job: ImportJob) -> int:
+    with reading(path, job) as found:
+        return sum(len(batch.times_ns) for batch in found.frames())
+
+
+def changed(objects: bytes, number: int, at: int, value: int) -> bytes:
+    """One of the objects with another number in its head."""
+    place = number * len(objects) // 100 + at
+    return objects[:place] + struct.pack("<H", value) + objects[place + 2 :]
+
+
+def test_objects_may_go_on_in_the_next_container(
+    tmp_path: Path, blf_job: ImportJob, objects: bytes
+) -> None:
+    packed = zlib.compress(objects[1001:])
+    both = container(objects[:1001]) + container(packed, method=2, n_bytes=len(objects) - 1001)
+    write(tmp_path / "run", both)
+    assert n_frames(tmp_path / "run", blf_job) == 100
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (lambda o: container(changed(o, 50, 8, 0)), "an object that is none"),  # for ever
+        (lambda o: container(changed(o, 50, 8, 60000)), "ends within an object"),
+        (lambda o: container(changed(o, 50, 6, 3)), "has 100 frames, of which 99 can be read"),
+        (lambda o: container(changed(o, 50, 12, 7)[: len(o) // 2]), "50 objects, the header says"),
+        (lambda o: container(o[:-20]), "cut off: it ends within an object"),
+        (lambda o: container(o[:96] + bytes(40) + o[96:]), "there is no object where one should"),
+        (lambda o: container(zlib.compress(o), method=1), "packed by method 1"),
+        (lambda o: container(zlib.compress(o)[:-9], method=2, n_bytes=len(o)), "is not of"),
+        (lambda o: container(zlib.compress(o), method=2, n_bytes=len(o) - 1), "is not of"),
+        (lambda _: container(b"\xff" * 99, method=2, n_bytes=9), "incorrect header check"),
+        (lambda o: o, "a frame outside of any container"),
+        (lambda _: OBJECT.pack(b"LOBJ", 16, 1, 20, 10) + bytes(4), "a container of 4 bytes"),
+    ],
+    ids=range(12),
+)
+def test_a_log_of_which_anything_is_missing_is_refused(
+    tmp_path: Path,
+    blf_job: ImportJob,
+    objects: bytes,
+    content: Callable[[bytes], bytes],
+    words: str,
+) -> None:
+    write(tmp_path / "run", content(objects))
+    with pytest.raises(ConfigError, match=words):
+        n_frames(tmp_path / "run", blf_job)
+
+
+def test_a_log_that_was_not_finished_is_refused(
+    tmp_path: Path, blf_job: ImportJob, objects: bytes
+) -> None:
+    write(tmp_path / "run", container(objects), n_objects=0, n_bytes=HEADER)
+    with pytest.raises(ConfigError, match=r"its header says 144: cut off, or whatever wrote it"):
+        n_frames(tmp_path / "run", blf_job)
+
+
+def test_a_container_that_unpacks_to_gigabytes_is_refused_in_little_memory(
+    tmp_path: Path, blf_job: ImportJob
+) -> None:
+    packer = zlib.compressobj(1)
+    block = packer.compress(bytes(2**24)) + packer.flush(zlib.Z_FULL_FLUSH)
+    packed = block + 255 * block[2:]  # without the head of the stream
+    declared, packed_more = tmp_path / "declared", tmp_path / "packed"
+    write(declared, container(packed, method=2, n_bytes=2**32 - 1))
+    write(packed_more, container(packed, method=2, n_bytes=1000))
+    own_mb, child_mb, said = measured(blf_job, declared, packed_more)
+    assert "from 4294967295 bytes" in said[0]
+    assert "is not of 1000 bytes" in said[1]
+    assert max(own_mb, child_mb) < 250

@@ -1,0 +1,324 @@
+"""What was written comes back: every count, every bit of every number, every gap."""
+
+import math
+import resource
+import struct
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from acquisition.delivery.calibration import (
+    ChannelCalibration,
+    SlowCalibration,
+    UnitCalibration,
+    calibrate,
+)
+from acquisition.delivery.raw import RawBlock
+from acquisition.errors import ConfigError
+from acquisition.recordings import reader, tables, writer
+from acquisition.recordings.inversion import raw_of
+from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.writer import RecordingWriter
+from core.arrays import CountArray, SampleArray
+from core.machine.unit import Measurand
+from core.samples.blocks import Rejection
+
+Numbered = Callable[..., RawBlock]
+
+WORDS = st.text(st.characters(codec="utf-8"), min_size=1, max_size=64)
+REJECTIONS = st.builds(Rejection, WORDS, st.integers(1, 999))
+
+
+def bits(block: RawBlock) -> tuple[object, ...]:
+    """Everything about a block, NaN and signed zero included, in a form that can be compared."""
+    slow = [struct.pack("<d", value) for value in block.slow]
+    counts = (block.counts.dtype.str, block.counts.shape, block.counts.tobytes())
+    return (
+        tuple(slow),
+        counts,
+        repr(replace(block, slow=(), counts=np.zeros((0, 0), np.int16))),
+    )
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[RawBlock]]:
+    """Any unit and any stream of blocks a device may deliver."""
+    n_channels, n_slow = draw(st.integers(1, 32)), draw(st.integers(0, 4))
+    number = st.floats(-1e6, 1e6).filter(bool)
+    sample_type = draw(st.sampled_from(["int16", "float32"]))
+    unit = RecordedUnit(
+        unit="U1",
+        rate_hz=draw(st.sampled_from([600.0, 1000 / 3])),
+        channels=tuple(
+            RecordedChannel(
+                id=f"c{n}",
+                measurand=draw(st.sampled_from(Measurand)),
+                full_scale_v=draw(st.floats(1e-3, 100.0)),
+                unit_per_v=draw(number),
+                ok_min_v=-100.0,
+                ok_max_v=draw(number),
+            )
+            for n in range(n_channels)
+        ),
+        slow_channels=tuple(
+            RecordedSlowChannel(id=f"s{n}", unit="degC", minimum=-10.0, maximum=draw(number))
+            for n in range(n_slow)
+        ),
+        sample_type=sample_type,
+        block_samples=draw(st.integers(1, 1000)),
+    )
+    blocks, epoch, index = [], draw(st.integers(0, 2**32)), draw(st.integers(0, 2**50))
+    for _ in range(draw(st.integers(1, 6))):
+        if draw(st.booleans()):
+            epoch, index = epoch + draw(st.integers(1, 2**32)), 0
+        rejected = draw(st.lists(REJECTIONS, max_size=3))
+        index += sum(r.n_samples for r in rejected) + draw(st.sampled_from([0, 0, 1, 10**6]))
+        n_samples = draw(st.integers(1, 9))
+        counts = draw(arrays(sample_type, (n_channels, n_samples)))
+        flags = st.lists(st.booleans(), min_size=n_channels, max_size=n_channels)
+        slow = st.lists(st.floats(), min_size=n_slow, max_size=n_slow)
+        blocks.append(
+            RawBlock(
+                epoch=epoch,
+                first_index=index,
+                start_ns=draw(st.integers(-(2**62), 2**62)),
+                rate_hz=unit.rate_hz,
+                counts=counts,
+                ok=tuple(draw(flags)),
+                slow=tuple(draw(slow)),
+                rejected=tuple(rejected),
+            )
+        )
+        index += n_samples
+    return unit, blocks
+
+
+@settings(max_examples=30, deadline=None)
+@given(recordings())
+def test_any_stream_of_blocks_comes_back_bit_for_bit(
+    recording: tuple[RecordedUnit, list[RawBlock]],
+) -> None:
+    unit, blocks = recording
+    with tempfile.TemporaryDirectory() as parent:
+        folder = Path(parent) / "recording"
+        with RecordingWriter(folder, unit, "a test") as recorder:
+            for block in blocks:
+                recorder.write(block)
+        opened = open_recording(folder)
+        assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
+        manifest = opened.manifest
+        assert RecordedUnit(**{name: getattr(manifest, name) for name in dict(unit)}) == unit
+        assert manifest.calibration == unit.calibration
+        assert manifest.calibration.block_samples == unit.block_samples
+        assert (manifest.n_blocks, manifest.n_samples) == (
+            len(blocks),
+            sum(block.counts.shape[1] for block in blocks),
+        )
+
+
+@pytest.mark.parametrize("n_each", [1, 7, 64, 200])
+def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
+    record: Callable[..., Path], numbered: Numbered, monkeypatch: pytest.MonkeyPatch, n_each: int
+) -> None:
+    for module in (writer, reader):
+        monkeypatch.setattr(module, "ROWS_PER_GROUP", 200)
+        monkeypatch.setattr(module, "BLOCKS_PER_GROUP", 10)
+    blocks = [numbered(n_each * n, n_each) for n in range(900 // n_each + 3)]
+    opened = open_recording(record(blocks))
+    assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
+    assert list(map(bits, opened.raw_blocks(3))) == list(map(bits, blocks[3:]))
+    with tables.parquet_file(
+        opened.folder / "samples.parquet",
+        tables.samples_schema(opened.manifest),
+        opened.manifest.n_samples,
+        200,
+    ) as file:
+        assert file.num_row_groups == -(-opened.manifest.n_samples // 200) > 4
+
+
+def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    folder = tmp_path / "run"
+    with RecordingWriter(folder, unit, "a test") as recorder:
+        recorder.write(numbered(0, 10))
+        assert [path.name for path in tmp_path.iterdir()] == ["run.incomplete"]
+        with pytest.raises(
+            ConfigError, match=r"run\.incomplete: no manifest.json, so no recording"
+        ):
+            open_recording(tmp_path / "run.incomplete")
+        with pytest.raises(ConfigError, match=r"run\.incomplete: is there already: being"):
+            RecordingWriter(folder, unit, "another")
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    with pytest.raises(ConfigError, match="run: is there already"):
+        RecordingWriter(folder, unit, "another")
+    assert open_recording(folder).manifest.n_samples == 10
+
+
+def test_a_disk_that_is_full_in_the_end_keeps_no_half_recording(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writer = RecordingWriter(tmp_path / "run", unit, "a test")
+    writer.write(numbered(0, 50))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, most))
+    try:
+        with pytest.raises(ConfigError, match=r"run\.incomplete: .*File too large"), writer:
+            pass
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
+) -> None:
+    broken_off = RecordingWriter(tmp_path / "a", unit, "x")
+    broken_off.write(numbered(0, 10))
+    with pytest.raises(ZeroDivisionError), broken_off:
+        _ = 1 / 0
+    empty = RecordingWriter(tmp_path / "b", unit, "x")
+    with pytest.raises(ConfigError, match="nothing was recorded"):
+        empty.finish()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"rate_hz": 500.0}, "at 500.0 Hz in a recording at 600.0 Hz"),
+        ({"counts": np.zeros((3, 5), np.int16)}, "3 channels"),
+        ({"counts": np.zeros((2, 5), np.int32)}, "int32"),
+        (
+            {"counts": np.zeros((2, 5), np.float32)},
+            "as float32, to be recorded are 2 and 2 as int16",
+        ),
+        ({"counts": np.zeros((2, 0), np.int16)}, "0 samples"),
+        ({"counts": np.zeros((2, 131_073), np.int16)}, "131073 samples"),
+        ({"ok": (True,)}, "block of"),
+        ({"slow": (math.nan,)}, "1 slow values"),
+        ({"first_index": -1}, "first index -1"),
+        ({"epoch": 2**60}, "epoch 1152921504606846976"),
+        ({"rejected": (Rejection("torn", 11),)}, "11 samples rejected in a jump of 10"),
+        ({"rejected": (Rejection("x" * 65, 1),)}, "reason of 1 to 64 letters"),
+    ],
+    ids=str,
+)
+def test_what_the_reader_would_refuse_is_not_written(
+    tmp_path: Path,
+    unit: RecordedUnit,
+    numbered: Numbered,
+    changes: dict[str, object],
+    words: str,
+) -> None:
+    recorder = RecordingWriter(tmp_path / "run", unit, "x")
+    recorder.write(numbered(0, 10))
+    with pytest.raises(ConfigError, match=words):
+        recorder.write(replace(numbered(20, 10), **changes))
+    recorder.write(numbered(20, 10, rejected=(Rejection("torn", 10),)))
+    assert recorder.finish().n_blocks == 2
+
+
+def test_a_manifest_says_when_it_began_and_who_made_it(
+    record: Callable[..., Path], numbered: Numbered
+) -> None:
+    first = numbered(0, 50, start_ns=1_767_225_600_008_333_333)
+    manifest = open_recording(record([first, numbered(50, 50)])).manifest
+    assert manifest.start == "2026-01-01T00:00:00.008333333Z"
+    assert manifest.made_by == "padwatch in a test"
+
+
+@pytest.mark.parametrize("is_calibrated", [True, False])
+@pytest.mark.parametrize("dtype", [np.int16, np.float32])
+def test_the_first_block_may_decide_what_is_recorded(
+    tmp_path: Path, unit: RecordedUnit, numbered: Numbered, dtype: type, is_calibrated: bool
+) -> None:
+    block = numbered(0, 50, counts=np.arange(100).reshape(2, 50).astype(dtype))
+    with RecordingWriter(tmp_path / "run", unit, "x", first_decides=True) as recorder:
+        if is_calibrated:
+            recorder.write_calibrated(calibrate(block, unit.calibration))
+        else:
+            recorder.write(block)
+    opened = open_recording(tmp_path / "run")
+    assert opened.manifest.sample_type == np.dtype(dtype).name
+    (found,) = opened.raw_blocks()
+    np.testing.assert_array_equal(found.counts, block.counts)
+
+
+EVERY_COUNT = np.arange(-32768, 32768, dtype=np.int16)
+
+
+@settings(deadline=None)
+@given(st.floats(1e-3, 100.0), st.floats(1e-6, 1e6), st.sampled_from([1.0, -1.0]))
+def test_every_count_is_found_again_whatever_the_gain(
+    full_scale_v: float, unit_per_v: float, sign: float
+) -> None:
+    channel = ChannelCalibration(full_scale_v, sign * unit_per_v, -200.0, 200.0)
+    calibration = UnitCalibration("U1", 600.0, (channel,), ())
+    raw = RawBlock(1, 0, 0, 600.0, EVERY_COUNT[np.newaxis], (True,), ())
+    found = raw_of(calibrate(raw, calibration), calibration)
+    assert found.counts.dtype == np.int16
+    np.testing.assert_array_equal(found.counts, raw.counts)
+
+
+@given(
+    st.one_of(arrays(np.int16, (2, 5)), arrays(np.float32, (2, 5), elements=st.floats(width=32))),
+    st.tuples(st.booleans(), st.booleans()),
+    st.tuples(st.floats(), st.floats(-11.0, 121.0)),
+)
+def test_what_was_judged_is_judged_the_same_again(
+    samples: CountArray | SampleArray, ok: tuple[bool, bool], slow: tuple[float, float]
+) -> None:
+    channel = ChannelCalibration(12.0, 250.0, 1.0, 11.0)
+    limits = (SlowCalibration("a", -10.0, 120.0), SlowCalibration("b", -10.0, 120.0))
+    calibration = UnitCalibration("U1", 600.0, (channel, channel), limits)
+    block = calibrate(RawBlock(1, 0, 0, 600.0, samples, ok, slow), calibration)
+    raw = raw_of(block, calibration, samples.dtype)
+    assert raw.counts.dtype == samples.dtype
+    again = calibrate(raw, calibration)
+    assert again.channel_quality == block.channel_quality
+    assert again.slow == block.slow
+    assert again.samples.tobytes() == block.samples.tobytes()
+
+
+@pytest.mark.parametrize("wrong", [0.5, math.nan, math.inf, 1e6])
+def test_samples_that_never_were_counts_are_refused(
+    unit: RecordedUnit, numbered: Numbered, wrong: float
+) -> None:
+    block = calibrate(numbered(70, 5), unit.calibration)
+    block.samples[1, 2] += np.float32(wrong) * np.float32(250.0 * 12.0 / 32768)
+    with pytest.raises(ConfigError, match="'U1' from index 70 on are not those of a 16-bit"):
+        raw_of(block, unit.calibration)
+
+
+def test_another_unit_or_calibration_is_refused(unit: RecordedUnit, numbered: Numbered) -> None:
+    block = calibrate(numbered(0, 5), unit.calibration)
+    for other in (
+        replace(unit.calibration, unit="U2"),
+        replace(unit.calibration, slow=unit.calibration.slow[:1]),
+        replace(unit.calibration, channels=unit.calibration.channels[:1]),
+        replace(
+            unit.calibration,
+            channels=tuple(replace(c, unit_per_v=-251.0) for c in unit.calibration.channels),
+        ),
+    ):
+        with pytest.raises(ConfigError, match="not those"):
+            raw_of(block, other)
+
+
+def test_a_channel_with_a_sample_that_was_none_has_none_in_the_recording(
+    unit: RecordedUnit, numbered: Numbered
+) -> None:
+    samples = np.array([[100.0, math.nan, 100.0], [200.0, 200.0, 200.0]], np.float32)
+    block = calibrate(numbered(0, 3, counts=samples), unit.calibration)
+    raw = raw_of(block, unit.calibration, np.float32)
+    assert np.isnan(raw.counts[0]).all()
+    np.testing.assert_array_equal(raw.counts[1], samples[1])

@@ -1,0 +1,248 @@
+"""The simulated CAN DAQ: examples, pace, end and faults; and links to simulated serial lines."""
+
+import asyncio
+import itertools
+import os
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rigs.can import shape_of
+from rigs.tiers import fast_and_long
+
+from acquisition.clock import SystemClock
+from acquisition.delivery.raw import FeedEndedError
+from acquisition.errors import ConfigError, LinkError
+from acquisition.simulated.devices.can_bus import CanBusServer
+from acquisition.simulated.devices.can_dbc import daq_dbc
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, dbc_name
+from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice
+from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+
+SHAPE = CanShape(
+    channels=(DaqSignal("a", "V"), DaqSignal("b", "V")),
+    slow=(DaqSignal("s", "MW"), DaqSignal("t", "MW")),
+)
+
+
+class EndingFeed:
+    """A counting feed that ends."""
+
+    def __init__(self, feed, n_blocks: int) -> None:
+        self._feed, self._n_blocks = feed, n_blocks
+
+    def advance(self, n_samples: int):
+        if self._n_blocks == 0:
+            raise FeedEndedError
+        self._n_blocks -= 1
+        return self._feed.advance(n_samples)
+
+
+class Terminal:
+    """Whoever has an slcan adapter in hand."""
+
+    def __init__(self, endpoint) -> None:
+        self._port = int(endpoint["channel"].rpartition(":")[2])
+
+    async def __aenter__(self) -> "Terminal":
+        self.reader, self.writer = await asyncio.open_connection("127.0.0.1", self._port)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.writer.close()
+
+    async def ask(self, command: bytes) -> bytes:
+        self.writer.write(command)
+        return await self.reader.read(1)
+
+
+@pytest.fixture
+def device(counting_feed) -> CanDevice:
+    return CanDevice(counting_feed(), SHAPE)
+
+
+async def test_an_adapter_answers_commands_refuses_to_send_and_has_frames_when_open(device):
+    async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as terminal:
+        answers = [await terminal.ask(c + b"\r") for c in (b"C", b"S6", b"Y2", b"t1230", b"L")]
+        assert answers == [b"\r", b"\r", b"\r", b"\a", b"\r"]
+        assert dict(server.commands) == {"C": 1, "S": 1, "Y": 1, "t": 1, "L": 1}
+        assert await terminal.reader.readuntil(b"\r") == b"t10080000000007000000\r"
+        assert await terminal.reader.readuntil(b"\r") == b"t10180000320003000000\r"
+
+
+async def test_a_second_reader_takes_the_place_of_the_first(device):
+    async with SlcanTcpServer(device) as server, Terminal(server.endpoint) as first:
+        await first.ask(b"L\r")
+        async with Terminal(server.endpoint) as second:
+            while await first.reader.read(10_000):
+                pass
+            assert await second.ask(b"L\r") == b"\r"
+
+
+@pytest.mark.parametrize("server_kind", [SlcanTcpServer, SlcanPtyServer, CanBusServer])
+async def test_an_unknown_fault_is_refused_with_those_there_are(server_kind, device):
+    async with server_kind(device) as server:
+        with pytest.raises(LookupError, match=r"no fault 'melt'; there are .*drop.*freeze"):
+            server.inject("melt")
+
+
+async def test_a_bus_without_text_has_no_faults_of_text_and_cannot_be_cut(device):
+    async with CanBusServer(device) as server:
+        with pytest.raises(LookupError, match="long_line"):
+            server.inject("long_line")
+        with pytest.raises(LookupError, match=r"no fault 'cut'; there are bus_off, drop"):
+            server.inject("cut")
+
+
+async def test_a_port_in_use_is_an_error_that_names_it(device):
+    async with SlcanTcpServer(device) as first:
+        where = first.endpoint["channel"].removeprefix("socket://")
+        with pytest.raises(LinkError, match=f"cannot listen on {where}"):
+            await SlcanTcpServer(device, port=int(where.rpartition(":")[2])).__aenter__()
+
+
+async def test_a_device_that_nobody_reads_stays_bounded(device):
+    device.produce(10_000)
+    n_waiting = 0
+    while device.has_frames:
+        frames = device.next_frames()
+        n_waiting += 1
+    assert n_waiting == 64
+    assert device.ledger.n_samples("U1") == 10_001 * 50
+    assert int.from_bytes(frames[0].data[:4], "little") == 10_000 * 50
+
+
+@pytest.mark.parametrize("patient", [True, False], ids=["patient", "on demand"])
+async def test_a_daq_that_waits_for_its_reader_loses_nothing_and_ends(
+    counting_feed, stepped_clock, patient
+):
+    device = CanDevice(EndingFeed(counting_feed(), 300), SHAPE)
+    how = {"clock": stepped_clock, "patient": True} if patient else {"on_demand": True}
+    async with SlcanTcpServer(device, **how) as server:
+        for _ in range(100):
+            await asyncio.sleep(0)
+        assert stepped_clock.monotonic_s() == 0.0
+        async with Terminal(server.endpoint) as terminal:
+            await terminal.ask(b"L\r")
+            running = asyncio.create_task(server.run())
+            text = b""
+            while text.count(b"t100") < 300:
+                text += await terminal.reader.read(65536)
+            await running
+    heads = [line for line in text.split(b"\r") if line.startswith(b"t100")]
+    first = [int.from_bytes(bytes.fromhex(h[5:13].decode()), "little") for h in heads]
+    assert first == [50 * n for n in range(300)]
+    assert device.ledger.n_samples("U1") == 300 * 50
+    assert not patient or stepped_clock.monotonic_s() >= 299 * 50 / 600.0
+
+
+async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
+    device = CanDevice(EndingFeed(counting_feed(), 3), SHAPE)
+    async with SlcanTcpServer(device, SystemClock()) as server:
+        while not device.ended:
+            await asyncio.sleep(0.01)
+        assert server.commands == {}
+
+
+def test_a_feed_that_does_not_fit_the_shape_is_refused(counting_feed):
+    with pytest.raises(ConfigError, match=r"\(3, 2\) in the feed, \(2, 2\)"):
+        CanDevice(counting_feed(n_channels=3), SHAPE)
+    with pytest.raises(ConfigError, match=r'need the profile "padwatch_int16", not "padwatch_f'):
+        CanDevice(counting_feed(), replace(SHAPE, floats=True))
+
+
+DEPLOY = Path(__file__).parents[4] / "deploy"
+COUNTS = 32768
+
+
+def demo_shape(**others) -> CanShape:
+    unit = tomllib.loads((DEPLOY / "demo.toml").read_text(encoding="utf-8"))["unit"][0]
+    return CanShape(
+        channels=tuple(
+            DaqSignal(c["id"], "V", c["full_scale_v"] / COUNTS) for c in unit["channel"]
+        ),
+        slow=tuple(DaqSignal(s["id"], s["unit"]) for s in unit["slow_channel"]),
+        **others,
+    )
+
+
+@pytest.mark.parametrize(("name", "fd"), [("demo_classic.dbc", False), ("demo_fd.dbc", True)])
+def test_an_example_is_what_the_simulated_daq_sends(name, fd):
+    text = (DEPLOY / "can" / name).read_text(encoding="utf-8")
+    assert text == daq_dbc(demo_shape(fd=fd))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"base_id": 0x7FF}, "base_id is 2047"),
+        ({"base_id": -1}, "base_id is -1"),
+        ({"channels": ()}, "0 channels"),
+        ({"channels": tuple(DaqSignal(f"c{n}", "V") for n in range(33))}, "33 channels"),
+    ],
+)
+def test_a_shape_that_does_not_fit_is_refused(wrong, words):
+    with pytest.raises(ConfigError, match=words):
+        CanShape(**{"channels": (DaqSignal("x", "V"),)} | wrong)
+
+
+def test_an_id_becomes_a_name_that_dbc_allows():
+    assert [dbc_name(i) for i in ("ujb.shaft-x", "1x", "µ")] == ["ujb_shaft_x", "_1x", "_"]
+
+
+@pytest.mark.parametrize("numbers", fast_and_long((1, 4, 9, 31, 32), range(1, 33)))
+@pytest.mark.parametrize("n_slow", [0, 1, 10, 11, 50])
+@pytest.mark.parametrize(("fd", "floats"), [*itertools.product((False, True), repeat=2)])
+def test_every_number_of_channels_fits(numbers, n_slow, fd, floats):
+    slow = tuple(DaqSignal(f"s{n}", "MW") for n in range(n_slow))
+    for n_channels in numbers:
+        channels = tuple(DaqSignal(f"c{n}", "V") for n in range(n_channels))
+        shape = CanShape(channels=channels, slow=slow, fd=fd, floats=floats)
+        carried = [f.name for m in shape.messages for f in m.fields]
+        for channel in shape.channels:
+            names = list(shape.sample_names(channel.id))
+            assert [name for name in carried if name in names] == names
+        assert all(m.length <= (64 if fd else 8) for m in shape.messages)
+
+
+@pytest.fixture(params=["modbus", "can"])
+def serve(request, counting_feed, counts_calibration):
+    def served(link: Path):
+        if request.param == "modbus":
+            return ModbusRtuServer(RingDevice(counting_feed()), link=link)
+        shape = shape_of(counts_calibration(), fd=False)
+        return SlcanPtyServer(CanDevice(counting_feed(), shape), link=link)
+
+    return served
+
+
+async def test_what_a_killed_daq_left_behind_is_replaced_and_cleared(serve, tmp_path):
+    line = tmp_path / "line"
+    line.symlink_to("/dev/pts/99999")
+    async with serve(line):
+        assert line.is_char_device()
+    assert not line.is_symlink()
+
+
+@pytest.mark.parametrize("what", ["a port", "a port by its id", "a file"])
+async def test_the_port_of_a_real_device_is_never_taken_away(serve, tmp_path, what):
+    line = tmp_path / "line"
+    if what == "a port by its id":
+        line.symlink_to("/dev/ttyUSB0")
+    elif what == "a file":
+        line.write_text("kept")
+    else:
+        os.mkfifo(line)
+    before = line.lstat()
+    with pytest.raises(ConfigError, match=f"{line}: something else is there; .* a free name"):
+        await serve(line).__aenter__()
+    after = line.lstat()
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+
+
+async def test_a_link_that_cannot_be_made_is_a_lost_link(serve, tmp_path):
+    with pytest.raises(LinkError, match="nowhere/line: cannot be made: No such file"):
+        await serve(tmp_path / "nowhere" / "line").__aenter__()

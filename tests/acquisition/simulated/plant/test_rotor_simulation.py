@@ -1,0 +1,121 @@
+import numpy as np
+import pytest
+
+from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.rotor import (
+    bearing_response,
+    bracket_motion,
+    force_map,
+    forward_force,
+    relative_motion,
+    rotor_matrices,
+)
+from acquisition.simulated.plant.rotor_discrete import DiscreteRotor, Hold, discretize
+from acquisition.simulated.plant.rotor_parameters import ForcePlane, RotorParameters
+from acquisition.simulated.plant.rotor_simulation import lift, simulate
+from core.arrays import FloatArray
+
+PARAMETERS = RotorParameters()
+FILMS = {
+    "UJB": Film.proportional(0.69e9, 0.69e9),
+    "LJB": Film.proportional(0.37e9, 0.37e9),
+    "TJB": Film.proportional(1.5e9, 1.5e9),
+}
+MATRICES = rotor_matrices(PARAMETERS, FILMS, 92.3)
+PLANES = tuple(ForcePlane)
+RATE_HZ = 600.0
+
+
+def discrete_rotor(hold: Hold = Hold.ZERO) -> DiscreteRotor:
+    forces = np.hstack([force_map(PARAMETERS, plane) for plane in PLANES])
+    displacement = np.vstack([relative_motion(PARAMETERS), bracket_motion(PARAMETERS)])
+    outputs = np.hstack([displacement, np.zeros_like(displacement)])
+    return discretize(MATRICES, forces, outputs, RATE_HZ, hold)
+
+
+def step_by_step(
+    rotor: DiscreteRotor, state: FloatArray, forces: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    outputs = np.empty((rotor.output_map.shape[0], forces.shape[1]))
+    for n in range(forces.shape[1]):
+        outputs[:, n] = rotor.output_map @ state + rotor.feedthrough @ forces[:, n]
+        state = rotor.transition @ state + rotor.input_map @ forces[:, n]
+    return outputs, state
+
+
+@pytest.mark.parametrize("hold", Hold)
+@pytest.mark.parametrize("n_steps", [1, 2, 32, 64])
+def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps: int, hold: Hold) -> None:
+    rotor = discrete_rotor(hold)
+    forces = 1.0e4 * np.random.default_rng(1).standard_normal((6, 1280))
+    state = np.random.default_rng(2).standard_normal(20) * 1.0e-5
+
+    expected, expected_state = step_by_step(rotor, state, forces)
+    outputs, after = simulate(lift(rotor, n_steps), state, forces)
+
+    assert np.abs(outputs - expected).max() <= 1e-11 * np.abs(expected).max()
+    assert np.abs(after - expected_state).max() <= 1e-11 * np.abs(expected_state).max()
+
+
+def test_a_run_in_two_parts_equals_the_run_in_one() -> None:
+    rotor = lift(discrete_rotor(), 32)
+    forces = 1.0e4 * np.random.default_rng(3).standard_normal((6, 640))
+
+    whole, _ = simulate(rotor, np.zeros(20), forces)
+    first, state = simulate(rotor, np.zeros(20), forces[:, :192])
+    second, _ = simulate(rotor, state, forces[:, 192:])
+
+    assert np.hstack([first, second]) == pytest.approx(whole, rel=1e-11, abs=1e-18)
+
+
+def test_a_held_force_settles_where_the_springs_balance_it() -> None:
+    forces = np.zeros((6, 600 * 60))
+    forces[4] = 1.0e5
+    outputs, _ = simulate(lift(discrete_rotor(), 32), np.zeros(20), forces)
+
+    pull = force_map(PARAMETERS, ForcePlane.RUNNER) @ np.array([1.0e5 + 0j, 0.0])
+    response = bearing_response(PARAMETERS, MATRICES, 0.0, pull)
+    static = np.concatenate(
+        [
+            part
+            for half in (slice(0, 2), slice(2, 4))
+            for part in (r[half] for r in response.values())
+        ]
+    ).real
+    assert outputs[:, -1] == pytest.approx(static, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("hold", Hold)
+@pytest.mark.parametrize("plane", PLANES)
+def test_steady_state_under_a_rotating_force_is_the_frequency_response(
+    plane: ForcePlane, hold: Hold
+) -> None:
+    frequency_hz = 92.3 / 60.0
+    # A force held for a step acts half a step late.
+    acting_s = (np.arange(600 * 60) + (0.5 if hold is Hold.ZERO else 0.0)) / RATE_HZ
+    angle = 2.0 * np.pi * frequency_hz * acting_s
+    forces = np.zeros((6, acting_s.size))
+    row = 2 * PLANES.index(plane)
+    forces[row : row + 2] = 75.6e3 * np.array([np.cos(angle), np.sin(angle)])
+
+    outputs, _ = simulate(lift(discrete_rotor(hold), 32), np.zeros(20), forces)
+
+    force = forward_force(PARAMETERS, plane, 75.6e3)
+    response = bearing_response(PARAMETERS, MATRICES, frequency_hz, force)
+    end_s = np.arange(600 * 50, 600 * 60) / RATE_HZ
+    for index, bracket in enumerate(PARAMETERS.brackets):
+        phasor = response[bracket.bearing][:, np.newaxis]
+        expected = (phasor * np.exp(2j * np.pi * frequency_hz * end_s)).real
+        rows = [2 * index, 2 * index + 1, 6 + 2 * index, 7 + 2 * index]
+        # What a force in steps of 1/600 s loses: (π f / rate)² / 6 = 1.1e-5, twice that in ramps
+        assert np.abs(outputs[rows][:, 600 * 50 :] - expected).max() <= 3e-5 * np.abs(phasor).max()
+
+
+def test_forces_of_uneven_blocks_and_a_rate_of_zero_are_refused() -> None:
+    rotor = lift(discrete_rotor(), 32)
+    with pytest.raises(ValueError, match=r"\(6, 33\).*32 steps"):
+        simulate(rotor, np.zeros(20), np.zeros((6, 33)))
+    with pytest.raises(ValueError, match="at least 1 step"):
+        lift(discrete_rotor(), 0)
+    with pytest.raises(ValueError, match="above 0 Hz"):
+        discretize(MATRICES, np.zeros((10, 2)), np.zeros((12, 20)), 0.0)

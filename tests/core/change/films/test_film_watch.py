@@ -1,0 +1,194 @@
+"""Films watched result by result: the same verdicts as over their whole history."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.baseline.baseline import Watched
+from core.baseline.stiffness_history import Evidence
+from core.change.back_test import back_test
+from core.change.catching_up import decision_after, operation_after
+from core.change.film_finding import FilmFinding, alarm_condition
+from core.change.film_reading import film_reading
+from core.change.film_rules import FilmRules
+from core.change.operation_history import operation_history
+from core.change.verdict import JUDGED, Verdict
+from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel
+from core.quality import Reading, Reason, missing, uncertain
+
+S = 1_000_000_000
+
+
+def loss(size: float, day: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda hours: np.where(hours > day * 24.0, np.log(1.0 - size), 0.0)
+
+
+def test_results_one_by_one_are_judged_as_their_whole_history_is(
+    films: Any, rules: FilmRules
+) -> None:
+    history = films.later(change=loss(0.2, 106.0))
+    news = films.watched(history)
+
+    said = history.rows(1, len(history))  # the first interval may have begun before
+    settled = operation_history(
+        history.time_ns, history.speed_rpm, history.power_mw, rules.operating
+    ).is_settled[1:]
+    assert [n.reading.time_ns for n in news] == said.time_ns.tolist()
+    assert [n.reading.condition.is_settled for n in news] == settled.tolist()
+    for row, direction in enumerate("xy"):
+        learned = films.baseline.of(Watched.STIFFNESS, direction)
+        whole = back_test(said, settled, learned, rules.change)
+        findings = [n.findings[row] for n in news]
+        assert [f.verdict for f in findings] == whole.verdict.tolist()
+        assert [f.level or 0 for f in findings] == whole.level.tolist()
+        change = [np.nan if f.change is None else f.change for f in findings]
+        np.testing.assert_allclose(change, whole.change, rtol=1e-12)
+        assert findings[-1].level is not None
+        assert findings[-1].baseline_version == 4
+
+
+def test_a_restart_in_the_middle_changes_no_verdict(films: Any, rules: FilmRules) -> None:
+    history = films.later(change=loss(0.1, 106.0))
+    through = films.watched(history)
+    n = len(history) // 2
+    first = films.watched(history.rows(0, n))
+
+    after = films.watch(has_baseline=False)
+    after.judge.put_in_force("UJB", films.baseline, first[-1].decisions)
+    operation, oil = operation_after(history.rows(n - 200, n), rules)
+    after.go_on(operation, {"UJB": oil})
+    second = films.watched(history.rows(n - 1, len(history)), after)
+
+    assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]
+
+
+def test_decisions_caught_up_with_are_those_that_would_have_been_made(
+    films: Any, rules: FilmRules
+) -> None:
+    history = films.later()
+    made = films.watched(history)
+    settled = np.array([n.reading.condition.is_settled for n in made])
+    for row, direction in enumerate("xy"):
+        learned = films.baseline.of(Watched.STIFFNESS, direction)
+        caught = decision_after(history.rows(1, len(history)), settled, learned, rules)
+        through = made[-1].decisions[row]
+        assert (caught.verdict, caught.level) == (through.verdict, through.level)
+        assert caught.evidence.n_counted == through.evidence.n_counted
+        assert caught.finding is not None
+        assert through.finding is not None
+        assert caught.finding.change == pytest.approx(through.finding.change, rel=1e-9)
+
+
+def test_without_a_baseline_nothing_is_called_normal(films: Any) -> None:
+    news = films.watched(films.life(3, days=2), films.watch(has_baseline=False))
+    verdicts = {finding.verdict for told in news for finding in told.findings}
+    assert verdicts == {Verdict.NO_BASELINE, Verdict.TRANSIENT}
+
+
+def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(films: Any) -> None:
+    watch = films.watch(has_baseline=False)
+    times = [1_000_000 * S + i * 12 * S for i in range(500)]
+    found = [watch.take([films.assessment(time_ns)])[1] for time_ns in times]
+    marks = [news[0].reading.time_ns for news in found if news]
+    assert len(marks) == 500 * 12 // 600
+    assert all(time_ns // (600 * S) != (time_ns - 12 * S) // (600 * S) for time_ns in marks)
+
+
+@pytest.mark.parametrize("back_s", [300, 3 * 3600, 400 * 86_400])
+def test_a_clock_that_is_put_back_stops_neither_operation_nor_readings(
+    films: Any, back_s: int
+) -> None:
+    history, watch = films.later(), films.watch()
+    films.watched(history.rows(0, 60), watch)
+    again = replace(history, time_ns=history.time_ns - back_s * S).rows(60, 400)
+
+    news = films.watched(again, watch)
+
+    assert len(news) >= 330
+    assert news[-1].findings[0].verdict in (*JUDGED, Verdict.TRANSIENT)
+    assert any(told.findings[0].verdict in JUDGED for told in news)
+
+
+def test_doubtful_numbers_are_no_numbers(films: Any, rules: FilmRules) -> None:
+    good = {
+        "eccentricity_ratio": Reading(0.4),
+        "oil_temperature_c": Reading(45.0),
+        "dynamic_k_xx_n_per_m": Reading(0.5e9, u_random=0.01e9),
+        "dynamic_k_yy_n_per_m": Reading(0.5e9, uncertain(Reason.LOW_COVERAGE), u_random=0.01e9),
+    }
+    condition = films.watch(has_baseline=False).take([films.assessment(**good)])[0][0].condition
+    assert condition is not None
+    x, y = film_reading(films.assessment(**good), condition, rules.estimators["UJB"]).values
+    assert (x.evidence, x.ln_k, x.u_random) == (Evidence.MEASURED, np.log(0.5e9), 0.02)
+    assert (y.evidence, y.reason) == (Evidence.BAD_QUALITY, Reason.LOW_COVERAGE)
+    assert np.isnan(y.ln_k)
+
+    cold = good | {"oil_temperature_c": missing(Reason.OUT_OF_RANGE)}
+    x, _ = film_reading(films.assessment(**cold), condition, rules.estimators["UJB"]).values
+    assert (x.evidence, x.reason) == (Evidence.BAD_QUALITY, Reason.OUT_OF_RANGE)
+
+    still = good | {"dynamic_k_xx_n_per_m": missing(Reason.INSUFFICIENT_EXCITATION)}
+    x, _ = film_reading(films.assessment(**still), condition, rules.estimators["UJB"]).values
+    assert x.evidence is Evidence.INSUFFICIENT_EXCITATION
+
+    soft = good | {"dynamic_k_xx_n_per_m": Reading(-1e6, u_random=1e6)}
+    x, _ = film_reading(films.assessment(**soft), condition, rules.estimators["UJB"]).values
+    assert x.evidence is Evidence.BAD_QUALITY
+
+
+def test_results_say_the_condition_that_they_were_found_under(films: Any) -> None:
+    known = {
+        "speed_rpm": Reading(92.3),
+        "power_mw": Reading(200.0),
+        "eccentricity_ratio": Reading(0.42),
+        "oil_temperature_c": Reading(46.0),
+    }
+    watch = films.watch(has_baseline=False)
+    [first], _ = watch.take([films.assessment(10**18, **known)])
+    for i in range(1, 62):
+        [last], _ = watch.take([films.assessment(10**18 + i * 60 * S, **known)])
+    lost = known | {"eccentricity_ratio": missing(Reason.DEAD)}
+    [blind], _ = watch.take([films.assessment(10**18 + 4000 * S, **lost)])
+
+    assert first.condition is not None
+    assert last.condition is not None
+    assert blind.condition is not None
+    assert (first.condition.state, first.condition.is_settled) == (OperatingState.PART_LOAD, False)
+    assert (last.condition.is_settled, last.condition.cell) == (True, (8, 18))
+    assert blind.condition.cell is None
+
+
+@pytest.mark.parametrize("verdict", [v for v in Verdict if v not in JUDGED])
+def test_what_is_not_judged_is_neither_an_alarm_nor_a_return(
+    rules: FilmRules, verdict: Verdict
+) -> None:
+    held = FilmFinding(verdict, AlarmLevel.ALERT, -0.1, 0.01, 4.0)
+    condition = alarm_condition(held, rules.change)
+    assert not condition.is_known
+    assert condition.reason == verdict.name.lower()
+
+
+def test_an_alarm_says_by_how_much_and_which_limit(rules: FilmRules) -> None:
+    alert = alarm_condition(FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.1), rules.change)
+    danger = alarm_condition(FilmFinding(Verdict.DANGER, AlarmLevel.DANGER, 0.3), rules.change)
+    assert (alert.level, alert.value, alert.limit) == (1, -0.1, rules.change.alert_change)
+    assert (danger.level, danger.value, danger.limit) == (2, 0.3, rules.change.danger_change)
+    assert alarm_condition(FilmFinding(Verdict.NORMAL), rules.change).level is None
+
+
+def test_time_that_passes_faster_asks_for_fewer_hours(films: Any, rules: FilmRules) -> None:
+    history = films.later(change=loss(0.2, 106.0))
+    start_ns = int(history.time_ns[0])
+    fast_ns = start_ns + (history.time_ns - start_ns) // 50
+    fast = replace(rules, reading_ns=12 * S, time_lapse=50.0)
+
+    slow_news = films.watched(history)
+    fast_news = films.watched(replace(history, time_ns=fast_ns), films.watch(fast))
+
+    levels = [[n.findings[0].level for n in news] for news in (slow_news, fast_news)]
+    raised = [found.index(AlarmLevel.ALERT) for found in levels]
+    assert abs(raised[0] - raised[1]) <= 3

@@ -1,0 +1,104 @@
+"""What transducers do to a signal, and how the analysis undoes it."""
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+
+from core.machine.response import HighPass, Resonance, Response, ResponseChain, ResponseTable
+from core.machine.transducers import displacement_factor
+from core.machine.unit import Channel, Measurand
+
+FREQUENCY_HZ = np.geomspace(0.05, 50.0, 200)
+SHEET = ResponseTable((0.1, 1.0, 10.0), (0.5, 1.0, 1.02), (60.0, 5.0, -2.0))
+RESPONSES: dict[str, Response] = {
+    "order 1": HighPass(0.5),
+    "order 2": HighPass(0.5, 2),
+    "resonance": Resonance(60.0, 0.1),
+    "sheet": SHEET,
+    "chain": ResponseChain((HighPass(0.5), Resonance(60.0, 0.1), SHEET)),
+}
+
+
+def test_a_half_hertz_corner_passes_0_61_of_the_vortex_line() -> None:
+    passed = HighPass(0.5).at(np.array([92.3 / 60.0 / 4.0]))[0]
+
+    assert abs(passed) == pytest.approx(0.61, abs=0.001)
+    assert cmath.phase(passed) > 0.0  # a high-pass leads
+
+
+@pytest.mark.parametrize(
+    ("response", "magnitude", "phase_deg"),
+    [
+        (HighPass(0.5), math.sqrt(0.5), 45.0),
+        (HighPass(0.5, 2), math.sqrt(0.5), 90.0),
+        (HighPass(0.5, 2, 0.1), 5.0, 90.0),
+        (Resonance(0.5, 0.1), 5.0, -90.0),
+    ],
+)
+def test_responses_at_their_own_frequency(
+    response: Response, magnitude: float, phase_deg: float
+) -> None:
+    factor = response.at(np.array([0.5]))[0]
+
+    assert abs(factor) == pytest.approx(magnitude)
+    assert math.degrees(cmath.phase(factor)) == pytest.approx(phase_deg)
+
+
+def test_responses_are_one_where_the_transducer_is_made_for_and_a_chain_multiplies_them() -> None:
+    far_above, far_below = np.array([500.0]), np.array([0.05])
+
+    assert HighPass(0.5).at(far_above)[0] == pytest.approx(1.0, abs=1e-3)
+    assert HighPass(0.5, 2).at(far_above)[0] == pytest.approx(1.0, abs=2e-3)
+    assert Resonance(500.0, 0.1).at(far_below)[0] == pytest.approx(1.0, abs=1e-4)
+
+    product = HighPass(0.5).at(FREQUENCY_HZ) * Resonance(60.0, 0.1).at(FREQUENCY_HZ)
+
+    chain = ResponseChain((HighPass(0.5), ResponseChain((Resonance(60.0, 0.1),))))
+
+    assert chain.at(FREQUENCY_HZ) == pytest.approx(product)
+    assert ResponseChain(()).at(FREQUENCY_HZ) == pytest.approx(np.ones(200))
+
+
+def test_a_sheet_is_met_at_its_points_and_between_them_a_phase_goes_the_short_way_round() -> None:
+    at_points = SHEET.at(np.array(SHEET.frequency_hz))
+    everywhere = SHEET.at(FREQUENCY_HZ)
+
+    assert np.abs(at_points) == pytest.approx(SHEET.magnitude)
+    assert np.degrees(np.angle(at_points)) == pytest.approx(SHEET.phase_deg)
+    assert np.all(np.diff(np.abs(everywhere)) >= -1e-12)
+    assert everywhere[0] == pytest.approx(at_points[0])
+    assert everywhere[-1] == pytest.approx(at_points[-1])
+    assert SHEET.covers(0.3, 9.0)
+    assert not SHEET.covers(0.05, 9.0)
+    assert not SHEET.covers(0.3, 25.0)
+
+    wrapping = ResponseTable((1.0, 2.0), (1.0, 1.0), (179.0, -179.0))
+
+    assert wrapping.at(np.array([math.sqrt(2.0)]))[0] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+def test_corners_and_damping_that_cannot_be_are_refused(value: float) -> None:
+    for build in (
+        lambda: HighPass(value),
+        lambda: HighPass(1.0, 2, value),
+        lambda: Resonance(value, 0.1),
+        lambda: Resonance(1.0, value),
+    ):
+        with pytest.raises(ValueError, match="must be positive and finite"):
+            build()
+    with pytest.raises(ValueError, match="order 1 or 2, got 3"):
+        HighPass(1.0, 3)
+
+
+@pytest.mark.parametrize("measurand", [m for m in Measurand if m != Measurand.KEY_PHASE_V])
+@pytest.mark.parametrize("name", RESPONSES)
+def test_the_analysis_takes_out_what_the_transducer_put_in(name: str, measurand: Measurand) -> None:
+    plain = Channel("vx", measurand, -1)
+    real = Channel("vx", measurand, -1, RESPONSES[name])
+
+    reading = RESPONSES[name].at(FREQUENCY_HZ) / displacement_factor(plain, FREQUENCY_HZ)
+
+    assert reading * displacement_factor(real, FREQUENCY_HZ) == pytest.approx(np.ones(200))

@@ -1,0 +1,209 @@
+"""A rack that gives amplitudes, and perhaps phases, is enough for equation (5); no more is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rigs.racks import AMPLITUDES, GAPS, K_B, RATE_HZ, SLOW, VORTEX, blocks_of, polls, watch
+
+from core.machine.unit import Channel, Measurand, Unit
+from core.monitor.assessment import Evidence
+from core.monitor.catalogue import CATALOGUE
+from core.monitor.settings import AnalysisSettings
+from core.monitor.vector_monitor import VectorMonitor
+from core.quality import GOOD, Level, Reading, Reason, bad, missing
+from core.spectra.speed import SpeedSource
+from core.spectra.vector_rows import VectorPart, VectorRow
+
+
+def test_equation_5_is_computed_from_the_amplitudes_of_a_rack(rack) -> None:
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, noise=1e-6))[-1]
+
+    value = {name: reading.value for name, reading in newest.readings.items()}
+    assert value["order1_shaft_x_um_pk"] == pytest.approx(60.0, rel=1e-5)
+    assert value["order1_bearing_y_um_pk"] == pytest.approx(10.0, rel=1e-5)
+    assert value["order1_k_eff_xx_n_per_m"] == pytest.approx(20.0 / 60.0 * K_B, rel=1e-5)
+    assert value["order1_k_eff_yy_n_per_m"] == pytest.approx(10.0 / 50.0 * K_B, rel=1e-5)
+    assert newest.readings["stiffness_xx_n_per_m"] == newest.readings["order1_k_eff_xx_n_per_m"]
+    assert newest.estimators == {"xx": "ratio_order1", "yy": "ratio_order1"}
+    assert newest.evidence is Evidence.AMPLITUDE_ONLY
+    assert newest.quality == GOOD
+    assert newest.speed_source is SpeedSource.SLOW_CHANNEL
+    assert (value["speed_rpm"], value["power_mw"], value["oil_temperature_c"]) == (92.3, 650, 45)
+
+
+def test_what_takes_waveforms_is_missing_and_never_a_number(rack) -> None:
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0))[-1]
+
+    assert set(newest.readings) == {quantity.name for quantity in CATALOGUE}
+    absent = [
+        name
+        for name in newest.readings
+        if name.startswith(("dynamic_", "vortex_shaft", "vortex_k", "vortex_transfer"))
+        or any(word in name for word in ("coherence", "roundness", "transfer", "gap", "centre"))
+    ]
+    assert len(absent) > 30
+    for name in absent:
+        assert newest.readings[name] == missing(Reason.NOT_MEASURED), name
+    assert newest.orbit is None
+    assert newest.spectrum.frequency_hz.size == 0
+    assert not newest.spectrum.n_segments.any()
+
+
+def test_results_come_every_hop_whatever_the_blocks(rack) -> None:
+    values = np.abs(np.random.default_rng(5).normal(40.0, 1.0, size=(4, 100)))
+    results = [watch(rack(), blocks_of(values, n_each=n_each)) for n_each in (1, 7, 100)]
+
+    assert [a.window.stop_index for a in results[0]] == list(range(12, 101, 12))
+    for other in results[1:]:
+        assert [a.readings for a in other] == [a.readings for a in results[0]]
+        assert [a.window for a in other] == [a.window for a in results[0]]
+
+
+def test_velocity_and_acceleration_become_displacement_at_the_speed_of_the_poll(unit: Unit) -> None:
+    omega = 2 * np.pi * 92.3 / 60
+    channels = (
+        *unit.channels[:2],
+        Channel("bx", Measurand.VELOCITY_MM_S),
+        Channel("by", Measurand.ACCELERATION_M_S2),
+    )
+    monitor = VectorMonitor(
+        replace(unit, rate_hz=RATE_HZ, channels=channels), AMPLITUDES, AnalysisSettings()
+    )
+    newest = watch(monitor, polls(60, 60, 20e-3 * omega, 20e-6 * omega**2, noise=0.0, n=12))[-1]
+
+    assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(20.0, rel=1e-5)
+    assert newest.readings["order1_bearing_y_um_pk"].value == pytest.approx(20.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "changes", "reason"),
+    [
+        ((0.0, 60.0, 20.0, 20.0), {}, Reason.INSUFFICIENT_EXCITATION),
+        ((60.0, 60.0, 20.0, 20.0), {"runout_um_pk": 20.0}, Reason.INSUFFICIENT_EXCITATION),
+        ((60.0, 60.0, 2.0, 20.0), {"runout_um_pk": 14.0}, Reason.OK),
+    ],
+)
+def test_too_little_motion_gives_no_stiffness(rack, amplitudes, changes, reason) -> None:
+    newest = watch(rack(bearing=changes), polls(*amplitudes))[-1]
+
+    k_eff = newest.readings["order1_k_eff_xx_n_per_m"]
+    assert k_eff.quality.reason is reason
+    assert (k_eff.value is None) == (reason is not Reason.OK)
+    assert newest.readings["stiffness_xx_n_per_m"].quality.reason is reason
+
+
+def test_a_lost_probe_is_never_shown_as_a_number_and_a_flagged_one_enters_no_average(rack) -> None:
+    monitor = rack()
+    watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=48))
+    lost = {0: bad(Reason.SENSOR_FAILURE)}
+    newest = watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=12, first_index=48, quality=lost))[-1]
+
+    for name in ("order1_shaft_x_um_pk", "order1_k_eff_xx_n_per_m", "stiffness_xx_n_per_m"):
+        assert newest.readings[name] == missing(Reason.SENSOR_FAILURE)
+    assert newest.readings["order1_k_eff_yy_n_per_m"].value is not None
+    assert newest.quality.level is Level.BAD
+
+    monitor = rack()
+    watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=40, noise=0.0))
+    wrong = {0: bad(Reason.CLIPPED)}
+    watch(monitor, polls(9e9, 50.0, 20.0, 10.0, n=8, noise=0.0, first_index=40, quality=wrong))
+    newest = watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=12, noise=0.0, first_index=48))[-1]
+
+    assert newest.readings["order1_shaft_x_um_pk"].value == pytest.approx(60.0)
+    assert newest.window.n_segments == 52
+    assert newest.window.coverage == pytest.approx(52 / 60)
+
+
+def test_a_standing_machine_gives_nothing_and_one_without_a_speed_the_rated_one_in_doubt(
+    rack,
+) -> None:
+    standing = SLOW | {"speed": Reading(3.0)}
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, slow=standing))[-1].readings
+
+    for name in ("speed_rpm", "order1_shaft_x_um_pk", "stiffness_xx_n_per_m"):
+        assert newest[name] == missing(Reason.STANDSTILL)
+
+    unknown = SLOW | {"speed": missing(Reason.NOT_MEASURED)}
+    newest = watch(rack(), polls(60.0, 50.0, 20.0, 10.0, slow=unknown))[-1]
+
+    assert newest.speed_source is SpeedSource.RATED
+    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.level is Level.UNCERTAIN
+
+
+def test_gaps_give_the_shaft_centre_which_moves_with_a_new_reference_alone(rack) -> None:
+    stream = polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, noise=1e-6)
+    newest = watch(rack(AMPLITUDES + GAPS), stream)[-1]
+
+    assert newest.readings["gap_x_um"].value == pytest.approx(1970.0, rel=1e-4)
+    assert newest.readings["shaft_centre_x_um"].value == pytest.approx(30.0, abs=0.1)
+    assert newest.readings["eccentricity_ratio"].value == pytest.approx(0.25, abs=0.001)
+
+    monitor = rack(AMPLITUDES + GAPS)
+    stream = polls(60.0, 50.0, 20.0, 10.0, 1970.0, 1960.0, n=24, noise=0.0)
+    before = watch(monitor, stream[:12])[-1]
+    [bearing] = monitor.unit.bearings
+    moved = replace(bearing, gap_reference_um=(1970.0, 1960.0))
+    monitor.adopt(replace(monitor.unit, bearings=(moved,)))
+    after = watch(monitor, stream[12:])[-1]
+
+    assert before.readings["eccentricity_ratio"].value == pytest.approx(0.25)
+    assert after.readings["eccentricity_ratio"].value == pytest.approx(0.0)
+    with pytest.raises(ValueError, match="rated_speed_rpm is 100"):
+        monitor.adopt(replace(monitor.unit, rated_speed_rpm=100.0))
+
+
+def test_the_vortex_order_is_its_own_line_or_switched_off(rack) -> None:
+    monitor = rack(AMPLITUDES + VORTEX, bearing={"runout_um_pk": 100.0})
+    newest = watch(monitor, polls(60.0, 50.0, 20.0, 10.0, 30.0, 30.0, 12.0, 12.0))[-1]
+
+    quiet = Reason.INSUFFICIENT_EXCITATION
+    assert newest.readings["order1_k_eff_xx_n_per_m"].quality.reason is quiet
+    assert newest.readings["vortex_k_eff_xx_n_per_m"].value == pytest.approx(0.4 * K_B, rel=0.02)
+    assert newest.readings["vortex_frequency_hz"].value == pytest.approx(0.25 * 92.3 / 60)
+    assert newest.estimators["xx"] == "ratio_vortex"
+
+    newest = watch(rack(has_vortex=False), polls(60.0, 50.0, 20.0, 10.0))[-1]
+
+    assert newest.readings["vortex_k_eff_xx_n_per_m"] == missing(Reason.SWITCHED_OFF)
+    assert newest.readings["vortex_shaft_x_um_pk"] == missing(Reason.SWITCHED_OFF)
+
+
+def test_missed_polls_are_an_exact_gap_and_repeated_ones_are_dropped(rack) -> None:
+    monitor = rack()
+    stream = polls(60.0, 50.0, 20.0, 10.0, n=40)
+    watch(monitor, stream[:10])
+    watch(monitor, stream[15:20])
+    newest = watch(monitor, stream[18:24])[-1]
+
+    assert newest.window.n_segments == 19
+    [gap] = monitor.drain_gaps()
+    assert (gap.first_index, gap.n_samples) == (10, 5)
+    assert monitor.drain_gaps() == []
+    account = monitor.account
+    assert (account.n_stored, account.n_gap, account.n_repeated) == (19, 5, 2)
+    assert account.n_offered == 24
+
+
+def test_a_restart_begins_a_new_average(rack) -> None:
+    monitor = rack()
+    watch(monitor, polls(60.0, 50.0, 20.0, 10.0, n=48))
+    newest = watch(monitor, polls(60.0, 50.0, 40.0, 10.0, n=12, epoch=2, noise=0.0))[-1]
+
+    assert newest.window.n_segments == 12
+    assert newest.window.epoch == 2
+    assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(40.0)
+
+
+def test_a_block_of_something_else_is_refused(rack) -> None:
+    [block] = polls(60.0, 50.0, 20.0, 10.0, n=1)
+    with pytest.raises(ValueError, match="block of unit 'U2'"):
+        rack().ingest(replace(block, unit="U2"))
+    with pytest.raises(ValueError, match=r"1\.0 Hz, configured 0\.2 Hz"):
+        rack().ingest(replace(block, rate_hz=1.0))
+    with pytest.raises(ValueError, match="4 channels offered to a ring of 6"):
+        rack(AMPLITUDES + GAPS).ingest(block)
+    with pytest.raises(ValueError, match="no channel of unit"):
+        rack((VectorRow("nowhere", VectorPart.GAP),))
+    with pytest.raises(ValueError, match="are the same"):
+        rack((AMPLITUDES[0], AMPLITUDES[0]))

@@ -1,0 +1,138 @@
+"""Broad-band vibration and 1× phases, read off signals whose values are known."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.arrays import FloatArray
+from core.machine.response import HighPass
+from core.machine.unit import Channel, Measurand, Unit
+from core.monitor.monitor import UnitMonitor
+from core.monitor.settings import AnalysisSettings
+from core.quality import GOOD, Reading, Reason, bad
+from core.samples.blocks import SampleBlock
+
+RATE_HZ, N = 600.0, 2 * 8192
+TIME_S = np.arange(N) / RATE_HZ
+TURN_HZ = 92.3 / 60.0
+
+Measure = Callable[..., Mapping[str, Reading]]
+
+
+def tone(amplitude: float, frequency_hz: float, lead_deg: float = 0.0) -> FloatArray:
+    return amplitude * np.cos(2 * np.pi * frequency_hz * TIME_S + math.radians(lead_deg))
+
+
+def pulses(mark_s: float) -> FloatArray:
+    """One pulse a turn that begins when the mark passes, a tenth of a turn long."""
+    turns = (TIME_S - mark_s) * TURN_HZ
+    return np.where(turns % 1.0 < 0.1, 5.0, 0.0)
+
+
+@pytest.fixture
+def measure(unit: Unit) -> Measure:
+    def read(*signals: FloatArray, there: Unit = unit, **other: Any) -> Mapping[str, Reading]:
+        settings = AnalysisSettings(**other)
+        rows = np.array([s + np.zeros(N) for s in signals], dtype=np.float32)
+        slow = {"power": Reading(650.0), "oil": Reading(45.0), "speed": Reading(92.3)}
+        block = SampleBlock("U1", 1, 0, 0, RATE_HZ, rows, (GOOD,) * len(signals), slow)
+        return UnitMonitor(there, settings).ingest(block)[-1].readings
+
+    return read
+
+
+STILL = np.full(N, 2000.0)
+
+
+@pytest.fixture
+def velocity(unit: Unit, measure: Measure) -> Callable[..., float | None]:
+    """Measures the bearing's velocity with a transducer."""
+
+    def read(
+        signal: FloatArray, measurand: Measurand, response: HighPass | None = None, **other: Any
+    ) -> float | None:
+        bearings = (Channel(id_, measurand, response=response) for id_ in ("bx", "by"))
+        there = replace(unit, channels=(*unit.channels[:2], *bearings))
+        found = measure(STILL, STILL, signal, signal, there=there, **other)
+        return found["overall_bearing_x_mm_s_rms"].value
+
+    return read
+
+
+def test_a_shaft_is_measured_from_peak_to_peak_and_by_its_farthest_excursion(
+    measure: Measure,
+) -> None:
+    both = tone(60.0, TURN_HZ) + tone(15.0, 3 * TURN_HZ)
+    found = measure(2000.0 + both, 2000.0 + tone(40.0, 7.3), 0 * TIME_S, 0 * TIME_S)
+
+    assert found["overall_shaft_x_um_pp"].value == pytest.approx(150.0, rel=2e-3)
+    assert found["overall_shaft_y_um_pp"].value == pytest.approx(80.0, rel=2e-3)
+
+    slanted = tone(60.0, TURN_HZ)
+    found = measure(2000.0 + slanted, 1900.0 + slanted, 0 * TIME_S, 0 * TIME_S)
+
+    assert found["overall_shaft_um_pk"].value == pytest.approx(60.0 * math.sqrt(2.0), rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("measurand", "per_velocity"),
+    [
+        (Measurand.VELOCITY_MM_S, 1.0),
+        (Measurand.ACCELERATION_M_S2, 2 * math.pi * 20.0 * 1e-3),
+        (Measurand.DISPLACEMENT_UM, 1e3 / (2 * math.pi * 20.0)),
+    ],
+)
+def test_a_bearing_has_the_same_velocity_whatever_measures_it(
+    velocity: Callable[..., float], measurand: Measurand, per_velocity: float
+) -> None:
+    found = velocity(tone(3.0 * per_velocity, 20.0), measurand)
+    assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
+
+
+def test_velocity_has_the_power_of_its_band_after_what_the_transducer_takes_away(
+    velocity: Callable[..., float],
+) -> None:
+    noise = np.random.default_rng(4).normal(size=N)  # mm/s, white up to 300 Hz
+    assert velocity(noise, Measurand.VELOCITY_MM_S) == pytest.approx(1.0, rel=0.03)
+    corner = HighPass(0.5)
+    passed = abs(complex(corner.at(np.array([TURN_HZ]))[0]))
+    found = velocity(tone(3.0 * passed, TURN_HZ), Measurand.VELOCITY_MM_S, corner)
+    assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=5e-3)
+    signal = tone(3.0, 20.0) + tone(9.0, 200.0)
+    found = velocity(signal, Measurand.VELOCITY_MM_S, velocity_high_hz=100.0)
+    assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
+
+
+def test_without_a_displacement_or_a_key_phase_there_is_no_shaft_motion_or_no_phase(
+    measure: Measure, unit: Unit
+) -> None:
+    shafts = tuple(Channel(id_, Measurand.VELOCITY_MM_S) for id_ in ("sx", "sy"))
+    there = replace(unit, channels=(*shafts, *unit.channels[2:]))
+    found = measure(*[tone(60.0, TURN_HZ)] * 4, there=there)
+
+    for name in ("overall_shaft_x_um_pp", "overall_shaft_um_pk"):
+        assert found[name].quality == bad(Reason.NOT_MEASURED)
+
+    turning = tone(60.0, TURN_HZ)
+    found = measure(2e3 + turning, 2e3 + turning, turning, turning)
+
+    assert found["order1_shaft_x_phase_deg"].quality == bad(Reason.NOT_MEASURED)
+
+
+@pytest.mark.parametrize("mark_s", [0.0, 0.2, 0.5])
+def test_a_phase_is_the_same_whenever_a_record_begins(
+    measure: Measure, unit: Unit, mark_s: float
+) -> None:
+    kp = Channel("kp", Measurand.KEY_PHASE_V)
+    there = replace(unit, channels=(*unit.channels, kp), key_phase="kp")
+    since = 360.0 * TURN_HZ * mark_s  # the shaft's angle at the first sample is less by this
+    x, y = tone(60.0, TURN_HZ, 30.0 - since), tone(60.0, TURN_HZ, -60.0 - since)
+    found = measure(2e3 - x, 2e3 - y, x / 3, y / 3, pulses(mark_s), there=there)
+
+    assert found["order1_shaft_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)
+    assert found["order1_shaft_y_phase_deg"].value == pytest.approx(300.0, abs=0.5)
+    assert found["order1_bearing_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)

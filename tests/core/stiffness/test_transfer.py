@@ -1,0 +1,101 @@
+"""Stiffness at one line: real part and imaginary part of one complex ratio."""
+
+import math
+
+import numpy as np
+import pytest
+
+from core.arrays import ComplexArray
+from core.machine.bracket import BracketDynamics
+from core.quality import Reason
+from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, CrossSpectrum, average
+from core.stiffness.evidence import LineLimits, line_excitation
+from core.stiffness.transfer import LineTransfer, line_transfer
+
+FREQUENCY_HZ = np.array([1.54])
+OMEGA = 2.0 * math.pi * 1.54
+BRACKET = BracketDynamics(1.18e9, 0.45e5, 2.0e5)
+K_N_PER_M, C_N_S_PER_M = 0.5e9, 6.25e6
+
+
+def spectrum(phasors: ComplexArray) -> CrossSpectrum:
+    return average(FREQUENCY_HZ, phasors, np.ones(phasors.shape[:2], dtype=bool))
+
+
+def motion(
+    seed: int = 1, n_segments: int = 24, noise_um: float = 0.0, probe_um: float = 0.0
+) -> ComplexArray:
+    """Shaft and bearing phasors (n_segments, 4, 1) of a film without cross-coupling."""
+    rng = np.random.default_rng(seed)
+    phase = np.exp(2j * np.pi * rng.uniform(size=(n_segments, 1, 1)))
+    shaft = phase * np.array([[10.0], [-10.0j]])
+    film = (K_N_PER_M + 1j * OMEGA * C_N_S_PER_M) / BRACKET.dynamic_stiffness_n_per_m(FREQUENCY_HZ)
+    noise = rng.normal(size=(2, n_segments, 2, 1)) + 1j * rng.normal(size=(2, n_segments, 2, 1))
+    bearing = film * shaft + noise_um * noise[0]
+    return np.concatenate([shaft + probe_um * noise[1], bearing], axis=1)
+
+
+def found(phasors: ComplexArray, bracket: BracketDynamics = BRACKET) -> LineTransfer:
+    result = line_transfer(spectrum(phasors), 0, SHAFT_X, BEARING_X, bracket)
+    assert result is not None
+    return result
+
+
+def test_stiffness_is_the_real_part_and_damping_the_imaginary_part_if_there_is_motion() -> None:
+    result = found(motion())
+
+    assert result.k_n_per_m == pytest.approx(K_N_PER_M, rel=1e-12)
+    assert result.c_n_s_per_m == pytest.approx(C_N_S_PER_M, rel=1e-12)
+    assert result.coherence == pytest.approx(1.0)
+    assert result.k_std_n_per_m == pytest.approx(0.0, abs=1e3)
+    assert result.shaft_um_pk == pytest.approx(10.0)
+
+    still = motion()
+    still[:, 0] = 0.0
+    assert line_transfer(spectrum(still), 0, SHAFT_X, BEARING_X, BRACKET) is None
+    assert line_transfer(spectrum(motion(n_segments=1)), 0, SHAFT_X, BEARING_X, BRACKET) is None
+
+
+def test_leaving_the_brackets_inertia_out_reads_what_equation_5_reads_and_is_stated() -> None:
+    result = found(motion(), BracketDynamics(BRACKET.stiffness_n_per_m))
+
+    # m_b ω² / k_b = 0.36 % at rated speed (UJB)
+    assert result.k_n_per_m / K_N_PER_M == pytest.approx(1.0036, abs=0.0003)
+
+    before = found(motion())
+    after = found(motion(), BracketDynamics(1.01 * 1.18e9, 0.45e5, 2.0e5))
+
+    change = 0.01 * BRACKET.stiffness_n_per_m * before.ratio.real
+    assert after.k_n_per_m - before.k_n_per_m == pytest.approx(change, rel=1e-9)
+
+
+def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude() -> None:
+    many = motion(n_segments=20_000, noise_um=2.0)
+
+    assert found(many).k_n_per_m == pytest.approx(K_N_PER_M, rel=0.01)
+    ratio = spectrum(many).amplitude_ratio(BEARING_X, SHAFT_X)[0] * BRACKET.stiffness_n_per_m
+    assert ratio > 1.1 * K_N_PER_M
+
+
+@pytest.mark.parametrize("n_segments", [3, 24])
+def test_the_stated_uncertainty_is_the_scatter(n_segments: int) -> None:
+    results = [found(motion(seed, n_segments, noise_um=0.5)) for seed in range(400)]
+
+    for value, stated in (("k_n_per_m", "k_std_n_per_m"), ("c_n_s_per_m", "c_std_n_s_per_m")):
+        scatter = np.std([getattr(result, value) for result in results])
+        mean_stated = math.sqrt(np.mean([getattr(result, stated) ** 2 for result in results]))
+        # The scatter of 400 runs is known to 3.5 %.
+        assert scatter == pytest.approx(mean_stated, rel=0.1)
+
+
+def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout() -> None:
+    clear, noisy = spectrum(motion()), spectrum(motion(noise_um=20.0))
+
+    def excitation(of: CrossSpectrum, **limits: float) -> Reason:
+        return line_excitation(of, 0, SHAFT_X, BEARING_X, LineLimits(**limits))
+
+    assert excitation(clear) is Reason.OK
+    assert excitation(noisy) is Reason.INSUFFICIENT_EXCITATION
+    assert excitation(clear, runout_um_pk=2.4) is Reason.OK
+    assert excitation(clear, runout_um_pk=2.6) is Reason.INSUFFICIENT_EXCITATION
+    assert excitation(spectrum(motion(n_segments=1))) is Reason.FEW_SEGMENTS
