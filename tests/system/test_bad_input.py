@@ -124,8 +124,9 @@ def test_words_with_code_in_them_stay_words_and_are_no_formula_in_a_csv_file(
     assert comments == [(words, words) for words in reversed(NASTY)]
     assert audit.headers["content-type"].startswith("application/json")
     assert audit.headers["x-content-type-options"] == "nosniff"
-    reasons = [entry["reason"] for entry in audit.json()["entries"]]
-    assert reasons[: len(NASTY)] == NASTY[::-1]
+    reasons = (entry["reason"] for entry in audit.json()["entries"])
+    # what was refused of the tests before may be written down meanwhile
+    assert [reason for reason in reasons if reason in NASTY] == NASTY[::-1]
     for path in (f"{ALARMS}/events", "/api/v1/audit"):
         table = service.client.get(path, params={"format": "csv"}).text
         cells = [cell for row in csv.reader(io.StringIO(table)) for cell in row]
