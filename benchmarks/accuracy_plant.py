@@ -17,10 +17,12 @@ from acquisition.delivery.calibration import (
 )
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES
-from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
-from acquisition.simulated.plant.rotor_parameters import (
+from acquisition.simulated.plant.rotor import (
     ForcePlane,
     RotorParameters,
+    bearing_response,
+    forward_force,
+    rotor_matrices,
     unbalance_force_n,
 )
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise

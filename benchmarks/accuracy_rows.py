@@ -5,10 +5,12 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
 from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film
-from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
-from acquisition.simulated.plant.rotor_parameters import (
+from acquisition.simulated.plant.rotor import (
     ForcePlane,
     RotorParameters,
+    bearing_response,
+    forward_force,
+    rotor_matrices,
     unbalance_force_n,
 )
 from acquisition.simulated.plant.scenario import (

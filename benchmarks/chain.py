@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.truth import UnitLife
 from benchmarks.chain_story import ROWS_PER_H, Story, Watch, from_readings, silenced, windows
 from benchmarks.chain_unit import readings
 from benchmarks.detection_unit import LearnedUnit

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.simulated.life.condition_change import four_fold
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_truth import UnitLife
 from acquisition.simulated.life.moment import scenario_at
+from acquisition.simulated.life.shaft import four_fold
+from acquisition.simulated.life.truth import UnitLife
 from benchmarks.chain_unit import UNIT, Window
 from benchmarks.detection_unit import (
     BRACKETS_N_PER_M,
@@ -25,10 +25,10 @@ from core.baseline.stiffness_history import Evidence
 from core.change.film_judge import FilmJudge, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
 from core.change.film_rules import FilmRules
-from core.condition.bearing_condition import BearingCondition
-from core.condition.operating_limits import OperatingLimits
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import (
     NEVER_SEEN,
+    OperatingLimits,
     OperatingReading,
     Operation,
     advance,

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
-from acquisition.simulated.life.measured import RUNOUT_UM_PK
+from acquisition.simulated.life.bearing import LIFE_BEARINGS, LifeBearing
+from acquisition.simulated.life.truth import RUNOUT_UM_PK
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES
-from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.rotor import RotorParameters
 from acquisition.simulated.plant.scenario import Scenario
 from acquisition.simulated.plant.unit import SimulatedUnit
 from core.change.film_reading import FilmReading, film_reading
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Bearing, Channel, Estimator, Measurand, Unit
 from core.monitor.assessment import Assessment

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.simulated.life.condition_change import cooling_failure, four_fold
 from acquisition.simulated.life.damage import Damage, DamageKind
+from acquisition.simulated.life.shaft import cooling_failure, four_fold
 from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit
 from core.baseline.stiffness_history import DIRECTIONS
 from core.change.attribution import Cause

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.smoothing import running_median
+from core.baseline.grouping import running_median
 from core.change.level_history import level_history
 
 N_ON, N_OFF = 6, 48

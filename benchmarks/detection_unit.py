@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.damage import Damage
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_truth import UnitLife
-from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.life.shaft import ConditionChange
+from acquisition.simulated.life.truth import UnitLife
+from acquisition.simulated.plant.rotor import RotorParameters
 from benchmarks.detection_fixed import BANDS, FixedThreshold
 from core.arrays import FloatArray
 from core.baseline.baseline import Origin, QuantityBaseline, Watched
@@ -24,7 +24,7 @@ from core.change.back_test import DecisionHistory, back_test
 from core.change.operation_history import operation_history
 from core.change.settings import ChangeLimits
 from core.change.verdict import JUDGED
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 
 DAY_NS = 86_400 * 10**9
 START_NS = 19_723 * DAY_NS

@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.truth import UnitLife
 from core.baseline.stiffness_history import Evidence
 from core.units import NS_PER_S
 

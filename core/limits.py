@@ -6,7 +6,7 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Self
 
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.quality import Reading, Reason
 
 

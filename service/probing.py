@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 from acquisition.modbus.cells import N_BYTES, ByteOrder, Cell, NumberType
 from acquisition.modbus.decoding import MapDecoder, byte_permutation
-from acquisition.modbus.profile import RingHeader
 from acquisition.modbus.register_map import MapValue
-from acquisition.modbus.slot import Slot
+from acquisition.modbus.ring_profile import RingHeader, Slot
 
 PLAUSIBLE = (1e-3, 1e6)
 """Absolute values of a float that a machine may have; anything else is likely another type or byte

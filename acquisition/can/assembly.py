@@ -6,10 +6,9 @@ from dataclasses import replace
 
 from acquisition.can.counted import CountedInstants, Placed
 from acquisition.can.gate import Frame
-from acquisition.can.instants import Instant, Refusal, RefusalCounts
 from acquisition.can.pause import PauseCheck
-from acquisition.can.plan import Part, Plan
-from acquisition.can.raw_blocks import RawBlockBuilder
+from acquisition.can.plan import Instant, Part, Plan, Refusal, RefusalCounts
+from acquisition.can.side_values import RawBlockBuilder
 from acquisition.can.uncounted import UncountedInstants
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import FrameError

@@ -3,14 +3,23 @@
 from collections.abc import Mapping
 
 from acquisition.can.dbc import DbcSignal, load_dbc, parse_dbc
-from acquisition.can.layout import FrameLayout, ScalarReader, scalar_reader
+from acquisition.can.layout import (
+    FrameLayout,
+    ScalarReader,
+    WaveChannel,
+    WaveformDecoder,
+    gain_and_offset,
+    is_counts,
+    require_full_scale,
+    scalar_reader,
+)
 from acquisition.can.plan import (
     EPOCH,
     HOLD,
     MICROSECONDS,
     OK_BITS,
     SECONDS,
-    Counter,
+    MessageCounter,
     MessagePlan,
     Part,
     Plan,
@@ -19,13 +28,6 @@ from acquisition.can.settings import CanChannel, CanSettings, CanSlowChannel
 from acquisition.can.signals import Place, SignalTable
 from acquisition.can.uncounted import MAX_INSTANTS_PER_S
 from acquisition.can.units import known_unit, spellings
-from acquisition.can.waveforms import (
-    WaveChannel,
-    WaveformDecoder,
-    gain_and_offset,
-    is_counts,
-    require_full_scale,
-)
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.errors import ConfigError
 
@@ -154,15 +156,15 @@ class _Compiler:
             found.setdefault(place, []).append((number, _scaled(slow, signal)))
         return found
 
-    def _counters(self) -> dict[Place, Counter]:
+    def _counters(self) -> dict[Place, MessageCounter]:
         step = self._samples_per_frame if self._settings.counter_counts == "frames" else 1
-        counters: dict[Place, Counter] = {}
+        counters: dict[Place, MessageCounter] = {}
         for path in self._settings.counters:
             signal = self._table.find(path, "counters")
             self._table.require_integer(signal, "counters")
             if signal.n_bits < _MIN_COUNTER_BITS:
                 raise ConfigError(f"counters: {path} has {signal.n_bits} bits, too few to count")
-            counter = Counter(scalar_reader(signal), step << signal.n_bits, step)
+            counter = MessageCounter(scalar_reader(signal), step << signal.n_bits, step)
             for place in self._places(signal):
                 if place in counters:
                     raise ConfigError(f"counters: {path} is the second of message {place[0]}")
@@ -219,7 +221,7 @@ class _Compiler:
         self,
         place: Place,
         values: list[tuple[str | int, ScalarReader]],
-        counters: Mapping[Place, Counter],
+        counters: Mapping[Place, MessageCounter],
         n_samples: Mapping[Place, ScalarReader],
     ) -> Part:
         return Part(

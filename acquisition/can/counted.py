@@ -4,9 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from acquisition.can.counter_axis import CounterAxis, Jump, Mark
-from acquisition.can.instants import Instant, PendingInstant, Refusal, RefusalCounts
-from acquisition.can.plan import Counter as PartCounter
-from acquisition.can.plan import Part, Plan
+from acquisition.can.plan import (
+    Instant,
+    MessageCounter,
+    Part,
+    PendingInstant,
+    Plan,
+    Refusal,
+    RefusalCounts,
+)
 from acquisition.can.rivals import Rivals
 from acquisition.delivery.epochs import Epochs
 
@@ -93,7 +99,9 @@ class CountedInstants:
         if part.wave is not None:
             self._unusable[part.wave] += self._plan.samples_per_frame
 
-    def take(self, part: Part, counter: PartCounter, data: bytes, arrived_ns: int) -> list[Placed]:
+    def take(
+        self, part: Part, counter: MessageCounter, data: bytes, arrived_ns: int
+    ) -> list[Placed]:
         """Place a frame; a doubted one comes with the one that confirms it."""
         raw = int(counter.read(data)) * counter.step
         told = int(part.epoch(data)) if part.epoch else None

@@ -1,10 +1,10 @@
-"""`FrameGate`: only what is exactly a frame of one of the configured messages gets through."""
+"""Only exact frames of configured messages pass; error frames are counted."""
 
 from typing import Protocol, TypeAlias
 
 from acquisition.can.dbc import frame_key
-from acquisition.can.instants import Refusal, RefusalCounts
-from acquisition.can.plan import Plan
+from acquisition.can.plan import Plan, Refusal, RefusalCounts
+from acquisition.errors import LinkError
 
 Frame: TypeAlias = tuple[int, bytes | None]
 """Frame key and data; None as data if it came but cannot be used."""
@@ -62,3 +62,38 @@ class FrameGate:
             return Refusal.ERROR
         twin = frame_key(message.arbitration_id, not message.is_extended_id)
         return Refusal.OTHER_ID_KIND if twin in self._shapes else Refusal.FOREIGN
+
+
+BUS_OFF = 0x40
+CONTROLLER = 0x04
+RESTARTED = 0x100
+PROTOCOL = 0x08
+BUS_ERROR = 0x80
+RX_OVERFLOW = 0x01
+RX_PASSIVE, TX_PASSIVE = 0x10, 0x20
+
+_CONTROLLER_BYTE = 1
+
+
+def require_bus(message: Message) -> None:
+    """Refuse to go on when an error frame says that the controller is off the bus, or nearly so.
+
+    Raises
+    ------
+    LinkError
+        If it is bus-off or error-passive; what arrives then cannot be complete.
+    """
+    if message.arbitration_id & BUS_OFF:
+        raise LinkError("the CAN controller is bus-off: wrong bitrate, wiring or termination")
+    if _controller_state(message) & (RX_PASSIVE | TX_PASSIVE):
+        raise LinkError("the CAN controller is error-passive: too many errors on the bus")
+
+
+def lost_in_controller(message: Message) -> bool:
+    """Whether an error frame says that frames were lost before they could be read."""
+    return bool(_controller_state(message) & RX_OVERFLOW)
+
+
+def _controller_state(message: Message) -> int:
+    told = message.arbitration_id & CONTROLLER and len(message.data) > _CONTROLLER_BYTE
+    return message.data[_CONTROLLER_BYTE] if told else 0

@@ -11,9 +11,8 @@ from typing import Literal
 import can
 
 from acquisition.can.bus import foreign_errors_renamed
-from acquisition.can.error_frames import lost_in_controller, require_bus
-from acquisition.can.gate import Frame, FrameGate
-from acquisition.can.instants import Refusal, RefusalCounts
+from acquisition.can.gate import Frame, FrameGate, lost_in_controller, require_bus
+from acquisition.can.plan import Refusal, RefusalCounts
 from acquisition.can.slcan import SlcanBus
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival

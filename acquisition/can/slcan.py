@@ -16,7 +16,7 @@ from can import Message
 from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
 
-from acquisition.can.error_frames import (
+from acquisition.can.gate import (
     BUS_ERROR,
     BUS_OFF,
     CONTROLLER,

@@ -1,7 +1,6 @@
 """`UncountedInstants`: sample instants of a device that counts nothing; the clock finds losses."""
 
-from acquisition.can.instants import Instant, Refusal, RefusalCounts
-from acquisition.can.plan import Part, Plan
+from acquisition.can.plan import Instant, Part, Plan, Refusal, RefusalCounts
 from acquisition.delivery.epochs import Epochs
 from core.units import NS_PER_S
 

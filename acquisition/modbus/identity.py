@@ -1,11 +1,27 @@
-"""Whether a device is the one that is configured: another one may answer at its address."""
+"""Whether a device is the configured one: registers that it must hold, and function 43/14."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Protocol, TypeAlias
 
 from acquisition.errors import ConfigError
-from acquisition.modbus.identification import Identification
 from acquisition.modbus.requests import READ_HOLDING_REGISTERS
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The basic objects of function 43/14; empty where the device gives none."""
+
+    vendor: str
+    product_code: str
+    revision: str
+
+    @classmethod
+    def of_objects(cls, objects: Mapping[int, bytes]) -> "Identification":
+        """Build from objects 0 to 2 as they were read; what is not ASCII is shown escaped."""
+        texts = (objects.get(number, b"") for number in range(3))
+        return cls(*(text.decode("ascii", "backslashreplace").strip("\0 ") for text in texts))
+
 
 _N_TRIES = 2
 """A reply that was changed on the way is not another device."""

@@ -10,8 +10,7 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, ReadInput
 
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.connection import Connection
-from acquisition.modbus.identification import Identification
-from acquisition.modbus.identity import require_identity
+from acquisition.modbus.identity import Identification, require_identity
 from acquisition.modbus.requests import (
     READ_COILS,
     READ_DISCRETE_INPUTS,

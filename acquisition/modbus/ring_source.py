@@ -10,11 +10,10 @@ from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.ring_pace import out_of_step_s
 from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.follower import RingFollower
 from acquisition.modbus.link import ModbusLink
-from acquisition.modbus.profile import HEADER_REGISTERS
 from acquisition.modbus.requests import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
-from acquisition.modbus.ring_reader import RingReader
+from acquisition.modbus.ring_follower import RingFollower, RingReader
+from acquisition.modbus.ring_profile import HEADER_REGISTERS
 from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
 from core.samples.blocks import SampleBlock
 

@@ -12,8 +12,7 @@ from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.modbus.decoding import MapDecoder, MapReading
 from acquisition.modbus.link import ModbusLink
-from acquisition.modbus.map_reader import MapReader
-from acquisition.modbus.polled_source import PolledSettings, slow_number
+from acquisition.modbus.polled_source import MapReader, PolledSettings, slow_number
 from acquisition.modbus.register_map import RegisterMap
 from core.quality import Reading, Reason, missing
 

@@ -2,8 +2,7 @@
 
 from enum import StrEnum
 
-from acquisition.modbus.ring_layout import U32, RingLayout
-from acquisition.modbus.slot import Slot
+from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from core.units import NS_PER_S
 
 _US_PER_S = 1_000_000

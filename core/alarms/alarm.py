@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.limits import NEVER_JUDGED, RESTED, AlarmLevel, Condition, DelayTimer
 
 

@@ -1,15 +1,62 @@
-"""`AlarmBoard`: alarms with their rules, and the news of them."""
+"""All alarms of a unit, and what is kept of them across a restart."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from core.alarms.alarm import Alarm, AlarmKind, AlarmRule
 from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.kinds import Watch
 from core.alarms.life_cycle import advance, interrupted, restored
-from core.alarms.memory import is_same_occurrence
 from core.alarms.operation import Action, expire, operate
-from core.alarms.watch import Watch
+from core.condition.cells import OperatingPoint
 from core.limits import Condition, unknown
+from core.quality import Reason
+
+
+@dataclass(frozen=True)
+class AlarmMemory:
+    """The alarms of a unit at one moment, so that they go on elsewhere as if nothing were.
+
+    Parameters
+    ----------
+    alarms
+        With their delays.
+    segment_faults
+        What only segments show of channels, by channel.
+    points
+        Newest operating condition of each bearing, and when that was.
+    stop
+        Epoch and index up to which blocks were taken in.
+    is_connected, link_reason
+        What was said of the link last.
+    """
+
+    alarms: tuple[Alarm, ...]
+    segment_faults: Mapping[str, Reason]
+    points: Mapping[str, tuple[OperatingPoint, int]]
+    stop: tuple[int, int] | None
+    is_connected: bool
+    link_reason: str | None
+
+    def link_by(self, alarm: Alarm) -> tuple[bool, str | None]:
+        """Whether samples arrive as far as is known, and why not.
+
+        Parameters
+        ----------
+        alarm
+            About the link, by its newest event. What came of it since all this was remembered
+            counts more: a link that was lost then stays lost until samples come.
+        """
+        kept = next((a for a in self.alarms if a.identity == alarm.identity), Alarm(alarm.identity))
+        if is_same_occurrence(kept, alarm):
+            return self.is_connected, self.link_reason
+        return (True, None) if alarm.level is None else (False, alarm.condition.reason)
+
+
+def is_same_occurrence(one: Alarm, other: Alarm) -> bool:
+    """Whether an alarm has neither been raised nor returned between two moments."""
+    return (one.level, one.occurrence) == (other.level, other.occurrence)
+
 
 RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 

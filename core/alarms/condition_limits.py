@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Self
 
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.condition.operating_state import STEADY, OperatingState
 from core.limits import AlarmLevel, Condition, Limits, judge, unknown
 from core.monitor.assessment import Assessment

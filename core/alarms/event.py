@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.limits import AlarmLevel
 
 

@@ -4,25 +4,26 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm
-from core.alarms.board import AlarmBoard
+from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.condition_limits import point_of, worst_of
-from core.alarms.conditions import (
+from core.alarms.event import AlarmNews
+from core.alarms.kinds import (
+    DEVICE,
     SENSOR_FAULTS,
+    LimitWatch,
+    Watch,
     channel_condition,
     drift_reading,
     link_condition,
     offset_reading,
     slow_channel_condition,
     stamp_condition,
+    watch_list,
 )
-from core.alarms.event import AlarmNews
-from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
 from core.alarms.rules import UnitRules
 from core.alarms.vector_change import VectorReference, vector_condition
-from core.alarms.watch import LimitWatch, Watch
-from core.alarms.watch_list import DEVICE, watch_list
-from core.condition.bearing_condition import NOWHERE_KNOWN, OperatingPoint
+from core.condition.cells import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import Condition, unknown
 from core.machine.unit import Unit

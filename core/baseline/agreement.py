@@ -1,9 +1,16 @@
-"""Whether two baselines of a bearing say the same where both know something."""
+"""Whether two baselines agree, and whether stiffness drifted while one was learned."""
+
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from core.baseline.baseline import BearingBaseline
+from core.arrays import FloatArray
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import Support
+from core.baseline.grouping import group_readings, robust_std
+from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.watched import watched_values
 
 Place = tuple[str, str]
 
@@ -33,3 +40,70 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[Pla
             difference = other.surface.at(conditions) - one.surface.at(conditions)
             found[one.quantity, one.direction] = float(np.average(difference, weights=weight))
     return found
+
+
+SPELL_DAYS = 8
+"""Longer than what makes healthy days alike."""
+
+LEAST_SPELLS = 3
+
+FAR = 4.0
+"""Standard deviations beyond which a day counts no further."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Change of ln over the whole time of learning, with its standard uncertainty."""
+
+    change: float
+    std: float
+
+
+def learning_drift(
+    history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
+) -> Drift | None:
+    """How much the readings that a baseline was learned from have drifted.
+
+    Returns
+    -------
+    None if too few conditions were met again in other spells.
+    """
+    conditions = history.conditions
+    value, _ = watched_values(history, baseline.quantity, baseline.direction)
+    usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
+    if not usable.any():
+        return None
+    conditions, grid = conditions.rows(usable), baseline.grid
+    residual = value[usable] - baseline.surface.at(conditions)
+    groups = group_readings(history.time_ns[usable], conditions, residual, grid)
+    _, cell = np.unique(grid.cells(groups.conditions), axis=1, return_inverse=True)
+    return drift_within(groups.day, groups.value, cell.reshape(-1))
+
+
+def drift_within(
+    day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
+) -> Drift | None:
+    """Drift of values over days, each compared only with others of its cell; (n,) all three."""
+    since = (day - day.min()) / max(int(np.ptp(day)), 1)
+    time, value = _within(since, cell), _within(value, cell)
+    spell = (day - day.min()) // SPELL_DAYS
+    if np.unique(spell[np.abs(time) > 0.0]).size < LEAST_SPELLS:
+        return None
+    slope = _slope(time, value)
+    left = value - slope * time
+    limit = FAR * max(robust_std(left), 1e-9)
+    slope += _slope(time, np.clip(left, -limit, limit))
+    left = np.clip(value - slope * time, -limit, limit)
+    scores = np.bincount(spell, weights=time * left)
+    return Drift(slope, float(np.sqrt(np.sum(scores**2)) / np.sum(time**2)))
+
+
+def _within(x: FloatArray, cell: npt.NDArray[np.int64]) -> FloatArray:
+    """Differences from the mean of each cell."""
+    _, number = np.unique(cell, return_inverse=True)
+    mean = np.bincount(number, weights=x) / np.bincount(number)
+    return np.asarray(x - mean[number])
+
+
+def _slope(time: FloatArray, value: FloatArray) -> float:
+    return float(np.sum(time * value) / np.sum(time**2))

@@ -10,8 +10,7 @@ from core.arrays import FloatArray
 from core.baseline.cell_table import NODES, CellTable
 from core.baseline.stiffness_history import DIRECTIONS
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
-from core.condition.cells import CellGrid
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import CellGrid, FilmConditions
 
 
 class Watched(StrEnum):

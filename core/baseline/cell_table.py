@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.condition.cells import Cell, CellArray
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import Cell, CellArray, FilmConditions
 
 NODES = 3
 """Along each axis of a cell, from edge to edge."""

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.robust import bisquare, robust_std
+from core.baseline.grouping import bisquare, robust_std
 from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 
 Place: TypeAlias = tuple[str, str]

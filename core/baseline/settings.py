@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from core.condition.cells import CellGrid
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import CellGrid, FilmConditions
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import FilmConditions
 
 CodeArray: TypeAlias = npt.NDArray[np.int8]
 """Members of an IntEnum, one byte each."""

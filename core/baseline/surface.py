@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import FilmConditions
 
 ATTITUDE_TERMS = 4
 """Shaft position along x and y, and twice its angle: what a bearing that is not round does."""

@@ -15,13 +15,11 @@ from core.baseline.cell_table import (
     cells_between,
     neighbourhood,
 )
-from core.baseline.fit import Fit
-from core.baseline.groups import Groups, group_medians
+from core.baseline.grouping import Groups, group_medians
 from core.baseline.settings import BaselineSettings
-from core.baseline.slope_scatter import LEAST_SCATTER
 from core.baseline.surface import Surface
-from core.condition.cells import Cell, CellArray, CellGrid
-from core.condition.film_conditions import FilmConditions
+from core.baseline.surface_fit import LEAST_SCATTER, Fit
+from core.condition.cells import Cell, CellArray, CellGrid, FilmConditions
 
 BELIEVED = 0.1
 """Robust weight from which on a group counts as support."""

@@ -10,7 +10,7 @@ from core.change.evidence import NOTHING_GATHERED, Counted, Finding, GatheredEvi
 from core.change.reading import WatchedReading
 from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits, sure_size
 from core.change.verdict import OF_EVIDENCE, Verdict, counted_verdict
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import FilmConditions
 from core.limits import REST, AlarmLevel, LevelTimer
 from core.units import NS_PER_S
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from core.baseline.baseline import QuantityBaseline, TimeScatter
-from core.baseline.smoothing import NOTHING_NEW, Newest, forgetting, forgetting_step
+from core.baseline.grouping import NOTHING_NEW, Newest, forgetting, forgetting_step
 
 
 @dataclass(frozen=True)

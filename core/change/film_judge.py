@@ -13,7 +13,7 @@ from core.change.film_reading import FilmReading
 from core.change.film_rules import FilmRules
 from core.change.reading import WatchedReading
 from core.change.recent_readings import RecentReadings
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import FilmConditions
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from core.baseline.stiffness_history import DIRECTIONS, Evidence
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Level, Quality, Reading, Reason, worst

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 from core.machine.unit import Estimator
 
 

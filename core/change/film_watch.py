@@ -8,8 +8,7 @@ from core.change.film_judge import FilmJudge, FilmNews
 from core.change.film_memory import FilmMemory
 from core.change.film_reading import FilmReading, film_reading, shown, sure
 from core.change.film_rules import FilmRules
-from core.condition.bearing_condition import BearingCondition
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import BearingCondition, FilmConditions
 from core.condition.oil_settling import NOT_AT_SPEED, OilSettling
 from core.condition.operating_state import NEVER_SEEN, OperatingReading, Operation, advance
 from core.monitor.assessment import Assessment

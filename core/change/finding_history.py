@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.baseline import Deviations, QuantityBaseline
-from core.baseline.smoothing import forgetting, forgetting_sum, running_median
+from core.baseline.grouping import forgetting, forgetting_sum, running_median
 
 
 @dataclass(frozen=True, eq=False)

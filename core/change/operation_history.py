@@ -8,8 +8,7 @@ import numpy.typing as npt
 from core.arrays import FloatArray, TimeArray
 from core.baseline.stiffness_history import CodeArray
 from core.condition.oil_settling import oil_settled
-from core.condition.operating_limits import Band, OperatingLimits
-from core.condition.operating_state import STEADY, OperatingState
+from core.condition.operating_state import STEADY, Band, OperatingLimits, OperatingState
 
 _Bools = npt.NDArray[np.bool_]
 _Ints = npt.NDArray[np.int64]

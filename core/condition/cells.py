@@ -1,13 +1,46 @@
-"""Cells of eccentricity and oil temperature (and attitude): within one, like meets like."""
+"""The conditions that films are compared under, and the cells that they fall into."""
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from core.condition.film_conditions import FilmConditions
+from core.arrays import FloatArray
+from core.condition.operating_state import OperatingState
+
+
+@dataclass(frozen=True, eq=False)
+class FilmConditions:
+    """Conditions of n readings as columns; NaN where something is not known.
+
+    Parameters
+    ----------
+    eccentricity_ratio, oil_temperature_c, attitude_deg : (n,)
+    """
+
+    eccentricity_ratio: FloatArray
+    oil_temperature_c: FloatArray
+    attitude_deg: FloatArray
+
+    @classmethod
+    def one(cls, eccentricity_ratio: float, oil_temperature_c: float, attitude_deg: float) -> Self:
+        """Condition of one reading."""
+        columns = np.array([[eccentricity_ratio], [oil_temperature_c], [attitude_deg]])
+        return cls(*columns)
+
+    def __len__(self) -> int:
+        return int(self.eccentricity_ratio.size)
+
+    def rows(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "FilmConditions":
+        """Some of the readings, by mask or row."""
+        return FilmConditions(
+            self.eccentricity_ratio[wanted],
+            self.oil_temperature_c[wanted],
+            self.attitude_deg[wanted],
+        )
+
 
 Cell: TypeAlias = tuple[int, ...]
 """Bin numbers of eccentricity ratio, oil temperature and, where it counts, attitude angle."""
@@ -76,3 +109,37 @@ class CellGrid:
         """Eccentricity ratio, oil temperature and attitude angle in the middle of a cell."""
         widths = (self.eccentricity_width, self.temperature_width_c, self.attitude_width_deg)
         return tuple((i + 0.5) * w for i, w in zip(cell, widths, strict=False) if w is not None)
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Operating state, eccentricity, attitude and oil temperature; None where not known."""
+
+    state: OperatingState = OperatingState.UNKNOWN
+    eccentricity_ratio: float | None = None
+    attitude_deg: float | None = None
+    oil_temperature_c: float | None = None
+
+
+NOWHERE_KNOWN = OperatingPoint()
+"""Of which nothing is known."""
+
+
+@dataclass(frozen=True)
+class BearingCondition:
+    """What a bearing's stiffness is compared by.
+
+    Parameters
+    ----------
+    state
+        What the unit does.
+    is_settled
+        Whether it has done so for the settling time, after the warm-up: only then are films alike.
+    cell
+        Bins of eccentricity ratio, oil temperature and, where it counts, attitude angle; None where
+        one of them is not known.
+    """
+
+    state: OperatingState
+    is_settled: bool
+    cell: Cell | None

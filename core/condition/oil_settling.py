@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.condition.operating_limits import OperatingLimits
-from core.condition.operating_state import Operation
+from core.condition.operating_state import OperatingLimits, Operation
 
 PARTS = 8
 """Parts of the settling time at which the temperature is remembered."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from core.arrays import SampleArray
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.quality import Quality, Reading
 from core.spectra.cross_spectrum import CrossSpectrum

@@ -8,10 +8,10 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm, AlarmKind
-from core.alarms.chatter import ChatterRule, ChatterWatch
+from core.alarms.board import AlarmMemory
 from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
-from core.alarms.memory import AlarmMemory
 from core.alarms.operation import Action
+from core.alarms.statistics import ChatterRule, ChatterWatch
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import VectorReference
 from core.limits import Condition

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
+from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
-from core.alarms.watch import Watch
 from core.limits import WITHIN, AlarmLevel, Condition
 from service.alarms.told_alarms import ToldAlarms
 

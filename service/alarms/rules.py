@@ -1,6 +1,5 @@
 """From the plant file's settings to the rules of a unit."""
 
-from core.alarms.chatter import ChatterRule
 from core.alarms.condition_limits import ConditionLimits
 from core.alarms.rules import (
     BearingRules,
@@ -10,6 +9,7 @@ from core.alarms.rules import (
     ZoneRule,
     rule_of,
 )
+from core.alarms.statistics import ChatterRule
 from core.alarms.vector_change import OrderVector, VectorReference
 from core.limits import Limits, ZoneLimits
 from core.units import ns_from_s

@@ -7,9 +7,9 @@ from dataclasses import replace
 from core.alarms.alarm import Alarm, AlarmKind
 from core.alarms.board import AlarmBoard
 from core.alarms.event import AlarmNews
+from core.alarms.kinds import LimitWatch
 from core.alarms.operation import Action
-from core.alarms.watch import LimitWatch
-from core.condition.bearing_condition import NOWHERE_KNOWN
+from core.condition.cells import NOWHERE_KNOWN
 from core.limits import WITHIN, AlarmLevel, Condition
 from core.quality import Reading
 from core.samples.account import SampleAccount

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from core.alarms.alarm import PLANT, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.condition_limits import ConditionLimits
+from core.alarms.kinds import LimitWatch, Watch
 from core.alarms.rules import rule_of
-from core.alarms.watch import LimitWatch, Watch
 from core.limits import Limits
 from service.alarms.stream_alarms import STREAM
 from service.settings.alarms import AlarmSettings

@@ -6,10 +6,10 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from acquisition.clock import Clock
-from core.alarms.chatter import SHOWN_NS
+from core.alarms.board import AlarmMemory
 from core.alarms.event import AlarmNews
-from core.alarms.memory import AlarmMemory
 from core.alarms.rules import UnitRules, rule_of
+from core.alarms.statistics import SHOWN_NS
 from core.alarms.unit_alarms import UnitAlarms
 from core.change.film_rules import FilmRules
 from core.samples.blocks import SampleBlock

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from core.alarms.alarm import Alarm
 from core.alarms.board import AlarmBoard
 from core.alarms.event import AlarmNews
+from core.alarms.kinds import Watch
 from core.alarms.operation import Action
-from core.alarms.watch import Watch
 from core.limits import WITHIN, Condition
 
 

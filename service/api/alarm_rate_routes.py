@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from core.alarms.alarm import PLANT
-from core.alarms.figures import DAY_NS
+from core.alarms.statistics import DAY_NS
 from service.api.access.declared import Reach, needs
 from service.api.alarm_rate_models import AlarmRatesModel
 from service.api.alarm_rate_views import alarm_rates_model, counted

@@ -4,8 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from core.alarms.alarm import PLANT
-from core.alarms.chatter import ChatterRule
-from core.alarms.figures import AlarmFigures, figures_of, stale_alarms
+from core.alarms.statistics import AlarmFigures, ChatterRule, figures_of, stale_alarms
 from core.limits import AlarmLevel
 from service.api.alarm_rate_models import AlarmFiguresModel, AlarmRatesModel, FrequentModel
 from service.api.alarm_views import LEVEL_NAMES, alarm_model

@@ -1,8 +1,7 @@
 """Alarms in the words of the API."""
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
-from core.condition.bearing_condition import OperatingPoint
-from core.condition.cells import CellGrid
+from core.condition.cells import CellGrid, OperatingPoint
 from core.limits import AlarmLevel, Condition
 from service.api.alarm_models import (
     AlarmCountModel,

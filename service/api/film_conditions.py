@@ -3,9 +3,7 @@
 import math
 from typing import cast
 
-from core.condition.bearing_condition import BearingCondition, OperatingPoint
-from core.condition.cells import Cell, CellGrid
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions, OperatingPoint
 from core.condition.operating_state import OperatingState
 from service.api.film_models import CellModel, FilmConditionModel, OperatingStateName
 from service.api.times import rfc3339

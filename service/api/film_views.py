@@ -12,7 +12,7 @@ from core.change.film_judge import FilmNews
 from core.change.film_reading import FilmReading
 from core.change.film_rules import FilmRules
 from core.change.verdict import Verdict
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import FilmConditions
 from service.api.context import Context
 from service.api.film_conditions import condition_model
 from service.api.film_models import (

@@ -16,7 +16,7 @@ from core.change.back_test import DecisionHistory, back_test
 from core.change.operation_history import OperationHistory, operation_history, operation_of_states
 from core.change.settings import ChangeLimits
 from core.change.verdict import OF_EVIDENCE, Verdict
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 from service.back_test.file_columns import ReadingsError
 from service.back_test.periods import Learning, MachineEvent, Period, periods_of
 from service.films.learning import drifted

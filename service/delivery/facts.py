@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from core.alarms.alarm import AlarmIdentity, AlarmKind
-from core.alarms.bearing_watches import READINGS
+from core.alarms.kinds import READINGS
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE

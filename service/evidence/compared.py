@@ -10,8 +10,7 @@ from core.baseline.cell_table import CellStatistics
 from core.change.decision import Decision
 from core.change.film_judge import FilmNews
 from core.change.film_rules import FilmRules
-from core.condition.cells import Cell
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import Cell, FilmConditions
 from service.api.times import rfc3339
 from service.evidence.bearing_part import AXES, Direction
 from service.evidence.comparison_part import (

@@ -7,8 +7,7 @@ from core.change.attribution import Attribution
 from core.change.film_finding import FilmFinding
 from core.change.film_judge import FilmNews
 from core.change.film_rules import FilmRules
-from core.condition.bearing_condition import BearingCondition
-from core.condition.cells import Cell, CellGrid
+from core.condition.cells import BearingCondition, Cell, CellGrid
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment, AveragingWindow
 from core.monitor.catalogue import BY_NAME

@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import TimeArray
-from core.baseline.agreement import mean_difference
+from core.baseline.agreement import learning_drift, mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
-from core.baseline.drift import learning_drift
 from core.baseline.far_readings import far_readings
 from core.baseline.learning import learn
 from core.baseline.response import ShaftResponse, learn_response

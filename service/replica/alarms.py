@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 
 from core.alarms.alarm import PLANT, Alarm
-from core.alarms.chatter import ChatterRule
+from core.alarms.statistics import ChatterRule
 from service.alarms.count import AlarmCount, count_of
 from service.alarms.gone_alarms import SHARED, is_shared
 from service.alarms.service_rules import told_by

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from core.alarms.alarm import Alarm
 from core.change.film_finding import FilmFinding
 from core.change.film_reading import FilmReading
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.monitor.assessment import AveragingWindow, Evidence
 from core.quality import Quality, Reading

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from core.alarms.memory import AlarmMemory
+from core.alarms.board import AlarmMemory
 from core.change.film_memory import FilmMemory
 from core.monitor.monitor_state import MonitorState
 from core.samples.counts import Count

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from core.baseline.settings import BaselineSettings
 from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 from service.settings.base import MisfitError, Settings
 
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]

@@ -5,7 +5,7 @@ from typing import Any
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Condition
 from service.audit.entry import Deed

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
-from acquisition.simulated.plant.rotor_parameters import (
+from acquisition.simulated.plant.rotor import (
     LJB,
     UJB,
     ForcePlane,
     RotorParameters,
+    bearing_response,
+    forward_force,
+    rotor_matrices,
     unbalance_force_n,
 )
 from core.stiffness.ratio import effective_stiffness_n_per_m

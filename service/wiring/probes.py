@@ -3,13 +3,12 @@
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.modbus.cells import BIT_FUNCTIONS
 from acquisition.modbus.decoding import MapDecoder
-from acquisition.modbus.identification import Identification
+from acquisition.modbus.identity import Identification
 from acquisition.modbus.link import ModbusLink
-from acquisition.modbus.map_reader import MapReader
-from acquisition.modbus.profile import RingHeader
+from acquisition.modbus.polled_source import MapReader
 from acquisition.modbus.register_map import RegisterMap
-from acquisition.modbus.ring_reader import RingReader
-from acquisition.modbus.slot import Slot
+from acquisition.modbus.ring_follower import RingReader
+from acquisition.modbus.ring_profile import RingHeader, Slot
 from acquisition.modbus.transport import LinkSettings
 from service.settings.modbus_link import ModbusLinkSettings
 from service.wiring.modbus import link_fields

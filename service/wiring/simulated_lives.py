@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 
 from acquisition.errors import ConfigError
+from acquisition.simulated.life.bearing import LIFE_BEARINGS
+from acquisition.simulated.life.course import LifeCourse, LifePlan, course_from, history_until
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.inputs import rated_speed_rpm
-from acquisition.simulated.life.life_bearing import LIFE_BEARINGS
-from acquisition.simulated.life.life_course import LifeCourse
 from acquisition.simulated.life.moment import TRANSDUCER_NOISE
 from acquisition.simulated.life.operation import RATED_POWER_MW
-from acquisition.simulated.life.present import LifePlan, course_from, history_until
-from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.rotor import RotorParameters
 from acquisition.simulated.plant.scenario import TransducerNoise
 from core.baseline.stiffness_history import StiffnessHistory
 from core.units import ns_from_s

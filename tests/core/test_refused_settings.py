@@ -9,7 +9,7 @@ import pytest
 from core.baseline.settings import BaselineSettings
 from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 from core.limits import Limits
 from core.machine.bracket import BracketDynamics
 from core.machine.response import ResponseTable

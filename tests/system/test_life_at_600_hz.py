@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.truth import UnitLife
 from benchmarks.chain import MOST_BIAS, STORY, Verdicts, judged, without_scatter
 from benchmarks.chain_story import ROWS_PER_H, Watch, from_readings, silenced, windows
 from benchmarks.chain_unit import readings

@@ -15,7 +15,7 @@ from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.rotor_parameters import unbalance_force_n
+from acquisition.simulated.plant.rotor import unbalance_force_n
 from acquisition.simulated.plant.scenario import (
     BearingScenario,
     HydraulicNoise,

@@ -4,8 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import TypeAlias
 
-from acquisition.modbus.ring_layout import U32
-from acquisition.modbus.slot import Slot
+from acquisition.modbus.ring_profile import U32, Slot
 
 SlotFault: TypeAlias = Callable[[Slot], Slot | None]
 """Takes the right slot, gives what is written instead; None if nothing is."""

@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from acquisition.modbus.ring_layout import U32, RingLayout
+from acquisition.modbus.ring_profile import U32, RingLayout
 from acquisition.modbus.timeline import ahead
 
 

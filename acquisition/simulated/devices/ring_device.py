@@ -7,9 +7,14 @@ import numpy as np
 
 from acquisition.delivery.raw import RawBlock, RawFeed
 from acquisition.errors import ConfigError
-from acquisition.modbus.profile import RingHeader, encode_header
-from acquisition.modbus.ring_layout import U32
-from acquisition.modbus.slot import Slot, encode_slot, encode_slow
+from acquisition.modbus.ring_profile import (
+    U32,
+    RingHeader,
+    Slot,
+    encode_header,
+    encode_slot,
+    encode_slow,
+)
 from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.faults import Repetition, SlotFault
 from acquisition.simulated.devices.reading_watch import ReadingWatch

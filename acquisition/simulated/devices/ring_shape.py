@@ -6,8 +6,7 @@ import numpy as np
 
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.modbus.profile import HEADER_REGISTERS
-from acquisition.modbus.ring_layout import RingLayout
+from acquisition.modbus.ring_profile import HEADER_REGISTERS, RingLayout
 
 
 @dataclass(frozen=True, kw_only=True)

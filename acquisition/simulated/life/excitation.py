@@ -1,10 +1,20 @@
-"""What shakes a unit over the years: residual unbalance, turbulence, the part-load vortex."""
+"""Unbalance, turbulence and vortex over the years, and the answer at 1×."""
+
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from acquisition.simulated.life.operation import Operation
-from acquisition.simulated.life.wander import lagged, wander
-from core.arrays import FloatArray
+from acquisition.simulated.life.operation import Operation, lagged, wander
+from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film, FilmColumns
+from acquisition.simulated.plant.rotor import (
+    N_SHAFT_COORDINATES,
+    RotorParameters,
+    rotor_matrices,
+    unbalance_force_n,
+)
+from core.arrays import ComplexArray, FloatArray
+from core.units import um_from_m
 
 WARM_UNBALANCE = 0.76
 """Unbalance of the warm rotor over that of the cold one.
@@ -61,3 +71,82 @@ def hydraulic_force_n(load: FloatArray) -> FloatArray:
     """Rms of the broadband hydraulic force in each direction, (n,)."""
     smooth_n = NO_LOAD_FORCE_N + (FULL_LOAD_FORCE_N - NO_LOAD_FORCE_N) * np.clip(load, 0.0, 1.0)
     return smooth_n * (1.0 + (VORTEX_TURBULENCE - 1.0) * has_vortex(load))
+
+
+NO_FILM = Film.proportional(0.0, 0.0)
+SHAFT = slice(0, N_SHAFT_COORDINATES)
+
+
+def order1_um_pk(
+    films: Mapping[str, FilmColumns],
+    bracket_factors: Mapping[str, FloatArray],
+    speed_rpm: float,
+    grade_mm_s: FloatArray,
+    rotor: RotorParameters,
+) -> dict[str, ComplexArray]:
+    """Answer to an unbalance in the plane of the mass centre, the model of `plant.rotor`.
+
+    Brackets are eliminated: with D = K + iΩC of the film and b = k_b − m_b Ω² of the bracket, the
+    shaft meets (D⁻¹ + b⁻¹)⁻¹, which leaves four equations instead of ten.
+
+    Parameters
+    ----------
+    bracket_factors : (n,) by bearing
+        True stiffness of the brackets over that of `rotor`.
+    speed_rpm
+        Rated: it does not vary enough to matter.
+    grade_mm_s : (n,)
+
+    Returns
+    -------
+    (4, n) by bearing: phasors of u_x, u_y, x_b, y_b.
+    """
+    alone = rotor_matrices(rotor, {b.bearing: NO_FILM for b in rotor.brackets}, speed_rpm)
+    omega = alone.speed_rad_s
+    free = alone.stiffness - omega**2 * alone.mass + 1j * omega**2 * alone.gyroscopic
+    dynamic = np.tile(free[SHAFT, SHAFT], (grade_mm_s.size, 1, 1))
+    shares = {}
+    for bracket in rotor.brackets:
+        spring = bracket.stiffness_n_per_m * bracket_factors[bracket.bearing]
+        b = spring - bracket.mass_kg * omega**2
+        film = _matrices(films[bracket.bearing]) * (1.0 + 1j * omega * DAMPING_OVER_STIFFNESS_S)
+        b = b[:, np.newaxis, np.newaxis]
+        share = _inverse(np.asarray(film + b * np.eye(2), np.complex128)) * b
+        motion = shaft_motion(bracket.height_m)
+        dynamic += motion.T @ (film @ share) @ motion
+        shares[bracket.bearing] = share, motion
+    force = np.zeros((grade_mm_s.size, N_SHAFT_COORDINATES, 1), dtype=np.complex128)
+    unit_force_n = unbalance_force_n(1.0, speed_rpm)
+    force[:, 0, 0], force[:, 1, 0] = unit_force_n * grade_mm_s, -1j * unit_force_n * grade_mm_s
+    shaft = np.linalg.solve(dynamic, force)
+    return {name: _split(share, motion @ shaft) for name, (share, motion) in shares.items()}
+
+
+def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
+    """The paper's rotor on the brackets of some bearings."""
+    rotor = RotorParameters()
+    return replace(rotor, brackets=tuple(b for b in rotor.brackets if b.bearing in ids))
+
+
+def shaft_motion(height_m: float) -> FloatArray:
+    """Map X, Y, φ_x, φ_y to the motion (x, y) of the shaft at a height (Brito et al., Table 3)."""
+    return np.array([[1.0, 0.0, 0.0, height_m], [0.0, 1.0, -height_m, 0.0]])
+
+
+def _split(share: ComplexArray, shaft_m: ComplexArray) -> ComplexArray:
+    """Motion of the shaft relative to the bearing, and of the bearing."""
+    relative = (share @ shaft_m)[:, :, 0].T
+    return np.asarray(um_from_m(1.0) * np.concatenate([relative, shaft_m[:, :, 0].T - relative]))
+
+
+def _matrices(film: FilmColumns) -> FloatArray:
+    """Stiffness, (n, 2, 2)."""
+    rows = ((film.k_xx_n_per_m, film.k_xy_n_per_m), (film.k_xy_n_per_m, film.k_yy_n_per_m))
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _inverse(matrix: ComplexArray) -> ComplexArray:
+    """Inverses of symmetric 2×2 matrices, (n, 2, 2)."""
+    a, b, d = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
+    inverse = np.moveaxis(np.array([[d, -b], [-b, a]]), -1, 0)
+    return np.asarray(inverse / (a * d - b * b)[:, np.newaxis, np.newaxis])

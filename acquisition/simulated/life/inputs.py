@@ -4,21 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.simulated.life.condition_change import ConditionChange
-from acquisition.simulated.life.excitation import draw_grade_mm_s
-from acquisition.simulated.life.films import PadSetting, draw_setting, worn_pad
-from acquisition.simulated.life.held_load import HeldLoad
-from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
-from acquisition.simulated.life.measured import Chain, draw_chain
-from acquisition.simulated.life.operation import Operation, time_grid_ns
-from acquisition.simulated.life.schedule import draw_operation
-from acquisition.simulated.life.shaft_position import draw_positions_um
-from acquisition.simulated.life.thermal import (
+from acquisition.simulated.life.bearing import (
+    LIFE_BEARINGS,
+    LifeBearing,
     ThermalCourse,
     draw_closing_share,
     draw_water_c,
     thermal_course,
 )
+from acquisition.simulated.life.excitation import draw_grade_mm_s
+from acquisition.simulated.life.films import PadSetting, draw_setting, worn_pad
+from acquisition.simulated.life.operation import HeldLoad, Operation, draw_operation, time_grid_ns
+from acquisition.simulated.life.shaft import ConditionChange, draw_positions_um
+from acquisition.simulated.life.truth import Chain, draw_chain
 from core.arrays import FloatArray
 
 RATED_SPEEDS_RPM = (92.3, 90.9)

@@ -4,9 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from acquisition.simulated.life.excitation import VORTEX_FORCE_N, has_vortex, hydraulic_force_n
-from acquisition.simulated.life.life_truth import BearingMoments, UnitLife
-from acquisition.simulated.life.order1 import rotor_of
+from acquisition.simulated.life.excitation import (
+    VORTEX_FORCE_N,
+    has_vortex,
+    hydraulic_force_n,
+    rotor_of,
+)
+from acquisition.simulated.life.truth import BearingMoments, UnitLife
 from acquisition.simulated.plant.scenario import (
     BearingScenario,
     ChannelScenario,

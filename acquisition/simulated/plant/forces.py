@@ -9,7 +9,7 @@ from acquisition.simulated.plant.excitation import (
     UnbalanceForce,
 )
 from acquisition.simulated.plant.rotation import Turning
-from acquisition.simulated.plant.rotor_parameters import ForcePlane, unbalance_force_n
+from acquisition.simulated.plant.rotor import ForcePlane, unbalance_force_n
 from acquisition.simulated.plant.scenario import Scenario
 from core.arrays import FloatArray
 from core.units import hz_from_rpm

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from acquisition.simulated.plant.faults import Fault
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.rotor_parameters import ForcePlane, RotorParameters
+from acquisition.simulated.plant.rotor import ForcePlane, RotorParameters
 from core.machine.response import Response
 
 

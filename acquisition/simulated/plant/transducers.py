@@ -4,9 +4,13 @@ import numpy as np
 
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.probes import probes
-from acquisition.simulated.plant.rotor import RotorMatrices, bracket_motion, relative_motion
-from acquisition.simulated.plant.rotor_discrete import state_matrix
-from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.rotor import (
+    RotorMatrices,
+    RotorParameters,
+    bracket_motion,
+    relative_motion,
+)
+from acquisition.simulated.plant.rotor_steps import state_matrix
 from core.arrays import FloatArray
 from core.machine.unit import Measurand, Unit
 

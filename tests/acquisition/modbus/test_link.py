@@ -9,8 +9,7 @@ from pymodbus.pdu import ModbusPDU
 
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import TcpFramer
-from acquisition.modbus.identification import Identification
-from acquisition.modbus.identity import ExpectedIdentification, Signature
+from acquisition.modbus.identity import ExpectedIdentification, Identification, Signature
 from acquisition.modbus.ring_source import ModbusRingSettings
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
 

@@ -10,9 +10,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.profile import RingHeader, decode_header, encode_header
-from acquisition.modbus.ring_layout import RingLayout
-from acquisition.modbus.slot import Slot, decode_slot, encode_slot
+from acquisition.modbus.ring_profile import (
+    RingHeader,
+    RingLayout,
+    Slot,
+    decode_header,
+    decode_slot,
+    encode_header,
+    encode_slot,
+)
 
 u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)

@@ -5,8 +5,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
-from acquisition.modbus.profile import RingHeader, encode_header
-from acquisition.modbus.slot import encode_slot
+from acquisition.modbus.ring_profile import RingHeader, encode_header, encode_slot
 from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings

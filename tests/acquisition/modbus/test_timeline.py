@@ -11,8 +11,7 @@ from acquisition.errors import FrameError
 from acquisition.modbus.counted_samples import WRAP, CountedSamples, Place
 from acquisition.modbus.fifo_assembly import ChannelAssembly, place_records
 from acquisition.modbus.fifo_layout import FifoPiece
-from acquisition.modbus.ring_layout import U32, RingLayout
-from acquisition.modbus.slot import Slot
+from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from acquisition.modbus.uncounted_samples import UncountedSamples
 

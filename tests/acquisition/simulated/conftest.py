@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.rotor import RotorParameters
 from acquisition.simulated.plant.scenario import (
     BearingScenario,
     HydraulicNoise,

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, missing, uncertain

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
-from core.alarms.chatter import ChatterRule, ChatterWatch
 from core.alarms.event import AlarmChange, AlarmEvent
-from core.alarms.figures import figures_of, stale_alarms
+from core.alarms.statistics import ChatterRule, ChatterWatch, figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.alarms.condition_limits import AT_SPEED, ConditionLimits, Region
-from core.alarms.conditions import (
+from core.alarms.kinds import (
     channel_condition,
     drift_reading,
     link_condition,
@@ -13,7 +13,7 @@ from core.alarms.conditions import (
     slow_channel_condition,
     stamp_condition,
 )
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Limits, ZoneLimits, judge
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain

@@ -13,7 +13,7 @@ from core.alarms.operation import Acknowledge
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.alarms.vector_change import OrderVector, VectorReference
-from core.condition.bearing_condition import BearingCondition, OperatingPoint
+from core.condition.cells import BearingCondition, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import Limits
 from core.machine.unit import Unit

@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from core.baseline.agreement import Drift, drift_within, learning_drift
 from core.baseline.baseline import Origin
-from core.baseline.drift import Drift, drift_within, learning_drift
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.slope_scatter import slope_scatter
 from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.surface_fit import slope_scatter
 
 FilmLife = Callable[..., StiffnessHistory]
 

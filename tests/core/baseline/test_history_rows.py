@@ -9,8 +9,7 @@ import pytest
 from core.baseline.history_rows import histories_from_columns
 from core.baseline.stiffness_history import Evidence, StiffnessHistory
 from core.change.operation_history import operation_history, operation_of_states
-from core.condition.operating_limits import OperatingLimits
-from core.condition.operating_state import OperatingState
+from core.condition.operating_state import OperatingLimits, OperatingState
 
 STEP_NS = 600_000_000_000
 PLACES = {("U1", "UJB"), ("U1", "LJB"), ("U2", "UJB")}

@@ -11,8 +11,7 @@ from core.baseline.cell_table import Support, cells_between, neighbourhood
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.baseline.stiffness_history import StiffnessHistory
-from core.condition.cells import CellGrid
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import CellGrid, FilmConditions
 
 ORIGIN = Origin("U1", "UJB", "dynamic", 1, "Ada", 1_700_000_000_000_000_000, "commissioning")
 FilmLife = Callable[..., StiffnessHistory]

@@ -16,7 +16,7 @@ from core.change.decision import UNDECIDED, Decision, advance
 from core.change.operation_history import operation_history
 from core.change.reading import WatchedReading
 from core.change.settings import ChangeLimits
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 
 DAY_NS = 86_400_000_000_000
 LEARNING_DAYS = 120

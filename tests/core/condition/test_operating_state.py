@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from core.change.operation_history import operation_history
-from core.condition.cells import CellGrid
-from core.condition.film_conditions import FilmConditions
+from core.condition.cells import CellGrid, FilmConditions
 from core.condition.oil_settling import NOT_AT_SPEED
-from core.condition.operating_limits import OperatingLimits
 from core.condition.operating_state import (
     NEVER_SEEN,
+    OperatingLimits,
     OperatingReading,
     OperatingState,
     Operation,

@@ -8,7 +8,7 @@ import pytest
 
 from core.alarms.alarm import AlarmKind, AlarmState
 from core.alarms.event import AlarmChange
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from service.api.alarm_names import AlarmChangeName, AlarmKindName, AlarmStateName

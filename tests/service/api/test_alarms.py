@@ -9,7 +9,7 @@ import pytest
 from rigs.assessments import assessment
 from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, PROBE, SHELVE, Probes, post
 
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.quality import Reason
 from service.api.alarm_routes import N_COMMENTS, S_PER_COMMENT

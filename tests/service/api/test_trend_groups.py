@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from service.settings.plant import PlantFile

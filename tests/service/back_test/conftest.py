@@ -14,11 +14,10 @@ from rigs.tiers import fast_and_long
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.truth import UnitLife
 from core.baseline.stiffness_history import DIRECTIONS, Evidence
 from core.change.operation_history import operation_history
-from core.condition.operating_limits import OperatingLimits
-from core.condition.operating_state import OperatingState
+from core.condition.operating_state import OperatingLimits, OperatingState
 
 DAY_NS = 86_400 * 10**9
 START_NS = 19_723 * DAY_NS

@@ -14,7 +14,7 @@ from core.change.film_finding import FilmFinding
 from core.change.film_judge import FilmNews
 from core.change.film_reading import FilmReading, FilmValue
 from core.change.verdict import Verdict
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason

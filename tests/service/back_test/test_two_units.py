@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.truth import UnitLife
 from core.baseline.baseline import Origin, Watched
 from core.baseline.exchange import from_json
 from core.baseline.history_rows import BearingRows, Place
@@ -21,7 +21,7 @@ from core.change.attribution import PlaceReadings, attribute
 from core.change.back_test import back_test
 from core.change.operation_history import operation_history
 from core.change.settings import ChangeLimits
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 from service.api.times import rfc3339
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines

@@ -13,9 +13,8 @@ from core.change.film_judge import FilmNews
 from core.change.film_reading import FilmReading, FilmValue
 from core.change.operation_history import operation_history
 from core.change.verdict import Verdict
-from core.condition.bearing_condition import BearingCondition
-from core.condition.operating_limits import OperatingLimits
-from core.condition.operating_state import OperatingState
+from core.condition.cells import BearingCondition
+from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
 from service.store.sqlite import SqliteStore

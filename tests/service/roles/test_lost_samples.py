@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
-from core.alarms.chatter import ChatterRule
 from core.alarms.event import AlarmChange, AlarmNews, changed
+from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import ServiceHealth

@@ -6,11 +6,11 @@ from collections.abc import Callable
 import pytest
 
 from core.alarms.alarm import AlarmRule
-from core.alarms.chatter import ChatterRule
 from core.alarms.condition_limits import AT_SPEED, EVERY_STATE, Region
 from core.alarms.rules import BearingRules, LimitRule
+from core.alarms.statistics import ChatterRule
 from core.alarms.vector_change import OrderVector, VectorReference
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import Limits
 from service.alarms.rules import chatter_rule_of, references_of, rules_of

@@ -12,7 +12,7 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
-from core.condition.bearing_condition import OperatingPoint
+from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import RESTED, AlarmLevel, Condition, unknown
 from service.store.port import AlarmQuery, StoreError

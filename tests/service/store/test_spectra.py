@@ -13,7 +13,7 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Execute
 
 from core.arrays import FloatArray
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reason, missing

@@ -10,7 +10,7 @@ import pytest
 from acquisition.delivery.blocks import Delivery
 from acquisition.errors import ConfigError
 from core.change.film_reading import film_reading
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment

@@ -10,7 +10,7 @@ from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import FeedEndedError, RawBlock
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.ring_layout import RingLayout
+from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.simulated.devices.reading_watch import ReadingWatch
 from acquisition.simulated.devices.ring_device import RingDevice

@@ -9,9 +9,8 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.profile import decode_header
+from acquisition.modbus.ring_profile import decode_header, decode_slot, decode_slow
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.modbus.slot import decode_slot, decode_slow
 from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.register_memory import RegisterMemory
 from acquisition.simulated.devices.ring_device import RingDevice

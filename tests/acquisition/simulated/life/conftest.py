@@ -5,10 +5,10 @@ from functools import cache
 
 import pytest
 
-from acquisition.simulated.life.condition_change import ConditionChange
 from acquisition.simulated.life.damage import Damage
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.shaft import ConditionChange
+from acquisition.simulated.life.truth import UnitLife
 from core.units import NS_PER_S
 
 START_NS = 1_735_689_600 * NS_PER_S

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.simulated.life.condition_change import cooling_failure, four_fold
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_truth import UnitLife
+from acquisition.simulated.life.shaft import cooling_failure, four_fold
+from acquisition.simulated.life.truth import UnitLife
 from core.arrays import FloatArray
 from core.baseline.stiffness_history import Evidence
 

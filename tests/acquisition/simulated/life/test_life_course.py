@@ -8,13 +8,12 @@ import pytest
 from rigs.tiers import fast_and_long
 
 from acquisition.delivery.blocks import Delivery
+from acquisition.simulated.life.course import LifeCourse, LifePlan, course_from, history_until
 from acquisition.simulated.life.damage import Damage, DamageKind
-from acquisition.simulated.life.held_load import HeldLoad
 from acquisition.simulated.life.inputs import LifeInputs, draw_inputs
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.life_course import LifeCourse
 from acquisition.simulated.life.moment import scenario_at
-from acquisition.simulated.life.present import LifePlan, course_from, history_until
+from acquisition.simulated.life.operation import HeldLoad
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES
 from acquisition.simulated.plant.unit import SimulatedUnit
 from benchmarks.chain_unit import CALIBRATION, SETTINGS, UNIT, UNKNOWN, WINDOW_SAMPLES

@@ -6,21 +6,22 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from acquisition.simulated.life.bearing import LIFE_UJB, ThermalCourse
 from acquisition.simulated.life.damage import Damage, DamageKind
+from acquisition.simulated.life.excitation import order1_um_pk
 from acquisition.simulated.life.films import even_setting, film_course
-from acquisition.simulated.life.life_bearing import LIFE_UJB
-from acquisition.simulated.life.life_truth import UnitLife
 from acquisition.simulated.life.moment import row_at, scenario_at
-from acquisition.simulated.life.order1 import order1_um_pk
-from acquisition.simulated.life.thermal import ThermalCourse
-from acquisition.simulated.life.wander import lagged, wander
-from acquisition.simulated.plant.rotor import bearing_response, forward_force, rotor_matrices
-from acquisition.simulated.plant.rotor_parameters import (
+from acquisition.simulated.life.operation import lagged, wander
+from acquisition.simulated.life.truth import UnitLife
+from acquisition.simulated.plant.films import FilmColumns
+from acquisition.simulated.plant.rotor import (
     ForcePlane,
     RotorParameters,
+    bearing_response,
+    forward_force,
+    rotor_matrices,
     unbalance_force_n,
 )
-from acquisition.simulated.plant.tilting_pad import FilmColumns
 from benchmarks.accuracy_plant import machine
 from core.machine.unit import Measurand
 

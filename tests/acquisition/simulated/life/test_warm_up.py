@@ -10,13 +10,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from acquisition.simulated.life.excitation import warm_unbalance
+from acquisition.simulated.life.bearing import LIFE_BEARINGS, LifeBearing, thermal_course
+from acquisition.simulated.life.excitation import order1_um_pk, warm_unbalance
 from acquisition.simulated.life.films import even_setting, film_course
-from acquisition.simulated.life.life_bearing import LIFE_BEARINGS, LifeBearing
 from acquisition.simulated.life.operation import Operation
-from acquisition.simulated.life.order1 import order1_um_pk
-from acquisition.simulated.life.thermal import thermal_course
-from acquisition.simulated.plant.rotor_parameters import RotorParameters
+from acquisition.simulated.plant.rotor import RotorParameters
 from core.arrays import FloatArray
 
 N_MINUTES = 421

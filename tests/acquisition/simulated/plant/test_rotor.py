@@ -3,14 +3,12 @@ import pytest
 
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.rotor import (
+    ForcePlane,
+    RotorParameters,
     bearing_response,
     force_map,
     forward_force,
     rotor_matrices,
-)
-from acquisition.simulated.plant.rotor_parameters import (
-    ForcePlane,
-    RotorParameters,
     unbalance_force_n,
 )
 

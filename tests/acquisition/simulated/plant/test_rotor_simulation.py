@@ -3,6 +3,8 @@ import pytest
 
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.rotor import (
+    ForcePlane,
+    RotorParameters,
     bearing_response,
     bracket_motion,
     force_map,
@@ -10,9 +12,7 @@ from acquisition.simulated.plant.rotor import (
     relative_motion,
     rotor_matrices,
 )
-from acquisition.simulated.plant.rotor_discrete import DiscreteRotor, Hold, discretize
-from acquisition.simulated.plant.rotor_parameters import ForcePlane, RotorParameters
-from acquisition.simulated.plant.rotor_simulation import lift, simulate
+from acquisition.simulated.plant.rotor_steps import DiscreteRotor, Hold, discretize, lift, simulate
 from core.arrays import FloatArray
 
 PARAMETERS = RotorParameters()

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.simulated.plant.oil import Oil
-from acquisition.simulated.plant.tilting_pad import FilmColumns, PadRing
+from acquisition.simulated.plant.films import FilmColumns, Oil, PadRing
 from core.arrays import FloatArray
 
 RING = PadRing(16, 6.67e9, 200.0, 0.034, 92.3, first_pad_deg=11.25)

@@ -13,7 +13,7 @@ from acquisition.delivery.calibration import UnitCalibration, calibrate
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
-from acquisition.simulated.plant.rotor_parameters import ForcePlane, unbalance_force_n
+from acquisition.simulated.plant.rotor import ForcePlane, unbalance_force_n
 from acquisition.simulated.plant.scenario import BearingScenario, HydraulicNoise, Scenario
 from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.simulated.plant.unit import SimulatedUnit

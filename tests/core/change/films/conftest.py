@@ -16,7 +16,7 @@ from core.change.film_watch import FilmWatch
 from core.change.operation_history import operation_history
 from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
-from core.condition.operating_limits import OperatingLimits
+from core.condition.operating_state import OperatingLimits
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import Reading, Reason, missing

@@ -17,7 +17,7 @@ from core.change.film_judge import FilmNews
 from core.change.film_reading import FilmReading, FilmValue
 from core.change.operation_history import operation_history
 from core.change.verdict import Verdict
-from core.condition.bearing_condition import BearingCondition
+from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment

@@ -1,14 +1,4 @@
-"""A robust smooth surface through groups of readings, with its uncertainty.
-
-The coefficients have a prior: their second differences along each axis are normal with
-`bend_std` (P-splines as a Gaussian prior: Eilers and Marx 1996; Wood, Generalized Additive Models,
-5.4). The posterior covariance is the uncertainty of the surface; it grows where there are few
-readings, and there the surface follows its neighbours. Groups scatter further where the surface is
-steep, and are believed the less. Groups far off count as nothing (Tukey's
-bisquare after Huber's start), so that a fault in less than a third of the learning period, or
-single wrong days, do not bend it. Residuals of one day, and of neighbouring days, are alike: by as
-much as they are, less is known, and that is measured.
-"""
+"""The robust fit of the surface, and what errors of position add where it is steep."""
 
 from dataclasses import dataclass
 
@@ -17,10 +7,64 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
 from core.arrays import FloatArray
-from core.baseline.groups import Groups
-from core.baseline.robust import bisquare, robust_std
-from core.baseline.slope_scatter import slope_scatter
+from core.baseline.grouping import Groups, bisquare, robust_std
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
+
+MOST_STDS = 3.0
+"""Deviations beyond this are taken for this, that wrong ones decide nothing."""
+
+FLAT_SHARE = 0.25
+"""Share of the deviations that count as those of a flat surface."""
+
+ROUNDS = 8
+LEAST_SCATTER = 1e-6
+
+
+@dataclass(frozen=True)
+class SlopeScatter:
+    """Variance of a deviation, given the slope.
+
+    Parameters
+    ----------
+    flat
+        Where the surface is as flat as in `flat_square`, a squared slope, or flatter.
+    per_slope
+        What a squared slope adds beyond that.
+    """
+
+    flat: float
+    per_slope: float
+    flat_square: float
+
+    def lasting(self, slope: FloatArray) -> FloatArray:
+        """Variance that errors of position make at each slope."""
+        return self.per_slope * np.maximum(slope**2 - self.flat_square, 0.0)
+
+    def variance(self, slope: FloatArray) -> FloatArray:
+        """Variance at each slope."""
+        return np.asarray(self.flat + self.lasting(slope))
+
+
+def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
+    """Fit variance to squared deviations, each by what is expected of it.
+
+    Parameters
+    ----------
+    slope, deviation : (n,)
+    """
+    from scipy.optimize import nnls  # slow to load, and not needed to begin
+
+    flat_square = float(np.quantile(slope**2, FLAT_SHARE))
+    steep = np.maximum(slope**2 - flat_square, 0.0)
+    terms = np.stack([np.ones(slope.size), steep], axis=1)
+    expected = np.full(slope.size, max(robust_std(deviation), LEAST_SCATTER) ** 2)
+    flat, per_slope = LEAST_SCATTER**2, 0.0
+    for _ in range(ROUNDS):
+        square = np.minimum(deviation**2, MOST_STDS**2 * expected)
+        (flat, per_slope), _ = nnls(terms / expected[:, np.newaxis], square / expected)
+        expected = np.maximum(terms @ (flat, per_slope), LEAST_SCATTER**2)
+    return SlopeScatter(max(float(flat), LEAST_SCATTER**2), float(per_slope), flat_square)
+
 
 HUBER_LIMIT = 1.345
 HUBER_ROUNDS, BISQUARE_ROUNDS, SLOPE_ROUNDS = 6, 8, 4

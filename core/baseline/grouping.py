@@ -1,0 +1,159 @@
+"""Readings of one day and condition as one point; robust scales, medians, means that forget."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray, TimeArray
+from core.condition.cells import CellGrid, FilmConditions
+from core.units import NS_PER_S
+
+DAY_NS = 86_400 * NS_PER_S
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Points that a surface is fitted to.
+
+    Parameters
+    ----------
+    value : (n,)
+        Median of the readings.
+    n_readings, day : (n,)
+        How many there are, and days since 1970.
+    """
+
+    conditions: FilmConditions
+    value: FloatArray
+    n_readings: npt.NDArray[np.int64]
+    day: npt.NDArray[np.int64]
+
+    def rows(self, wanted: npt.NDArray[np.bool_]) -> "Groups":
+        """Some of the groups."""
+        return Groups(
+            self.conditions.rows(wanted),
+            self.value[wanted],
+            self.n_readings[wanted],
+            self.day[wanted],
+        )
+
+
+def group_readings(
+    time_ns: TimeArray, conditions: FilmConditions, value: FloatArray, grid: CellGrid
+) -> Groups:
+    """Draw together what lies in one quarter of a cell on one day.
+
+    A day is the unit that repeats: readings within it see the same water, weather and warm-up. A
+    quarter, because ln k changes by a tenth and more across a cell.
+    """
+    halves = replace(
+        grid,
+        eccentricity_width=grid.eccentricity_width / 2.0,
+        temperature_width_c=grid.temperature_width_c / 2.0,
+    )
+    day = time_ns // DAY_NS
+    keys, group = np.unique(np.vstack([day, halves.cells(conditions)]), axis=1, return_inverse=True)
+    group = group.reshape(-1)
+    angle = np.radians(conditions.attitude_deg)
+    sines, cosines = (_group_sums(part(angle), group) for part in (np.sin, np.cos))
+    middle = FilmConditions(
+        group_medians(conditions.eccentricity_ratio, group),
+        group_medians(conditions.oil_temperature_c, group),
+        np.degrees(np.arctan2(sines, cosines)),
+    )
+    return Groups(middle, group_medians(value, group), np.bincount(group), keys[0])
+
+
+def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
+    """Median of x in every group; groups are numbered from zero without holes."""
+    x = x[np.lexsort((x, group))]
+    count = np.bincount(group)
+    start = np.cumsum(count) - count
+    return np.asarray((x[start + (count - 1) // 2] + x[start + count // 2]) / 2.0)
+
+
+def _group_sums(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
+    return np.bincount(group, x).astype(np.float64)
+
+
+STD_PER_MAD = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+BISQUARE_LIMIT = 4.685
+"""Standard deviations beyond which Tukey's bisquare counts a value as nothing; 95 % efficient where
+all are normal (Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
+
+
+def robust_std(deviation: FloatArray) -> float:
+    """Standard deviation about zero, from the median of the absolute deviations."""
+    if deviation.size == 0:
+        return 0.0
+    return STD_PER_MAD * float(np.median(np.abs(deviation)))
+
+
+def bisquare(standardised: FloatArray) -> FloatArray:
+    """Weight of each standardised deviation: 1 at zero, 0 beyond `BISQUARE_LIMIT`."""
+    rest = np.clip(1.0 - (standardised / BISQUARE_LIMIT) ** 2, 0.0, 1.0)
+    return np.asarray(rest**2)
+
+
+def absolute_quantile_std(deviation: FloatArray) -> float:
+    """Standard deviation about zero of values that need not be normal: the larger of what the
+    middle half and the middle three quarters say.
+    """  # noqa: D205
+    if deviation.size == 0:
+        return 0.0
+    half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))
+    return float(max(STD_PER_MAD * half, three_quarters / 1.1503))
+
+
+MEDIAN_READINGS = 5
+"""Of which the median is taken."""
+
+
+def forgetting(time_scale_h: float, reading_h: float) -> float:
+    """Weight λ of the newest reading in the mean over a time scale."""
+    return -math.expm1(-reading_h / time_scale_h)
+
+
+@dataclass(frozen=True)
+class Newest:
+    """The newest deviations, oldest first, of which the median is taken."""
+
+    deviations: tuple[float, ...] = ()
+
+    def step(self, deviation: float) -> "Newest":
+        """Take in one more."""
+        return Newest((*self.deviations, deviation)[-MEDIAN_READINGS:])
+
+    @property
+    def median(self) -> float:
+        """Median of the newest; until there are enough, of all."""
+        return float(np.median(self.deviations))
+
+
+NOTHING_NEW = Newest()
+
+
+def running_median(deviation: FloatArray) -> FloatArray:
+    """(n,) what `Newest.median` gives step by step."""
+    n = deviation.size
+    if n < MEDIAN_READINGS:
+        return np.array([np.median(deviation[: i + 1]) for i in range(n)], np.float64)
+    windows = np.lib.stride_tricks.sliding_window_view(deviation, MEDIAN_READINGS)
+    start = [np.median(deviation[: i + 1]) for i in range(MEDIAN_READINGS - 1)]
+    return np.concatenate([start, np.median(windows, axis=1)])
+
+
+def forgetting_sum(x: FloatArray, forgotten: float) -> FloatArray:
+    """(n,) sums in which the newest of x has weight `forgotten`."""
+    from scipy.signal import lfilter  # slow to load, and not needed to begin
+
+    return np.asarray(lfilter([forgotten], [1.0, forgotten - 1.0], x))
+
+
+def forgetting_step(total: float, x: float, forgotten: float) -> float:
+    """Next value of `forgetting_sum`, in the order of its arithmetic."""
+    return total * (1.0 - forgotten) + forgotten * x
