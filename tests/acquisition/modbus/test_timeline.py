@@ -32,6 +32,7 @@ def slot(n: int, sequence: int = 0, index: int = 0, shift_s: float = 0.0, shift_
         1,
         NOTHING,
         (sequence + n) & 0xFFFF,
+        epoch=1,
     )
 
 
@@ -67,7 +68,7 @@ def test_the_index_decides_where_a_slot_belongs_and_not_its_stamp(shift_s):
 def test_a_microsecond_field_of_a_million_is_no_time_and_spoils_nothing():
     timeline = Timeline(LAYOUT)
     assert timeline.place(slot(0)) == 0
-    wrong = Slot(1, 50, 1_767_225_600, 1_000_000, 1, NOTHING, 1)
+    wrong = Slot(1, 50, 1_767_225_600, 1_000_000, 1, NOTHING, 1, epoch=1)
     assert timeline.place(wrong) is Refusal.IMPOSSIBLE_TIME
     assert timeline.place(slot(2)) == 100
 
