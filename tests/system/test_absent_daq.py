@@ -51,9 +51,12 @@ async def tcp_server(reply: bytes) -> AsyncIterator[int]:
         await server.wait_closed()
 
 
-def ring(counting_feed: Feed, n_channels: int = N_CHANNELS, **server: Any) -> ModbusTcpServer:
-    """A device that stands still: its header stays as a test leaves it."""
+def ring(
+    counting_feed: Feed, n_channels: int = N_CHANNELS, header: bytes = b"", **server: Any
+) -> ModbusTcpServer:
+    """A device that stands still: its header stays as a test leaves it, if it is changed."""
     device = RingDevice(counting_feed(n_channels, RATE_HZ, slow=(45.0,) * N_SLOW))
+    device.memory.write(0, header)
     return ModbusTcpServer(device, **server)
 
 
@@ -66,10 +69,8 @@ async def test_each_wrong_daq_is_named_and_shows_no_number_and_one_that_comes_up
         nobody.bind(("127.0.0.1", 0))
         silent = await stack.enter_async_context(tcp_server(b""))
         web = await stack.enter_async_context(tcp_server(b"HTTP/1.1 400 Bad Request\r\n\r\n"))
-        no_ring = await stack.enter_async_context(ring(counting_feed))
-        no_ring.device.memory.write(0, b"\x12\x34")
-        newer = await stack.enter_async_context(ring(counting_feed))
-        newer.device.memory.write(1, b"\x00\x03")
+        no_ring = await stack.enter_async_context(ring(counting_feed, header=b"\x12\x34"))
+        newer = await stack.enter_async_context(ring(counting_feed, header=b"\x50\x57\x00\x03"))
         small = await stack.enter_async_context(ring(counting_feed, n_channels=8))
         standing = await stack.enter_async_context(ring(counting_feed))
         ports = {
