@@ -13,10 +13,10 @@ from acquisition.delivery.host_stamps import HostStamps
 from acquisition.delivery.raw import RawBlock
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.counted_samples import CountedSamples
 from acquisition.modbus.fifo_assembly import ChannelAssembly, PlacedSamples, place_records
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
-from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.transport import LinkSettings
 from acquisition.modbus.uncounted_samples import UncountedSamples
 from core.samples.blocks import SampleBlock
@@ -92,7 +92,7 @@ class FifoSource:
         ConfigError
             If it has no such queue.
         """
-        link = ModbusLink(self._settings)
+        link = ModbusClient(self._settings)
         try:
             with wrong_replies_drop_the_link():
                 await link.open()
@@ -106,7 +106,7 @@ class FifoSource:
         finally:
             link.close()
 
-    async def _begin(self, link: ModbusLink) -> None:
+    async def _begin(self, link: ModbusClient) -> None:
         """Throw away what can no longer be told from new samples."""
         self._channels.forget()
         uncounted = not self._layout.has_counter
@@ -120,7 +120,7 @@ class FifoSource:
             while not self._is_drained(await self._read(link)):
                 self._require_in_time(self._clock.monotonic_s() - begun_s)
 
-    async def _blocks(self, link: ModbusLink) -> AsyncGenerator[SampleBlock, None]:
+    async def _blocks(self, link: ModbusClient) -> AsyncGenerator[SampleBlock, None]:
         waiting: list[PlacedSamples] = []
         arrived = Arrival.now(self._clock)
         reading_s = 0.0
@@ -161,7 +161,7 @@ class FifoSource:
         raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
         return self._delivery.take_together(raw_blocks, arrived)
 
-    async def _read(self, link: ModbusLink) -> list[FifoPiece]:
+    async def _read(self, link: ModbusClient) -> list[FifoPiece]:
         return [
             self._layout.decode(await link.read_fifo(address)) for address in self._layout.addresses
         ]

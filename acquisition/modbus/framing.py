@@ -1,188 +1,113 @@
-"""Framing, TCP and RTU, that lets only reads out and only the one right reply in.
+"""Framing, TCP and RTU: a request as bytes, and the one reply that it allows out of bytes.
 
-pymodbus 3.16.1 takes a transaction id of 0 for any, and checks neither function, byte count nor
-register count of a reply, nor what follows it. These framers know the outstanding request, so they
-know its answer in advance but for the values; whatever differs is a fault. They also hand registers
-over as bytes, which spares a Python integer for each of them.
+The answer to a read is known in advance but for the values; whatever differs is a fault. Judging
+stops at the first fault: what follows one cannot be told apart from it.
 """
 
 import struct
 from dataclasses import dataclass
-from typing import ClassVar
-
-from pymodbus.framer import FramerRTU, FramerSocket
-from pymodbus.framer.base import FramerBase
-from pymodbus.pdu import DecodePDU, ModbusPDU
+from typing import Protocol
 
 from acquisition.errors import FrameError
-from acquisition.modbus.requests import (
-    EXCEPTION_BIT,
-    MAX_PDU_BYTES,
-    ReplyShape,
-    least_bytes,
-    reply_to,
-    require_read,
-)
+from acquisition.modbus.requests import MAX_PDU_BYTES, ReadRequest
 
 _MBAP = struct.Struct(">HHHB")
-_SHOWN_BYTES = 16
-
-
-class Reply(ModbusPDU):
-    """What came back: the whole reply from its function code on, or what was wrong."""
-
-    def __init__(self, pdu: bytes = b"", fault: str = "") -> None:
-        super().__init__()
-        self.pdu = pdu
-        self.fault = fault
-
-    @property
-    def refusal(self) -> int | None:
-        """The exception code, if the device refuses."""
-        return self.pdu[1] if self.pdu and self.pdu[0] & EXCEPTION_BIT else None
+_POLYNOMIAL, _CRC_START = 0xA001, 0xFFFF
 
 
 @dataclass(frozen=True)
-class _Asked:
-    """The outstanding request and the reply it allows."""
+class Asked:
+    """A request that was sent to a unit and not answered yet; `transaction` counts over TCP."""
 
-    request: ModbusPDU
-    shape: ReplyShape
-
-    def least_bytes(self, pdu: bytes) -> int:
-        return least_bytes(self.request.function_code, self.shape, pdu)
+    request: ReadRequest
+    unit: int
+    transaction: int = 0
 
 
-class ReadOnlyFramer(FramerBase):
-    """One outstanding read, one acceptable reply.
+class Framing(Protocol):
+    """How requests and replies lie on a wire."""
 
-    Attributes
-    ----------
-    unasked
-        What came while nothing was outstanding, as words; empty if nothing did.
-    n_received
-        Bytes that have come since the last request, or unasked.
-    """
+    def frame(self, asked: Asked) -> bytes:
+        """Bytes of a request."""
+        ...
 
-    head_bytes: ClassVar[int]
-    tail_bytes: ClassVar[int]
-
-    def __init__(self) -> None:
-        super().__init__(DecodePDU(False))
-        self.forget()
-
-    def forget(self) -> None:
-        """Start anew, as with a new connection."""
-        self.unasked = ""
-        self.n_received = 0
-        self._asked: _Asked | None = None
-
-    @property
-    def awaiting(self) -> bool:
-        """Whether a request is outstanding."""
-        return self._asked is not None
-
-    def buildFrame(self, message: ModbusPDU) -> bytes:  # noqa: N802 - pymodbus calls it so
-        """Frame a request and remember which reply it allows.
-
-        Raises
-        ------
-        ConfigError
-            If the request is anything but a read.
-        """
-        require_read(message.function_code)
-        self._asked = _Asked(message, reply_to(message.function_code, message.encode()))
-        self.n_received = 0
-        return super().buildFrame(message)
-
-    def handleFrame(  # noqa: N802 - pymodbus calls it so
-        self,
-        data: bytes,
-        exp_devid: int,  # noqa: ARG002 - known from the request
-        exp_tid: int,  # noqa: ARG002
-    ) -> tuple[int, ModbusPDU | None]:
-        """Judge all bytes received since the request was sent.
+    def take(self, data: memoryview, asked: Asked) -> tuple[int, memoryview] | None:
+        """Judge received bytes as the reply to a request.
 
         Returns
         -------
-        tuple
-            Bytes used up, and the reply if it is complete or wrong.
+        Bytes that the reply fills, and the reply from its function code on; None while the bytes
+        may still become the right one.
+
+        Raises
+        ------
+        FrameError
+            If they never can.
         """
-        if self._asked is None:
-            self.n_received += len(data)
-            self.unasked = f"{len(data)} bytes came unasked: {data[:_SHOWN_BYTES].hex()}"
-            return len(data), None
-        self.n_received = len(data)
-        try:
-            reply = self._judge(data, self._asked)
-        except FrameError as fault:
-            reply = Reply(fault=f"{fault}: {data[:_SHOWN_BYTES].hex()}")
-        if reply is None:
-            return 0, None
-        reply.dev_id = self._asked.request.dev_id
-        reply.transaction_id = self._asked.request.transaction_id
-        self._asked = None
-        return len(data), reply
-
-    def _judge(self, data: bytes, asked: _Asked) -> Reply | None:
-        """Return the reply, or None while the bytes may still become the right one."""
-        if len(data) <= self.head_bytes:
-            return None
-        n_expected = self.head_bytes + self._pdu_bytes(data, asked) + self.tail_bytes
-        if len(data) < n_expected:
-            return None
-        if len(data) > n_expected:
-            raise FrameError(f"{len(data) - n_expected} bytes follow the reply")
-        return Reply(self._checked_pdu(data))
-
-    def _pdu_bytes(self, data: bytes, asked: _Asked) -> int:
-        """Bytes that the reply has between head and tail, or more than are there."""
-        raise NotImplementedError
-
-    def _checked_pdu(self, data: bytes) -> bytes:
-        """Return what is between head and tail of a complete reply."""
-        raise NotImplementedError
+        ...
 
 
-class TcpFramer(ReadOnlyFramer, FramerSocket):
+class TcpFraming:
     """Modbus TCP: transaction, protocol, length and unit before the reply."""
 
-    head_bytes = _MBAP.size
-    tail_bytes = 0
+    def frame(self, asked: Asked) -> bytes:
+        """Bytes of a request."""
+        pdu = asked.request.pdu
+        return _MBAP.pack(asked.transaction, 0, len(pdu) + 1, asked.unit) + pdu
 
-    def _pdu_bytes(self, data: bytes, asked: _Asked) -> int:
-        length: int
-        tid, protocol, length, unit = _MBAP.unpack_from(data)
-        request = asked.request
-        _require_equal("transaction id", tid, request.transaction_id)
+    def take(self, data: memoryview, asked: Asked) -> tuple[int, memoryview] | None:
+        """Judge received bytes; see `Framing`."""
+        if len(data) <= _MBAP.size:
+            return None
+        transaction, protocol, length, unit = _MBAP.unpack_from(data)
+        _require_equal("transaction id", transaction, asked.transaction)
         _require_equal("protocol id", protocol, 0)
-        _require_equal("unit id", unit, request.dev_id)
-        pdu = data[_MBAP.size :]
-        n_least, n_told = asked.least_bytes(pdu), length - 1
+        _require_equal("unit id", unit, asked.unit)
+        pdu = data[_MBAP.size : _MBAP.size + max(length - 1, 1)]
+        n_least, n_told = asked.request.least_bytes(pdu), length - 1
         # a reply whose length is not known from the request has to agree with itself
         if n_told < n_least or n_told > MAX_PDU_BYTES or (len(pdu) >= n_least < n_told):
             raise FrameError(f"length is {length}, expected {n_least + 1}")
-        return n_told
-
-    def _checked_pdu(self, data: bytes) -> bytes:
-        return data[_MBAP.size :]
+        return (_MBAP.size + n_told, pdu) if len(pdu) == n_told else None
 
 
-class RtuFramer(ReadOnlyFramer, FramerRTU):
+class RtuFraming:
     """Modbus RTU: unit before the reply, CRC-16 behind it."""
 
-    head_bytes = 1
-    tail_bytes = 2
+    def frame(self, asked: Asked) -> bytes:
+        """Bytes of a request."""
+        body = bytes((asked.unit,)) + asked.request.pdu
+        return body + crc16(body).to_bytes(2, "little")
 
-    def _pdu_bytes(self, data: bytes, asked: _Asked) -> int:
-        _require_equal("unit id", data[0], asked.request.dev_id)
-        return asked.least_bytes(data[1:])
-
-    def _checked_pdu(self, data: bytes) -> bytes:
-        found, expected = int.from_bytes(data[-2:], "big"), self.compute_CRC(data[:-2])
+    def take(self, data: memoryview, asked: Asked) -> tuple[int, memoryview] | None:
+        """Judge received bytes; see `Framing`."""
+        if len(data) < 2:
+            return None
+        _require_equal("unit id", data[0], asked.unit)
+        end = 1 + asked.request.least_bytes(data[1:])
+        if len(data) < end + 2:
+            return None
+        found, expected = int.from_bytes(data[end : end + 2], "little"), crc16(data[:end])
         if found != expected:
             raise FrameError(f"CRC is {found:#06x}, expected {expected:#06x}")
-        return data[1:-2]
+        return end + 2, data[1:end]
+
+
+def _crc_of_byte(value: int) -> int:
+    for _ in range(8):
+        value = value >> 1 ^ (_POLYNOMIAL if value & 1 else 0)
+    return value
+
+
+_CRC_OF_BYTE = tuple(map(_crc_of_byte, range(256)))
+
+
+def crc16(data: bytes | memoryview) -> int:
+    """CRC-16 of Modbus RTU (Modbus over Serial Line 1.02, 6.2.2)."""
+    crc = _CRC_START
+    for byte in data:
+        crc = crc >> 8 ^ _CRC_OF_BYTE[(crc ^ byte) & 0xFF]
+    return crc
 
 
 def _require_equal(name: str, found: int, expected: int) -> None:

@@ -20,8 +20,8 @@ from acquisition.delivery.ticks import Ticks
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError
 from acquisition.modbus.cells import BIT_FUNCTIONS, reads_as
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import CellDecoder, MapDecoder, MapReading, ValueState
-from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.read_plan import ReadPlan, plan_signature
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.transport import LinkSettings
@@ -31,7 +31,7 @@ from core.samples.blocks import SampleBlock
 class MapReader:
     """One device's map. One request is outstanding at a time, and none is repeated."""
 
-    def __init__(self, link: ModbusLink, decoder: MapDecoder) -> None:
+    def __init__(self, link: ModbusClient, decoder: MapDecoder) -> None:
         self._link, self._decoder = link, decoder
 
     async def read(self) -> MapReading:
@@ -179,7 +179,7 @@ class PolledSource:
         ConfigError
             If it is not the configured device, or lacks a register.
         """
-        link = ModbusLink(self._settings)
+        link = ModbusClient(self._settings)
         try:
             with wrong_replies_drop_the_link():
                 await link.open()

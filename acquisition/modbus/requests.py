@@ -1,4 +1,4 @@
-"""Which replies a read allows: for every function code that may be sent, how its answer must look.
+"""Requests that only read, and for each of them how its answer must look.
 
 A reply is judged by its function code and what follows it (the PDU), the same over TCP and RTU.
 """
@@ -29,8 +29,9 @@ MAX_PDU_BYTES = 253
 MAX_FIFO_REGISTERS = 31
 EXCEPTION_BIT = 0x80
 _EXCEPTION_BYTES = 2
-_MEI_READ_IDENTIFICATION = 14
-_READ_CODES = (1, 2, 3, 4)
+_MEI = b"\x0e"
+READ_BASIC = 1
+_READ_CODES = (READ_BASIC, 2, 3, 4)
 _IDENTIFICATION_HEAD = struct.Struct(">7B")
 _FIFO_HEAD = struct.Struct(">BHH")
 _ADDRESS_AND_COUNT = struct.Struct(">HH")
@@ -39,7 +40,7 @@ _ADDRESS_AND_COUNT = struct.Struct(">HH")
 class ReplyShape(Protocol):
     """The reply that one outstanding request allows, apart from an exception."""
 
-    def least_bytes(self, pdu: bytes) -> int:
+    def least_bytes(self, pdu: memoryview) -> int:
         """Bytes that the whole reply has, or at least has, by what has arrived of it.
 
         Raises
@@ -56,7 +57,7 @@ class CountedReply:
 
     n_bytes: int
 
-    def least_bytes(self, pdu: bytes) -> int:
+    def least_bytes(self, pdu: memoryview) -> int:
         """Length of the reply, which is known in advance."""
         if len(pdu) > 1 and pdu[1] != self.n_bytes:
             raise FrameError(f"byte count is {pdu[1]}, expected {self.n_bytes}")
@@ -67,7 +68,7 @@ class CountedReply:
 class FifoReply:
     """A queue's registers: the reply says how many, at most 31."""
 
-    def least_bytes(self, pdu: bytes) -> int:
+    def least_bytes(self, pdu: memoryview) -> int:
         """Length of the reply by its FIFO count."""
         if len(pdu) < _FIFO_HEAD.size:
             return _FIFO_HEAD.size
@@ -87,11 +88,11 @@ class IdentificationReply:
 
     read_code: int
 
-    def least_bytes(self, pdu: bytes) -> int:
+    def least_bytes(self, pdu: memoryview) -> int:
         """Length of the reply, as far as its objects are known."""
-        expected = bytes((_MEI_READ_IDENTIFICATION, self.read_code))
-        if not expected.startswith(pdu[1:3]):
-            raise FrameError(f"MEI type and read code are {pdu[1:3].hex()}, not {expected.hex()}")
+        expected, found = _MEI + bytes((self.read_code,)), bytes(pdu[1:3])
+        if not expected.startswith(found):
+            raise FrameError(f"MEI type and read code are {found.hex()}, not {expected.hex()}")
         if len(pdu) < _IDENTIFICATION_HEAD.size:
             return _IDENTIFICATION_HEAD.size
         end = _IDENTIFICATION_HEAD.size
@@ -105,55 +106,85 @@ class IdentificationReply:
         return end
 
 
-def reply_to(function: int, request: bytes) -> ReplyShape:
-    """Return the shape of the reply that a request allows.
+@dataclass(frozen=True)
+class ReadRequest:
+    """One request, and the reply that it allows.
 
     Parameters
     ----------
-    request
-        What follows its function code.
+    function, body
+        Function code, and what follows it.
+    shape
+        Of the reply, apart from an exception.
+    intent
+        What is asked for, as a refused request is told; example: "a read of 2 at 100".
 
     Raises
     ------
     ConfigError
-        If this is not a request that only reads. Nothing else can be framed.
+        If it is not one that only reads. Nothing else can be framed.
     """
-    if function == READ_IDENTIFICATION and _reads_identification(request):
-        return IdentificationReply(request[1])
-    if function == READ_FIFO_QUEUE:
-        return FifoReply()
-    if function in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
-        return CountedReply(2 * _ADDRESS_AND_COUNT.unpack(request)[1])
-    if function in (READ_COILS, READ_DISCRETE_INPUTS):
-        return CountedReply(-(-_ADDRESS_AND_COUNT.unpack(request)[1] // 8))
-    raise _never_sent(function)
+
+    function: int
+    body: bytes
+    shape: ReplyShape
+    intent: str
+
+    def __post_init__(self) -> None:
+        is_read = self.function in READ_FUNCTIONS
+        if self.function == READ_IDENTIFICATION:
+            # function 43 carries other services too
+            is_read = self.body[:1] == _MEI and self.body[1] in _READ_CODES
+        if not is_read:
+            raise ConfigError(
+                f"function code {self.function} is never sent, only {READ_FUNCTIONS} to read"
+            )
+
+    @property
+    def pdu(self) -> bytes:
+        """The request from its function code on."""
+        return bytes((self.function,)) + self.body
+
+    def least_bytes(self, pdu: memoryview) -> int:
+        """Bytes that the reply has or at least has: the one asked for, or an exception.
+
+        Raises
+        ------
+        FrameError
+            If it can never become either.
+        """
+        if pdu[0] == self.function:
+            return self.shape.least_bytes(pdu)
+        if pdu[0] == self.function | EXCEPTION_BIT:
+            return _EXCEPTION_BYTES
+        raise FrameError(f"function code is {pdu[0]}, expected {self.function}")
 
 
-def require_read(function: int) -> None:
-    """Refuse a function code that does anything but read.
-
-    Raises
-    ------
-    ConfigError
-        Always, unless it is one of `READ_FUNCTIONS`.
-    """
-    if function not in READ_FUNCTIONS:
-        raise _never_sent(function)
+def registers_request(address: int, count: int, function: int) -> ReadRequest:
+    """Registers by function 3 or 4."""
+    intent = f"a read of {count} at {address}, function {function}"
+    body = _ADDRESS_AND_COUNT.pack(address, count)
+    return ReadRequest(function, body, CountedReply(2 * count), intent)
 
 
-def least_bytes(function: int, shape: ReplyShape, pdu: bytes) -> int:
-    """Bytes that the reply has or at least has, whether it is the one asked for or an exception.
+def bits_request(address: int, count: int, function: int) -> ReadRequest:
+    """Bits by function 1 or 2."""
+    intent = f"a read of {count} at {address}, function {function}"
+    body = _ADDRESS_AND_COUNT.pack(address, count)
+    return ReadRequest(function, body, CountedReply(-(-count // 8)), intent)
 
-    Raises
-    ------
-    FrameError
-        If it can never become either.
-    """
-    if pdu[0] == function:
-        return shape.least_bytes(pdu)
-    if pdu[0] == function | EXCEPTION_BIT:
-        return _EXCEPTION_BYTES
-    raise FrameError(f"function code is {pdu[0]}, expected {function}")
+
+def fifo_request(address: int) -> ReadRequest:
+    """A queue, by function 0x18."""
+    body = address.to_bytes(2, "big")
+    return ReadRequest(READ_FIFO_QUEUE, body, FifoReply(), f"a read of the queue at {address}")
+
+
+def identification_request(first_object: int = 0) -> ReadRequest:
+    """The basic objects of function 43/14, from one of them on."""
+    body = _MEI + bytes((READ_BASIC, first_object))
+    shape = IdentificationReply(READ_BASIC)
+    return ReadRequest(READ_IDENTIFICATION, body, shape, "a read of its identification")
 
 
 def fifo_registers(pdu: bytes) -> bytes:
@@ -170,11 +201,3 @@ def identification_objects(pdu: bytes) -> tuple[dict[int, bytes], int | None]:
         objects[number] = pdu[at + 2 : at + 2 + n_bytes]
         at += 2 + n_bytes
     return objects, next_object if more_follows else None
-
-
-def _never_sent(function: int) -> ConfigError:
-    return ConfigError(f"function code {function} is never sent, only {READ_FUNCTIONS} to read")
-
-
-def _reads_identification(request: bytes) -> bool:
-    return request[:1] == bytes((_MEI_READ_IDENTIFICATION,)) and request[1] in _READ_CODES

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from acquisition.delivery.epochs import Epochs
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.ring_profile import (
     HEADER_REGISTERS,
     U32,
@@ -26,7 +26,7 @@ _N_TRIES = 4
 class RingReader:
     """One device's ring, as it is found: slots are not judged here."""
 
-    def __init__(self, link: ModbusLink, base_address: int, function: int) -> None:
+    def __init__(self, link: ModbusClient, base_address: int, function: int) -> None:
         self._link = link
         self._base = base_address
         self._function = function

@@ -10,7 +10,7 @@ from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.ring_pace import out_of_step_s
 from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
 from acquisition.modbus.ring_follower import RingFollower, RingReader
 from acquisition.modbus.ring_profile import HEADER_REGISTERS
@@ -89,7 +89,7 @@ class ModbusRingSource:
         ConfigError
             If it is not a block ring, or not the configured one.
         """
-        link = ModbusLink(self._settings)
+        link = ModbusClient(self._settings)
         try:
             with _nonsense_drops_the_link():
                 await link.open()

@@ -10,8 +10,8 @@ from acquisition.delivery.calibration import SlowCalibration, slow_reading
 from acquisition.delivery.freshness import Freshness
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError, ConfigError
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder, MapReading
-from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import MapReader, PolledSettings, slow_number
 from acquisition.modbus.register_map import RegisterMap
 from core.quality import Reading, Reason, missing
@@ -108,7 +108,7 @@ class PolledSlowValues:
 
     async def _poll(self) -> None:
         """Open the link and poll until something goes wrong."""
-        link = ModbusLink(self._settings)
+        link = ModbusClient(self._settings)
         try:
             with wrong_replies_drop_the_link():
                 await link.open()

@@ -14,8 +14,9 @@ Parity: TypeAlias = Literal["none", "even", "odd"]
 
 MAX_REGISTERS_PER_READ = 125
 ADDRESS_SPACE = 0x10000
+_MAX_REQUESTS_IN_FLIGHT = 16
 _N_TRANSACTIONS = 65_000
-"""Ids are 1 to this, as pymodbus has them; some devices answer to 0 as to any."""
+"""Ids are 1 to this; some devices answer to 0 as to any."""
 
 _MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
 _MAX_SERIAL_DEVICE_ID = 247
@@ -113,6 +114,35 @@ class ConnectionUse(StrEnum):
     PER_REPLY = "per_reply"
 
 
+class RequestsInFlight:
+    """How many requests a device is sent before it has answered the first.
+
+    Attributes
+    ----------
+    now
+        As wanted; one from the first time on that it did not answer all in order, or hung up twice
+        running.
+    """
+
+    def __init__(self, wanted: int) -> None:
+        self.now = wanted
+        self._n_cut = 0
+
+    def answered(self) -> None:
+        """Note that all were."""
+        self._n_cut = 0
+
+    def cut(self) -> None:
+        """Note that the connection was closed while some were in flight: by the device or not."""
+        self._n_cut += 1
+        if self._n_cut > 1:
+            self.stalled()
+
+    def stalled(self) -> None:
+        """Note that the device cannot take more than one."""
+        self.now = 1
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
     """How to reach a Modbus device, and how it wants to be asked.
@@ -131,6 +161,14 @@ class LinkSettings:
     connection
         "kept" for as long as it works, or a new one for each request: for devices that close it
         after each reply or when they are not asked for a while, or that have a single one for all.
+    requests_in_flight
+        Most requests that are sent at once, 1 to 16; over TCP, on a connection that is kept. Most
+        devices answer them one after another and save the round trips; some lose all but one.
+
+    Attributes
+    ----------
+    in_flight
+        How many there may be now; remembered from one connection to the next.
     """
 
     transport: Transport
@@ -139,6 +177,8 @@ class LinkSettings:
     max_registers: int = MAX_REGISTERS_PER_READ
     identity: Identity | None = None
     connection: ConnectionUse = ConnectionUse.KEPT
+    requests_in_flight: int = 1
+    in_flight: RequestsInFlight = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         serial = isinstance(self.transport, SerialTransport)
@@ -146,6 +186,10 @@ class LinkSettings:
             raise ConfigError("modbus: a serial line is kept, there are no connections on it")
         _require("device_id", self.device_id, 1, _MAX_SERIAL_DEVICE_ID if serial else 255)
         _require("max_registers", self.max_registers, 1, MAX_REGISTERS_PER_READ)
+        is_single = serial or self.connection is not ConnectionUse.KEPT
+        most = 1 if is_single else _MAX_REQUESTS_IN_FLIGHT
+        _require("requests_in_flight", self.requests_in_flight, 1, most)
+        object.__setattr__(self, "in_flight", RequestsInFlight(self.requests_in_flight))
         if not 0 < self.timeout_s < float("inf"):
             raise ConfigError(f"modbus: timeout_s is {self.timeout_s}, must be above 0")
 

@@ -23,7 +23,13 @@ from service.settings.modbus_map import RegisterMapSettings
 from service.settings.modbus_sources import MappedDeviceSettings
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
-from service.wiring.probes import identify_once, read_map_once, read_once, read_ring_once
+from service.wiring.probes import (
+    identify_once,
+    measure_in_flight,
+    read_map_once,
+    read_once,
+    read_ring_once,
+)
 
 app = typer.Typer(
     no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."
@@ -31,6 +37,7 @@ app = typer.Typer(
 
 
 MAX_COUNT = 1000
+MAX_IN_FLIGHT = 16
 BIT_FUNCTIONS = (1, 2)
 RTU_PREFIX = "/"
 SINGLES = ("int16", "uint16")
@@ -144,6 +151,22 @@ def identity(
     found = asdict(_done(identify_once(place)))
     lines = [f"{name.replace('_', ' ')}: {text}" for name, text in found.items()]
     typer.echo(json.dumps(found) if json_output else "\n".join(lines))
+
+
+@app.command("in-flight")
+def in_flight(
+    device: DevicePlace,
+    address: Annotated[int, typer.Option(min=0, max=65535, help="Of a register it has.")] = 0,
+    function: Annotated[int, typer.Option(min=3, max=4, help="Function code 3 or 4.")] = 3,
+    unit_id: UnitIdOption = 1,
+    timeout_s: TimeoutOption = 1.0,
+) -> None:
+    """Try how many requests a device answers when they are sent at once (Modbus TCP)."""
+    place = _place(device, unit_id, timeout_s, 115_200, "even")
+    if place.host is None:
+        fail("padwatch probe: a serial line carries one request at a time", code=2)
+    found = _done(measure_in_flight(place, address, function, MAX_IN_FLIGHT))
+    typer.echo(f"requests_in_flight = {found}")
 
 
 def _done(look: Coroutine[Any, Any, Result]) -> Result:

@@ -41,6 +41,11 @@ class ModbusLinkSettings(Settings):
     """What the device must answer to be the right one, asked on each connection: kind "signature"
     (registers) or "identification" (function 43/14). Without it only the data's own form tells."""
 
+    requests_in_flight: Annotated[int, Field(ge=1, le=16)] | None = None
+    """Most requests that are sent before the first is answered, over TCP: 1 to 16. Without it six
+    to a block ring, and one to any other device, as some lose all but one. A device that does not
+    answer them in order is asked one at a time from then on. `padwatch probe in-flight` tries."""
+
     @model_validator(mode="after")
     def _check_link(self) -> Self:
         if (self.host is None) == (self.device is None):
@@ -50,4 +55,6 @@ class ModbusLinkSettings(Settings):
             )
         if self.device is not None and self.device_id > 247:
             raise MisfitError("on a serial line must be 1 to 247", "device_id")
+        if self.device is not None and (self.requests_in_flight or 1) > 1:
+            raise MisfitError("must be 1 on a serial line", "requests_in_flight")
         return self

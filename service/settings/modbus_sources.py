@@ -52,6 +52,8 @@ class MappedDeviceSettings(ModbusLinkSettings):
         self._require_least("timeout_s", self._map.min_timeout_s)
         if self.device is not None and self.connection != "kept":
             raise MisfitError('must be "kept" on a serial line', "connection")
+        if self.connection != "kept" and (self.requests_in_flight or 1) > 1:
+            raise MisfitError('must be 1 with connection = "per_reply"', "requests_in_flight")
         if self.stale_after_s < MIN_STALE_POLLS * self.poll_period_s:
             least = MIN_STALE_POLLS * self.poll_period_s
             raise MisfitError(f"must be two poll periods or more, {least:g}", "stale_after_s")

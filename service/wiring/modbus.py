@@ -5,7 +5,11 @@ from typing import Any
 from acquisition.modbus.transport import ConnectionUse, SerialTransport, TcpTransport, Transport
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import MappedDeviceSettings
+from service.settings.sources import ModbusRingSettings
 from service.wiring.modbus_identity import identity_of
+
+RING_REQUESTS_IN_FLIGHT = 6
+"""What a poll of 12 channels takes."""
 
 
 def transport_of(source: ModbusLinkSettings) -> Transport:
@@ -29,4 +33,12 @@ def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
         "timeout_s": source.timeout_s,
         "identity": identity_of(source.identity),
         "connection": ConnectionUse(use),
+        "requests_in_flight": _requests_in_flight(source),
     }
+
+
+def _requests_in_flight(source: ModbusLinkSettings) -> int:
+    if source.requests_in_flight is not None:
+        return source.requests_in_flight
+    is_ring = isinstance(source, ModbusRingSettings) and source.host is not None
+    return RING_REQUESTS_IN_FLIGHT if is_ring else 1

@@ -1,10 +1,13 @@
 """One look into a Modbus device: connect, read once, leave."""
 
+from dataclasses import replace
+
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
+from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import BIT_FUNCTIONS
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.identity import Identification
-from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import MapReader
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.ring_follower import RingReader
@@ -12,6 +15,8 @@ from acquisition.modbus.ring_profile import RingHeader, Slot
 from acquisition.modbus.transport import LinkSettings
 from service.settings.modbus_link import ModbusLinkSettings
 from service.wiring.modbus import link_fields
+
+_TRIES_IN_FLIGHT = 20
 
 
 def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
@@ -29,7 +34,7 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
     ConfigError
         If it has no such registers.
     """
-    link = ModbusLink(link_settings_of(device))
+    link = ModbusClient(link_settings_of(device))
     try:
         with wrong_replies_drop_the_link():
             await link.open()
@@ -50,7 +55,7 @@ async def read_map_once(
         As `read_once`; ConfigError too if it is another device.
     """
     decoder = MapDecoder(registers)
-    link = ModbusLink(link_settings_of(device))
+    link = ModbusClient(link_settings_of(device))
     try:
         with wrong_replies_drop_the_link():
             await link.open()
@@ -71,7 +76,7 @@ async def read_ring_once(
     LinkError, ConfigError
         As `read_once`; ConfigError too if this is no block ring.
     """
-    link = ModbusLink(link_settings_of(device))
+    link = ModbusClient(link_settings_of(device))
     try:
         with wrong_replies_drop_the_link():
             await link.open()
@@ -91,10 +96,45 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
     LinkError, ConfigError
         As `read_once`; ConfigError too if it does not say.
     """
-    link = ModbusLink(link_settings_of(device))
+    link = ModbusClient(link_settings_of(device))
     try:
         with wrong_replies_drop_the_link():
             await link.open()
             return await link.identify()
     finally:
         link.close()
+
+
+async def measure_in_flight(
+    device: ModbusLinkSettings, address: int, function: int, most: int
+) -> int:
+    """Try how many requests a device answers in order when they are sent at once.
+
+    Parameters
+    ----------
+    address
+        Of a register that it has.
+
+    Returns
+    -------
+    At least 1.
+
+    Raises
+    ------
+    LinkError, ConfigError
+        As `read_once`, of a single request.
+    """
+    await read_once(device, address, 1, function)
+    n_taken = 1
+    for n_requests in range(2, most + 1):
+        link = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
+        try:
+            await link.open()
+            for _ in range(_TRIES_IN_FLIGHT):
+                await link.read_each([address] * n_requests, function)
+        except AcquisitionError:
+            break
+        finally:
+            link.close()
+        n_taken = n_requests
+    return n_taken

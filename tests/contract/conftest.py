@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 from rigs.can import CanFdRig, CanRig
-from rigs.modbus import ModbusRig, ModbusRtuRig
+from rigs.modbus import InFlightRig, ModbusRig, ModbusRtuRig
 from rigs.recording import RecordingRig, SimulatedRig, UnitsRecordingRig
 from rigs.registers import REGISTER_RIGS
 
-WIRED = [CanRig, CanFdRig, ModbusRig, ModbusRtuRig, *REGISTER_RIGS]
+WIRED = [CanRig, CanFdRig, ModbusRig, InFlightRig, ModbusRtuRig, *REGISTER_RIGS]
 ALL = [*WIRED, SimulatedRig, RecordingRig, UnitsRecordingRig]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.delivery.names import KnownAddresses
 from acquisition.errors import LinkError
-from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.transport import LinkSettings, TcpTransport
 
 
@@ -57,7 +57,7 @@ async def test_a_name_that_was_never_known_is_a_lost_link_in_time_and_costs_one_
     names: NameServer,
 ) -> None:
     names.answers.clear()
-    link = ModbusLink(LinkSettings(transport=TcpTransport(host="daq.plant"), timeout_s=0.02))
+    link = ModbusClient(LinkSettings(transport=TcpTransport(host="daq.plant"), timeout_s=0.02))
     for _ in range(5):
         with pytest.raises(LinkError, match=r"daq.plant:502: no name server answers within 0.02 s"):
             await link.open()
@@ -72,7 +72,7 @@ async def test_a_device_that_has_moved_is_found_at_its_other_address(names: Name
     server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     names.answer = ["127.0.0.77", "127.0.0.1"]
-    link = ModbusLink(LinkSettings(transport=TcpTransport(host="daq.plant", port=port)))
+    link = ModbusClient(LinkSettings(transport=TcpTransport(host="daq.plant", port=port)))
     await link.open()
     link.close()
     server.close()

@@ -9,7 +9,7 @@ from rigs.modbus import transport_of
 from rigs.polled import CALIBRATION, Follower, device_of, map_of
 
 from acquisition.clock import SystemClock
-from acquisition.modbus.link import ModbusLink
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
@@ -61,22 +61,22 @@ async def hostile_line(device, tmp_path) -> AsyncIterator[HostileLine]:
 
 
 @pytest.fixture
-def link_on() -> Callable[..., ModbusLink]:
+def link_on() -> Callable[..., ModbusClient]:
     """Builds links to a serial line; other settings as keywords."""
 
-    def build(path: object, parity: str = "none", **settings) -> ModbusLink:
+    def build(path: object, parity: str = "none", **settings) -> ModbusClient:
         transport = SerialTransport(device=str(path), baudrate=230_400, parity=parity)
-        return ModbusLink(LinkSettings(transport=transport, **settings))
+        return ModbusClient(LinkSettings(transport=transport, **settings))
 
     return build
 
 
 @pytest.fixture
-def link_to() -> Callable[..., ModbusLink]:
+def link_to() -> Callable[..., ModbusClient]:
     """Builds links to a port of this machine; other settings as keywords."""
 
-    def build(port: int, host: str = "127.0.0.1", **settings) -> ModbusLink:
-        return ModbusLink(LinkSettings(transport=TcpTransport(host=host, port=port), **settings))
+    def build(port: int, host: str = "127.0.0.1", **settings) -> ModbusClient:
+        return ModbusClient(LinkSettings(transport=TcpTransport(host=host, port=port), **settings))
 
     return build
 
@@ -161,9 +161,11 @@ def linked(bench_server):
     """Builds links to the bench; other settings as keywords."""
     links = []
 
-    def build(**settings) -> ModbusLink:
+    def build(**settings) -> ModbusClient:
         transport = transport_of(bench_server)
-        links.append(ModbusLink(LinkSettings(transport=transport, **{"timeout_s": 0.6} | settings)))
+        links.append(
+            ModbusClient(LinkSettings(transport=transport, **{"timeout_s": 0.6} | settings))
+        )
         return links[-1]
 
     yield build

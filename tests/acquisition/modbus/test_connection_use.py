@@ -13,10 +13,11 @@ from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.cells import Cell
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.identity import ExpectedIdentification
-from acquisition.modbus.link import ModbusLink
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import Signature
+from acquisition.modbus.reply_protocol import ReplyProtocol
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, TcpTransport
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
@@ -86,29 +87,23 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
 
 
 @pytest.mark.parametrize("done", ["a reply", "a connection"])
-async def test_what_is_done_with_the_stop_does_not_undo_it(done, counting_feed, link_to):
+async def test_what_is_done_with_the_stop_does_not_undo_it(
+    done, counting_feed, link_to, monkeypatch
+):
+    method = {"a reply": "data_received", "a connection": "connection_made"}[done]
+    does = getattr(ReplyProtocol, method)
+
+    def stop_and_do(self, given):
+        stopped.cancel()
+        does(self, given)
+
     async with ModbusTcpServer(RingDevice(counting_feed())) as server:
         link = link_to(server.port)
         if done == "a reply":
+            monkeypatch.setattr(ReplyProtocol, method, stop_and_do)
             await link.open()
-            stopped = asyncio.create_task(link.read(0, 16))
-            judge = link._connection._framer.handleFrame
-
-            def stop_and_judge(*arguments):
-                stopped.cancel()
-                return judge(*arguments)
-
-            link._connection._framer.handleFrame = stop_and_judge
-        else:
-            stopped = asyncio.create_task(link.open())
-            create = link._connection._client.ctx.call_create
-
-            async def create_and_stop():
-                made = await create()
-                stopped.cancel()
-                return made
-
-            link._connection._client.ctx.call_create = create_and_stop
+        monkeypatch.setattr(ReplyProtocol, method, stop_and_do)
+        stopped = asyncio.create_task(link.read(0, 16) if done == "a reply" else link.open())
         await asyncio.wait([stopped], timeout=30)
         assert stopped.cancelled()
         link.close()
@@ -140,7 +135,7 @@ async def test_it_is_a_lost_link_each_time_and_nothing_else(port: int) -> None:
         identity=ExpectedIdentification(vendor="any"),
     )
     for _ in range(N_TRIES):
-        link = ModbusLink(settings)
+        link = ModbusClient(settings)
         with pytest.raises(LinkError, match=r"closed the connection|reset by peer"):
             await link.open()
         link.close()
@@ -175,7 +170,7 @@ async def test_a_late_reply_that_a_gateway_passes_on_to_the_next_connection_is_n
 
     for lie, error in ((keep, LinkError), (pass_on, FrameError)):
         hostile.lie = lie
-        link = ModbusLink(settings)
+        link = ModbusClient(settings)
         await link.open()
         with pytest.raises(error):
             await link.read(len(late), 1)  # the same length, function and unit: only its id tells
@@ -185,7 +180,7 @@ async def test_transactions_are_numbered_on_from_connection_to_connection_and_ne
     transport = TcpTransport(host="127.0.0.1", port=hostile.port)
     *_, last = islice(transport.transactions, 64_998)
     for _ in range(2):
-        link = ModbusLink(LinkSettings(transport=transport))
+        link = ModbusClient(LinkSettings(transport=transport))
         await link.open()
         for _ in range(2):
             await link.read(0, 1)

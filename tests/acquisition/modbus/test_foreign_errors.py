@@ -1,20 +1,18 @@
-"""No exception of pymodbus, the socket or the event loop leaves under its own name."""
+"""No exception of the socket, the serial port or the event loop leaves under its own name."""
 
+import asyncio
 import inspect
 import socket
 import termios
 
-import pymodbus.exceptions
 import pytest
 import serial.serialutil
-from pymodbus.client.base import ModbusBaseClient
 
 from acquisition.errors import AcquisitionError, ConfigError, LinkError
 
 FOREIGN = [
     kind
-    for module in (pymodbus.exceptions, serial.serialutil)
-    for _, kind in inspect.getmembers(module, inspect.isclass)
+    for _, kind in inspect.getmembers(serial.serialutil, inspect.isclass)
     if issubclass(kind, Exception)
 ] + [
     termios.error,
@@ -41,19 +39,26 @@ TEXT = "as seen in the field|Attempting to use a port that is not open"
 each_foreign_error = pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
 
 
-@each_foreign_error
-async def test_what_pymodbus_raises_is_renamed(kind, server, monkeypatch, link_to):
+@pytest.mark.parametrize(
+    "kind", [kind for kind in FOREIGN if issubclass(kind, OSError)], ids=lambda kind: kind.__name__
+)
+async def test_what_the_event_loop_raises_is_renamed(kind, server, monkeypatch, link_to):
     async def fails(*_: object) -> None:
         raise field_error(kind)
 
+    loop = asyncio.get_running_loop()
+    with monkeypatch.context() as patched:
+        patched.setattr(type(loop), "create_connection", fails)
+        with pytest.raises(LinkError, match=f"{TEXT}|no connection within"):
+            await link_to(server.port).open()
     link = link_to(server.port)
     await link.open()
-    monkeypatch.setattr(ModbusBaseClient, "execute", fails)
-    with pytest.raises(AcquisitionError, match=TEXT):
-        await link.read(0, 1)
-    monkeypatch.setattr(ModbusBaseClient, "connect", fails)
-    with pytest.raises(AcquisitionError, match=TEXT):
-        await link.open()
+    reading = asyncio.create_task(link.read(0, 1))
+    await asyncio.sleep(0)
+    link._protocol.connection_lost(field_error(kind))
+    with pytest.raises(LinkError, match=f"closed the connection: {TEXT}"):
+        await reading
+    link.close()
 
 
 @each_foreign_error

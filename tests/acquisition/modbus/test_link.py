@@ -1,17 +1,16 @@
 """What can be read from a device, over TCP and RTU alike, and that nothing can be written."""
 
-import inspect
 import struct
 from functools import partial
 
 import pytest
-from pymodbus.pdu import ModbusPDU
 
 from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.framing import TcpFramer
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.identity import ExpectedIdentification, Identification, Signature
 from acquisition.modbus.ring_source import ModbusRingSettings
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
+from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 
 
 async def test_every_kind_of_read_brings_what_the_device_has(linked, bench_server, bench):
@@ -73,6 +72,23 @@ async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, be
     assert not bench_server.function_codes
 
 
+@pytest.mark.parametrize("in_flight", [2, 6, 16])
+async def test_many_requests_in_flight_bring_the_same(bench, in_flight):
+    async with ModbusTcpServer(bench) as server:
+        transport = TcpTransport(host="127.0.0.1", port=server.port)
+        link = ModbusClient(
+            LinkSettings(transport=transport, max_registers=7, requests_in_flight=in_flight)
+        )
+        await link.open()
+        assert await link.read(100, 100) == bytes(range(200))
+        server.inject("busy", 3)
+        assert await link.read(100, 100) == bytes(range(200))
+        with pytest.raises(ConfigError, match="illegal address"):
+            await link.read(390, 20)
+        assert await link.read(100, 1) == b"\0\1"
+        link.close()
+
+
 async def test_a_busy_device_is_asked_again_on_the_same_connection(linked, bench_server):
     link = linked()
     await link.open()
@@ -88,49 +104,6 @@ async def test_a_device_that_stays_busy_is_not_waited_for_for_ever(linked, bench
     with pytest.raises(LinkError, match=r"exception 6 \(busy\) to a read of 1 at 100"):
         await link.read(100, 1)
     assert 2 <= bench_server.function_codes[3] <= 4
-
-
-def requests_of_pymodbus() -> list[type[ModbusPDU]]:
-    """Every request that pymodbus can send."""
-    kinds: list[type[ModbusPDU]] = [ModbusPDU]
-    for kind in kinds:
-        kinds += kind.__subclasses__()
-    found = {kind for kind in kinds if kind.__name__.endswith("Request")}
-    return sorted(found, key=lambda kind: kind.__name__)
-
-
-READS = {
-    "ReadCoilsRequest",
-    "ReadDeviceInformationRequest",
-    "ReadDiscreteInputsRequest",
-    "ReadFifoQueueRequest",
-    "ReadHoldingRegistersRequest",
-    "ReadInputRegistersRequest",
-}
-
-
-def arguments_of(kind: type[ModbusPDU]) -> dict[str, object]:
-    known = {"address": 100, "count": 1, "registers": [1], "bits": [True]}
-    return {name: known[name] for name in inspect.signature(kind).parameters if name in known}
-
-
-def test_pymodbus_has_more_requests_than_may_be_sent():
-    assert {kind.__name__ for kind in requests_of_pymodbus()} > READS
-    assert len(requests_of_pymodbus()) > 15
-
-
-@pytest.mark.parametrize("kind", requests_of_pymodbus(), ids=lambda kind: kind.__name__)
-async def test_nothing_but_reads_ever_reaches_the_wire(kind, linked, bench_server):
-    link = linked()
-    await link.open()
-    request = kind(**arguments_of(kind))
-    if kind.__name__ in READS:
-        await link._connection.ask(request, "a read")
-        assert list(bench_server.function_codes) == [kind.function_code]
-        return
-    with pytest.raises(ConfigError, match="is never sent"):
-        await link._connection.ask(request, "a write")
-    assert not bench_server.function_codes
 
 
 TCP = TcpTransport(host="127.0.0.1")
@@ -153,6 +126,8 @@ ring = partial(ModbusRingSettings, transport=TCP)
         (on_tcp, {"timeout_s": 0.0}, "timeout_s is 0.0"),
         (on_tcp, {"timeout_s": float("nan")}, "timeout_s is nan"),
         (on_line, {"connection": ConnectionUse.PER_REPLY}, "serial line is kept"),
+        (on_line, {"requests_in_flight": 2}, "requests_in_flight is 2, allowed is 1 to 1"),
+        (on_tcp, {"requests_in_flight": 17}, "requests_in_flight is 17, allowed is 1 to 16"),
         (ring, {"function": 6}, "function is 6, allowed are 3 and 4"),
         (ring, {"base_address": 65521}, "allowed is 0 to 65520"),
         (ring, {"poll_period_s": 0.0}, "poll_period_s is 0.0, must"),
@@ -162,18 +137,6 @@ ring = partial(ModbusRingSettings, transport=TCP)
 def test_what_cannot_be_is_refused_with_value_and_limit(kind, wrong, complaint):
     with pytest.raises(ConfigError, match=complaint):
         kind(**wrong)
-
-
-@pytest.mark.parametrize("request_data", [b"", b"\x0d\x01\x00", b"\x0e\x00\x00", b"\x0e\x05\x00"])
-def test_function_43_is_only_sent_to_read_an_identification(request_data):
-    class Other(ModbusPDU):
-        function_code = 43
-
-        def encode(self) -> bytes:
-            return request_data
-
-    with pytest.raises(ConfigError, match="function code 43 is never sent"):
-        TcpFramer().buildFrame(Other())
 
 
 async def test_the_expected_device_is_read_and_another_one_is_not(linked, bench_server):

@@ -25,7 +25,7 @@ async def test_a_reply_that_comes_too_late_is_never_taken_for_the_next_one(hosti
     assert len(hostile_line.requests) == 2
     hostile_line.lie = None
     opening = asyncio.create_task(link.open())
-    while not link._connection._client.connected:
+    while not link._protocol.is_open:
         await asyncio.sleep(0)
     hostile_line.write(held_back[0])  # the same function, unit and length: only time can tell
     await opening

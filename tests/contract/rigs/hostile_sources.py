@@ -16,7 +16,7 @@ import numpy as np
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from rigs.hostile_modbus import HostileLine, HostileServer, rtu_frame
-from rigs.modbus import ModbusRig, ModbusRtuRig
+from rigs.modbus import InFlightRig, ModbusRig, ModbusRtuRig
 from rigs.registers import REGISTER_RIGS
 
 TIMEOUT_S = 0.25
@@ -252,6 +252,7 @@ KINDS = {
     (kind.link, source): kind
     for source, kind in [
         *(("ring", _ring(rig)) for rig in (ModbusRig, ModbusRtuRig)),
+        ("ring in flight", _ring(InFlightRig)),
         *zip(_REGISTERS, map(_kind, REGISTER_RIGS), strict=True),
     ]
 }
@@ -261,7 +262,7 @@ KINDS = {
 def lies_to(link: str, source: str) -> dict[str, Callable]:
     """Kinds of wrong replies that a source must not believe."""
     lies = FORMS[link] | (OF_QUEUES if source.startswith("queue") else OF_REGISTERS)
-    return lies | CONTENTS[link] if source == "ring" else lies
+    return lies | CONTENTS[link] if source.startswith("ring") else lies
 
 
 class Trial:
@@ -284,6 +285,8 @@ class Trial:
 
         while self.n_told < n_lies:
             ear.n_honest, ear.lie = int(self._random.integers(MAX_HONEST)), lie
+            if isinstance(self._rig, InFlightRig):
+                self._rig.forget_stalls()
             try:
                 await self._read()
             except (LinkError, ConfigError):

@@ -75,17 +75,25 @@ class RingRig(Rig):
     """A block ring; the plant runs when `run` is called."""
 
     shape = RingDeviceSettings()
+    requests_in_flight = 1
 
     async def __aenter__(self) -> "RingRig":
         self.device = RingDevice(self._feed, settings=self.shape)
         self.step_samples = self.shape.samples_per_slot
         self._server = self._serve(self.device)
         await self.plug_in()
-        settings = ModbusRingSettings(
-            transport=self._transport(), poll_period_s=0.001, timeout_s=self.timeout_s
+        self._settings = ModbusRingSettings(
+            transport=self._transport(),
+            poll_period_s=0.001,
+            timeout_s=self.timeout_s,
+            requests_in_flight=self.requests_in_flight,
         )
-        self.source = ModbusRingSource(settings, self._calibration, SystemClock())
+        self.source = ModbusRingSource(self._settings, self._calibration, SystemClock())
         return self
+
+    def forget_stalls(self) -> None:
+        """Let the device have as many requests in flight again as at first."""
+        self._settings.in_flight.now = self.requests_in_flight
 
     @property
     def n_kept(self) -> int:
@@ -97,6 +105,12 @@ class RingRig(Rig):
 
 class ModbusRig(OnTcp, RingRig):
     """A block ring over Modbus TCP."""
+
+
+class InFlightRig(ModbusRig):
+    """The same, asked for much at once."""
+
+    requests_in_flight = 6
 
 
 class ModbusRtuRig(OnRtu, RingRig):
