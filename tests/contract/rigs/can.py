@@ -1,6 +1,7 @@
 """CAN sources on a counting plant, behind a real slcan adapter on a TCP port."""
 
 from contextlib import AsyncExitStack
+from dataclasses import replace
 
 from acquisition.can.settings import CanLinkSettings
 from acquisition.can.source import CanSource
@@ -41,7 +42,8 @@ class CanRig:
         await self.plug_in()
         link = CanLinkSettings(**self._server.endpoint, fd=self.fd)
         units = ("um",) * len(self._calibration.channels)
-        settings = daq_settings(self._shape, link, units)
+        # it sends when a test wants, however busy the machine is: that it does not is no pause
+        settings = replace(daq_settings(self._shape, link, units), stale_after_s=60.0)
         self.source = CanSource(settings, self._calibration, SystemClock())
         return self
 
