@@ -43,7 +43,9 @@ class CanRig:
         link = CanLinkSettings(**self._server.endpoint, fd=self.fd)
         units = ("um",) * len(self._calibration.channels)
         # it sends when a test wants, however busy the machine is: that it does not is no pause
-        settings = replace(daq_settings(self._shape, link, units), stale_after_s=60.0)
+        settings = replace(
+            daq_settings(self._shape, link, units), stale_after_s=60.0, when_full="wait"
+        )
         self.source = CanSource(settings, self._calibration, SystemClock())
         return self
 
