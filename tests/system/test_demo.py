@@ -1,5 +1,6 @@
 """`padwatch demo`: a plant to look at with one command, and nothing left of it afterwards."""
 
+import asyncio
 import os
 import signal
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -65,6 +66,8 @@ async def test_the_demo_ends_with_ctrl_c_in_order_and_takes_its_daq_along(
     demo: Program, tmp_path: Path, children: Children, gone: Gone
 ) -> None:
     [daq] = children(demo.pid)
+    while not list((tmp_path / "data").rglob("configurations")):  # kept by a task of its own
+        await asyncio.sleep(0.05)
     kept = {path.name: path.stat().st_mode & 0o077 for path in (tmp_path / "data").rglob("*")}
 
     assert await demo.end(signal.SIGINT) == 0
