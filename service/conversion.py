@@ -60,9 +60,7 @@ def _channel(settings: ChannelSettings) -> Channel:
 
 
 def _calibration(settings: ChannelSettings) -> ChannelCalibration:
-    return ChannelCalibration(
-        settings.full_scale_v, settings.unit_per_v, settings.ok_min_v, settings.ok_max_v
-    )
+    return ChannelCalibration(**settings.scale)
 
 
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:

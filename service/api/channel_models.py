@@ -28,19 +28,28 @@ class WaveformChannelModel(ApiModel):
     """Engineering unit of its samples."""
 
     sensitivity: float | None
-    """As in the plant file; null for a key-phase."""
+    """As in the plant file; null for a key-phase, and where counts are scaled."""
 
     sensitivity_unit: str | None
     """Unit of the sensitivity."""
 
-    full_scale_v: float
-    """Converter input in volts that reads full scale."""
+    full_scale_v: float | None
+    """Converter input in volts that reads full scale; null where counts are scaled."""
 
-    ok_min_v: float
+    ok_min_v: float | None
     """Lowest mean voltage of a healthy transducer."""
 
-    ok_max_v: float
+    ok_max_v: float | None
     """Highest mean voltage of a healthy transducer."""
+
+    unit_per_count: float | None
+    """Engineering units per count, where counts are scaled; else null."""
+
+    ok_min: float | None
+    """Lowest mean of a healthy transducer whose counts are scaled, in engineering units."""
+
+    ok_max: float | None
+    """Highest mean of such a one."""
 
     gain_uncertainty: float
     """Half-width of what the sensitivity may be off, as a share."""

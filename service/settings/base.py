@@ -24,6 +24,10 @@ class MisfitError(ValueError):
         self.at = at
 
 
+class MissingError(MisfitError):
+    """A key that is needed beside others that stand in the file."""
+
+
 class SecretMisfitError(MisfitError):
     """A value that does not fit and may hold a secret: it is not shown."""
 

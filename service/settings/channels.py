@@ -1,5 +1,6 @@
 """Waveform and slow channels of a unit."""
 
+import math
 from enum import StrEnum
 from typing import Annotated, Literal, Self
 
@@ -7,7 +8,7 @@ from pydantic import Field, model_validator
 
 from core.machine.unit import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
-from service.settings.base import Identifier, MisfitError, Settings
+from service.settings.base import Identifier, MisfitError, MissingError, Settings
 from service.settings.response import ResponseSettings
 from service.settings.slow_roll import ProbeName, SlowRollSettings
 
@@ -77,6 +78,12 @@ LINE_FLOORS = {
 SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
 """What a shaft may be looked at with, and so what may see its runout."""
 
+OF_VOLTS = ("full_scale_v", "ok_min_v", "ok_max_v")
+OF_COUNTS = ("unit_per_count", "ok_min", "ok_max")
+OF_A_VOLTAGE = ("sensitivity", "sensitivity_unit")
+COUNTS = 32768.0
+"""Of a 16-bit converter, at full scale."""
+
 NOT_OF_A_KEY_PHASE = (
     *("sensitivity", "sensitivity_unit", "response", "delay_s", "line_floor", "probe"),
     "slow_roll",
@@ -102,14 +109,25 @@ class ChannelSettings(Settings):
     """"V/mm" or "mV/um" for probes and displacement, "mV/(mm/s)" for velocity, "mV/g" or
     "mV/(m/s2)" for accelerometers."""
 
-    full_scale_v: Annotated[float, Field(gt=0.0, le=100.0)]
+    full_scale_v: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
     """Converter input in volts that reads 32768 counts; example: 12.0."""
 
-    ok_min_v: Annotated[float, Field(ge=-100.0, le=100.0)]
+    ok_min_v: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     """Lowest mean voltage of a healthy transducer (gap OK limit); example: 1.0."""
 
-    ok_max_v: Annotated[float, Field(ge=-100.0, le=100.0)]
+    ok_max_v: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     """Highest mean voltage of a healthy transducer (gap OK limit); example: 11.0."""
+
+    unit_per_count: float | None = None
+    """For a device that gives scaled counts, in place of the sensitivity and of all keys in volts:
+    µm, mm/s or m/s² per count (V of a key_phase), negative if counts fall; example: 0.0625."""
+
+    ok_min: float | None = None
+    """With unit_per_count: lowest mean of a healthy transducer, in µm, mm/s, m/s² or V; example:
+    250.0."""
+
+    ok_max: float | None = None
+    """With unit_per_count: highest mean of a healthy transducer; example: 2750.0."""
 
     gain_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
     """Half-width of what the sensitivity may be off, as a share: the transducer's class; example:
@@ -144,14 +162,30 @@ class ChannelSettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if not self.ok_min_v < self.ok_max_v:
-            raise MisfitError(f"must be below ok_max_v {self.ok_max_v:g}", "ok_min_v")
+        self._check_scale()
         if self.transducer is Transducer.KEY_PHASE:
             self._check_key_phase()
         else:
-            self._check_sensitivity()
+            if self.unit_per_count is None:
+                self._check_sensitivity()
             self._check_runout()
         return self
+
+    def _check_scale(self) -> None:
+        """Of a channel in volts, or of one in scaled counts; never of both."""
+        in_counts = self.unit_per_count is not None
+        keys, others = (OF_COUNTS, OF_VOLTS) if in_counts else (OF_VOLTS, OF_COUNTS)
+        for key in (*others, *(OF_A_VOLTAGE if in_counts else ())):
+            if getattr(self, key) is not None:
+                raise MisfitError("a channel is in volts or in scaled counts, not in both", key)
+        for key in keys:
+            if getattr(self, key) is None:
+                raise MissingError("is missing", key)
+        if self.unit_per_count == 0.0 or not math.isfinite(self.unit_per_count or 0.0):
+            raise MisfitError("must be a number other than 0", "unit_per_count")
+        low, high = keys[1:]
+        if not getattr(self, low) < getattr(self, high):
+            raise MisfitError(f"must be below {high} {getattr(self, high):g}", low)
 
     def _check_key_phase(self) -> None:
         for key in NOT_OF_A_KEY_PHASE:
@@ -187,10 +221,26 @@ class ChannelSettings(Settings):
 
     @property
     def unit_per_v(self) -> float:
-        """Engineering units per volt; pulses stay volts."""
+        """Engineering units per volt; pulses stay volts; per count where a count is a volt."""
+        if self.unit_per_count is not None:
+            return self.unit_per_count
         if self.sensitivity is None or self.sensitivity_unit is None:
             return 1.0
         return 1.0 / (self.sensitivity * V_PER_ENGINEERING_UNIT[self.sensitivity_unit])
+
+    @property
+    def scale(self) -> dict[str, float]:
+        """Full scale, units per volt and OK limits; scaled counts are taken for volts."""
+        full_scale, low, high = (getattr(self, key) for key in OF_VOLTS)
+        if self.unit_per_count is not None:
+            limits = (float(getattr(self, key)) / self.unit_per_count for key in OF_COUNTS[1:])
+            full_scale, (low, high) = COUNTS, sorted(limits)
+        return {
+            "full_scale_v": full_scale,
+            "unit_per_v": self.unit_per_v,
+            "ok_min_v": low,
+            "ok_max_v": high,
+        }
 
     @property
     def floor(self) -> float:

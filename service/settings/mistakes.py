@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from service.settings.base import MisfitError, SecretMisfitError
+from service.settings.base import MisfitError, MissingError, SecretMisfitError
 from service.settings.positions import Location
 from service.settings.schema import description, known_keys
 
@@ -38,7 +38,8 @@ def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -
     meaning = description(location)
     if error["type"] == "extra_forbidden":
         return f"{shown}: unknown key; known here: {', '.join(known_keys(location[:-1]))}"
-    if error["type"] == "value_error":
+    is_missing = isinstance(error.get("ctx", {}).get("error"), MissingError)
+    if error["type"] == "value_error" and not is_missing:
         if isinstance(error["ctx"]["error"], SecretMisfitError):
             return f"{key}: {error['ctx']['error']}"
         return f"{shown if found else f'{key} (by default)'}: {error['ctx']['error']}"

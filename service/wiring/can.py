@@ -89,7 +89,11 @@ def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
     floats = source.profile == "padwatch_float32"
     return CanShape(
         channels=tuple(
-            DaqSignal(c.id, UNITS[c.measurand] if floats else "V", _factor(c.full_scale_v, floats))
+            DaqSignal(
+                c.id,
+                UNITS[c.measurand] if floats else "V",
+                1.0 if floats else c.scale["full_scale_v"] / COUNTS,
+            )
             for c in unit.channel
         ),
         slow=tuple(DaqSignal(slow.id, slow.unit) for slow in unit.slow_channel),
@@ -141,10 +145,6 @@ def can_daq_of(
             ' be "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
         )
     return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
-
-
-def _factor(full_scale_v: float, floats: bool) -> float:
-    return 1.0 if floats else full_scale_v / COUNTS
 
 
 def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:

@@ -10,14 +10,7 @@ def recorded_unit(unit: UnitSettings) -> RecordedUnit:
         unit=unit.id,
         rate_hz=unit.sampling_hz,
         channels=tuple(
-            RecordedChannel(
-                id=channel.id,
-                measurand=channel.measurand,
-                full_scale_v=channel.full_scale_v,
-                unit_per_v=channel.unit_per_v,
-                ok_min_v=channel.ok_min_v,
-                ok_max_v=channel.ok_max_v,
-            )
+            RecordedChannel(id=channel.id, measurand=channel.measurand, **channel.scale)
             for channel in unit.channel
         ),
         slow_channels=tuple(RecordedSlowChannel(**slow.model_dump()) for slow in unit.slow_channel),

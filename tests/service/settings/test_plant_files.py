@@ -132,3 +132,33 @@ def test_no_plant_file_ever_yields_anything_but_a_plant_or_a_refusal(
 
 def load_text(text: str) -> PlantFile:
     return PlantFile.model_validate(tomllib.loads(text))
+
+
+IN_VOLTS = """sensitivity = 4.0
+sensitivity_unit = "V/mm"
+full_scale_v = 12.0
+ok_min_v = 1.0
+ok_max_v = 11.0
+"""
+IN_COUNTS = """unit_per_count = 0.091552734375
+ok_min = 250.0
+ok_max = 2750.0
+"""
+
+
+def test_scaled_counts_are_the_same_channel_without_volts(plant_text: str) -> None:
+    plants = [
+        PlantFile.model_validate(tomllib.loads(text))
+        for text in (plant_text, plant_text.replace(IN_VOLTS, IN_COUNTS, 1))
+    ]
+    volts, counts = (calibration_of(plant.unit[0]) for plant in plants)
+    assert plants[1].unit[0].channel[0].full_scale_v is None
+    assert counts.channels[0].unit_per_count == volts.channels[0].unit_per_count
+    assert counts.channels[0].ok_limits == pytest.approx(volts.channels[0].ok_limits)
+    feeds = [simulated_feed(plant.unit[0], SystemClock()) for plant in plants]
+    first, second = (
+        calibrate(feed.advance(50), calibration)
+        for feed, calibration in zip(feeds, (volts, counts), strict=True)
+    )
+    assert [q.level for q in first.channel_quality] == [q.level for q in second.channel_quality]
+    assert first.samples == pytest.approx(second.samples, abs=0.1)

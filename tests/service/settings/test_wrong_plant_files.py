@@ -36,6 +36,7 @@ BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
         ('"V/mm"', '"mV/g"', f"{CHANNEL_1}sensitivity_unit = 'mV/g'", '"V/mm" or "mV/um"'),
         ('"V/mm"', '"V/m"', f"{CHANNEL_1}sensitivity_unit = 'V/m'", "'mV/(m/s2)'"),
         ("min_v = 1.0", "min_v = 11.0", f"{CHANNEL_1}ok_min_v = 11.0", "below ok_max_v 11"),
+        ("ok_min_v = 1.0", "ok_min = 1.0", f"{CHANNEL_1}ok_min = 1.0", "volts or in scaled counts"),
         ("= 600.0", "= true", f"{UNIT_1}rate_hz = true", "valid number"),
         ("= 600.0", '= "600"', f"{UNIT_1}rate_hz = '600'", "valid number"),
         ("= 600.0", "= 2026-11-21", f"{UNIT_1}rate_hz = datetime.date(", "valid number"),
@@ -108,6 +109,7 @@ def test_an_analysis_that_cannot_tell_the_lines_apart_is_refused(
         ("bracket_stiffness_n_per_m = 1.18e9\n", f"{UJB}bracket_stiffness_n_per_m"),
         ("rated_speed_rpm = 92.3\n", f"{UNIT_1}rated_speed_rpm"),
         ("full_scale_v = 12.0\n", f"{CHANNEL_1}full_scale_v"),
+        ("ok_max_v = 11.0\n", f"{CHANNEL_1}ok_max_v"),
         ('kind = "modbus_ring"\n', f"{UNIT_1}source.kind"),
     ],
 )
