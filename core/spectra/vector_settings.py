@@ -12,13 +12,13 @@ class VectorSettings:
     n_polls
         Polls in the averaging window; 60 of 5 s are five minutes.
     hop_polls
-        Polls from one result to the next.
+        Polls from one result to the next, after which limits of vibration are judged.
     min_polls
         Polls with a changed vector below which a result is uncertain; at least 2.
     """
 
     n_polls: int = 60
-    hop_polls: int = 12
+    hop_polls: int = 4
     min_polls: int = 4
 
     def __post_init__(self) -> None:

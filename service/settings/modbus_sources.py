@@ -147,8 +147,9 @@ class ModbusVectorSettings(MappedDeviceSettings):
     n_polls: Annotated[int, Field(ge=2, le=100_000)] = 60
     """Polls that are averaged; 60 of 5 s are five minutes."""
 
-    hop_polls: Annotated[int, Field(ge=1, le=100_000)] = 12
-    """Polls from one result to the next; not above n_polls."""
+    hop_polls: Annotated[int, Field(ge=1, le=100_000)] = 4
+    """Polls from one result to the next, when limits of vibration are judged: four of 5 s are 20 s;
+    not above n_polls."""
 
     min_polls: Annotated[int, Field(ge=2, le=100_000)] = 4
     """Polls with a changed vector below which a result is uncertain; not above n_polls."""
