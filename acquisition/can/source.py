@@ -141,7 +141,7 @@ class CanSource:
             await asyncio.sleep(0)
 
     def _require_fresh(self, silent_s: float, doubtful_s: float) -> None:
-        """Refuse to wait longer for a sample, or for one of which the clock tells its place."""
+        """Give up a bus that brings no samples, or only samples that the clock contradicts."""
         is_doubtful = doubtful_s >= self._stale_after_s + _MAX_DOUBT_S
         if silent_s >= self._stale_after_s or is_doubtful:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())

@@ -4,7 +4,6 @@ pymodbus serves the simulated devices; why it does not read real ones is in deci
 """
 
 import asyncio
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -13,7 +12,7 @@ from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkEr
 from acquisition.modbus.framing import Asked
 from acquisition.modbus.identity import Identification, require_identity
 from acquisition.modbus.refusals import BUSY, refusal_error
-from acquisition.modbus.reply_protocol import CLOSED, ReplyProtocol, SilenceError
+from acquisition.modbus.reply_protocol import CLOSED, ReplyProtocol, SilenceError, reason_of
 from acquisition.modbus.requests import (
     EXCEPTION_BIT,
     READ_COILS,
@@ -47,10 +46,10 @@ _BUSY_WAIT_S = 0.05
 class ModbusClient:
     """One device, and the connection to it.
 
-    After a wrong or a missing reply the connection is closed, so that a late reply meets nobody. A
-    TCP connection is then another one. A serial line stays the same: when it is opened, whatever
-    comes is thrown away until nothing has come for as long as a reply may take. Where each request
-    has a connection of its own, none is open in between.
+    The connection is closed after a wrong or a missing reply, so that a late reply is never taken
+    for the next one. A serial line stays the same line when it is opened again: all bytes are
+    discarded until the line has been silent for `timeout_s`. With `ConnectionUse.PER_REPLY` each
+    request opens and closes a connection of its own.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
@@ -73,7 +72,7 @@ class ModbusClient:
         Raises
         ------
         LinkError
-            If nobody accepts the connection in time, there is no such port, or the line is never
+            If the connection is not accepted in time, the port does not exist, or the line is never
             silent; the message says why.
         ConfigError
             If there can be no such host, or the device is not the expected one.
@@ -293,7 +292,7 @@ class ModbusClient:
                 except TimeoutError:
                     continue
                 except OSError as error:
-                    why = _reason(error)
+                    why = reason_of(error)
                 else:
                     return
                 finally:
@@ -333,10 +332,3 @@ class ModbusClient:
                 f"{self.where}: {n_wanted} at {address} are asked, addresses are 0 to"
                 f" {ADDRESS_SPACE - 1}"
             )
-
-
-def _reason(error: OSError) -> str:
-    """Why no connection could be made, without what the event loop wraps around it."""
-    if error.errno is not None and error.errno > 0:
-        return os.strerror(error.errno)
-    return error.strerror or str(error)

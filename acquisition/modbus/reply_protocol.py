@@ -1,6 +1,8 @@
 """`ReplyProtocol`: requests in flight, and the replies that come to them in the same order."""
 
 import asyncio
+import errno
+import os
 from collections import deque
 from collections.abc import Sequence
 
@@ -10,6 +12,14 @@ from acquisition.modbus.transport import SerialTransport, Transport
 
 CLOSED = "the device closed the connection"
 _SHOWN_BYTES = 16
+
+
+def reason_of(error: OSError | EOFError) -> str:
+    """Why there is no connection, without what event loop and pyserial wrap around it."""
+    code = error.errno if isinstance(error, OSError) else None
+    if code == errno.EWOULDBLOCK:
+        return "another program has the port"
+    return os.strerror(code) if code is not None and code > 0 else str(error)
 
 
 class SilenceError(LinkError):

@@ -117,7 +117,8 @@ class ReadRequest:
     shape
         Of the reply, apart from an exception.
     intent
-        What is asked for, as a refused request is told; example: "a read of 2 at 100".
+        What is asked for, in the words of the error if the device refuses; example: "a read of 2
+        at 100".
 
     Raises
     ------

@@ -2,12 +2,12 @@
 
 import asyncio
 import errno
-import os
 import termios
 
 import serial
 
 from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.reply_protocol import reason_of
 from acquisition.modbus.transport import SerialTransport
 
 _RECEIVE_BYTES = 1024
@@ -69,21 +69,12 @@ def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLi
     port.parity, port.exclusive, port.write_timeout = settings.parity[0].upper(), True, 0
     try:
         port.open()
-        port.timeout = 0  # sets it up once more: what a port ignores is told the second time only
+        port.timeout = 0  # configures it again: a port reports an ignored setting only then
     except termios.error as error:  # of a port that exists but cannot be set up so
         port.close()
         kind = ConfigError if error.args[0] == errno.EINVAL else LinkError
         raise kind(f"{settings}: the port refuses its settings: {error.args[-1]}") from None
     except (OSError, EOFError) as error:
         port.close()
-        raise LinkError(f"{settings}: {_reason(error)}") from None
+        raise LinkError(f"{settings}: {reason_of(error)}") from None
     return SerialLine(port, protocol)
-
-
-def _reason(error: OSError | EOFError) -> str:
-    """Why there is no port, without what pyserial wraps around it."""
-    if isinstance(error, EOFError):
-        return str(error)
-    if error.errno == errno.EWOULDBLOCK:
-        return "another program has the port"
-    return os.strerror(error.errno) if error.errno else str(error)

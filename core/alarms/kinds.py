@@ -145,7 +145,7 @@ class WatchList:
     temperatures
         To be compared with slow channels.
     films
-        Of each bearing and direction; somebody else judges them.
+        Of each bearing and direction; `core.change` judges them.
     """
 
     channels: tuple[Watch, ...]

@@ -110,7 +110,7 @@ def absolute_quantile_std(deviation: FloatArray) -> float:
 
 
 MEDIAN_READINGS = 5
-"""Of which the median is taken."""
+"""Number of newest deviations whose median counts, so that single spikes do not."""
 
 
 def forgetting(time_scale_h: float, reading_h: float) -> float:
@@ -120,7 +120,7 @@ def forgetting(time_scale_h: float, reading_h: float) -> float:
 
 @dataclass(frozen=True)
 class Newest:
-    """The newest deviations, oldest first, of which the median is taken."""
+    """The newest deviations, oldest first, and their median."""
 
     deviations: tuple[float, ...] = ()
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE
 from core.machine.unit import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings
@@ -81,9 +82,6 @@ SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
 OF_VOLTS = ("full_scale_v", "ok_min_v", "ok_max_v")
 OF_COUNTS = ("unit_per_count", "ok_min", "ok_max")
 OF_A_VOLTAGE = ("sensitivity", "sensitivity_unit")
-COUNTS = 32768.0
-"""Of a 16-bit converter, at full scale."""
-
 NOT_OF_A_KEY_PHASE = (
     *("sensitivity", "sensitivity_unit", "response", "delay_s", "line_floor", "probe"),
     "slow_roll",
@@ -234,7 +232,7 @@ class ChannelSettings(Settings):
         full_scale, low, high = (getattr(self, key) for key in OF_VOLTS)
         if self.unit_per_count is not None:
             limits = (float(getattr(self, key)) / self.unit_per_count for key in OF_COUNTS[1:])
-            full_scale, (low, high) = COUNTS, sorted(limits)
+            full_scale, (low, high) = float(COUNTS_FULL_SCALE), sorted(limits)
         return {
             "full_scale_v": full_scale,
             "unit_per_v": self.unit_per_v,

@@ -6,6 +6,7 @@ from typing import Any
 from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE
 from acquisition.delivery.raw import RawFeed
 from acquisition.simulated.devices.can_bus import CanBusServer
 from acquisition.simulated.devices.can_dbc import daq_settings
@@ -25,7 +26,6 @@ UNITS = {
     Measurand.ACCELERATION_M_S2: "m/s2",
     Measurand.KEY_PHASE_V: "V",
 }
-COUNTS = 32768
 
 
 def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
@@ -92,7 +92,7 @@ def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
             DaqSignal(
                 c.id,
                 UNITS[c.measurand] if floats else "V",
-                1.0 if floats else c.scale["full_scale_v"] / COUNTS,
+                1.0 if floats else c.scale["full_scale_v"] / COUNTS_FULL_SCALE,
             )
             for c in unit.channel
         ),

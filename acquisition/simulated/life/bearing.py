@@ -33,7 +33,7 @@ class LifeBearing:
         By how much the pads move out along one diameter once the bracket's arms are warmed by the
         field of the generator at full load (Figure 3); across it they move in as much.
     told_clearance_um
-        What the monitor is told, and eccentricity is a ratio of: that of the warm machine.
+        Clearance in the plant file, that of the warm machine; eccentricity is a ratio of it.
     oil_rise_c, oil_rise_at_load_c
         Oil over cooling water at speed without load, and what full load adds.
     oil_time_s, closing_time_s, opening_time_s
