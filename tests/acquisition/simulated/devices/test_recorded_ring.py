@@ -49,8 +49,7 @@ class PiecewiseFeed:
 
 
 def source_of(server, calibration: UnitCalibration, **settings: float) -> ModbusRingSource:
-    timeout_s = 5.0 if "port" in server.endpoint else 0.6
-    given = {"poll_period_s": 0.0001, "timeout_s": timeout_s} | settings
+    given = {"poll_period_s": 0.0001, "timeout_s": 3.0} | settings
     settings = ModbusRingSettings(transport=transport_of(server), **given)
     return ModbusRingSource(settings, calibration, SystemClock())
 
