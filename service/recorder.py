@@ -74,9 +74,9 @@ class Recorder:
     parked
         The file.
     capacity
-        Most findings that wait for a store that does not answer; beyond it the oldest are given up
-        and counted in :attr:`LiveView.n_unstored`. News of alarms wait apart from them, up to
-        `MAX_NEWS`, and are given up last.
+        Most findings that wait for a store that does not answer, besides those being written;
+        beyond it the oldest are given up and counted in :attr:`LiveView.n_unstored`. News of alarms
+        wait apart from them, up to `MAX_NEWS`, and are given up last.
     told
         Called when news of alarms has been written.
     timed
@@ -103,6 +103,7 @@ class Recorder:
         self._finds_again = finds_again
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
+        self._n_writing = 0
         self._waits_since_s = 0.0
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
@@ -128,9 +129,7 @@ class Recorder:
             self._waits_since_s = self._clock.monotonic_s()
         if findings.assessments or findings.gaps or findings.position:
             self._waiting.append(replace(findings, alarms=()))
-        if len(self._waiting) > self._capacity:
-            self._waiting.popleft()
-            self._live.note_unstored(1, GIVEN_UP)
+        self._give_up_oldest()
         self._alarms += findings.alarms
         while len(self._alarms) > MAX_NEWS:
             self._resolve(self._alarms.popleft(), "too much waits for the store")
@@ -200,8 +199,15 @@ class Recorder:
             else:
                 log.error("results are lost", **counts)
 
+    def _give_up_oldest(self) -> None:
+        """Keep to the capacity; what is being written may yet be stored, and is kept."""
+        while len(self._waiting) > self._capacity + self._n_writing:
+            del self._waiting[self._n_writing]
+            self._live.note_unstored(1, GIVEN_UP)
+
     async def _write(self) -> bool:
         batch, alarms = list(self._waiting), list(self._alarms)
+        self._n_writing = len(batch)
         append = partial(self._append, [Findings(alarms=alarms), *batch])
         try:
             refused = await asyncio.get_running_loop().run_in_executor(self._thread, append)
@@ -209,6 +215,8 @@ class Recorder:
             if self._live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
             self._live.store_error = str(error)
+            self._n_writing = 0
+            self._give_up_oldest()
             await self._tell_progress()
             return False
         if self._live.store_error is not None:
@@ -216,6 +224,7 @@ class Recorder:
         self._live.store_error = None
         self._waits_since_s = self._clock.monotonic_s()
         self._note_parked(refused)
+        self._n_writing = 0
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
         reasons = {id(row): reason for row, reason in refused}

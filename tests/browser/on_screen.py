@@ -33,7 +33,7 @@ AGE = """() => {
     return 60 * Number(minutes ?? 0) + Number(seconds);
 }"""
 
-N_TABS = 60
+N_TABS = 180
 WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
 

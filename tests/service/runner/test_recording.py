@@ -156,19 +156,37 @@ async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(
 
 
 @pytest.mark.parametrize("plant", [3], indirect=True)
-async def test_what_does_not_fit_while_the_store_is_away_is_counted(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_what_does_not_fit_while_the_store_is_away_is_counted(plant: Any) -> None:
+    results = [assessment(at(n), order1_k_eff_xx_n_per_m=float(n)) for n in range(5)]
     break_store(plant)
+    for result in results:
+        plant.recorder.put(Findings([result]))
 
-    await play(plant, scripted, [block(number) for number in range(36)], flush=False)
-    newest = plant.live.assessment("U1", "UJB").readings[K].value
+    await plant.recorder.flush()
     mend_store(plant)
     await plant.recorder.flush()
 
     assert plant.live.n_unstored == 2
-    assert len(stored(plant)) == 3
-    assert stored(plant)[-1] == newest
+    assert stored(plant) == [2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize("plant", [3], indirect=True)
+async def test_what_is_being_written_is_never_given_up(plant: Any) -> None:
+    gaps = [UnitGap("U1", Gap(1, n * 100, 10, n)) for n in range(7)]
+    with closing(sqlite3.connect(plant.path)) as blocker:
+        blocker.execute("BEGIN IMMEDIATE")
+        for gap_ in gaps[:3]:
+            plant.recorder.put(Findings([], [gap_]))
+        writing = asyncio.create_task(plant.recorder.flush())
+        await until(plant.store._lock.locked)
+        for gap_ in gaps[3:]:
+            plant.recorder.put(Findings([], [gap_]))
+        blocker.rollback()
+        await writing
+    await plant.recorder.flush()
+
+    assert plant.live.n_unstored == 1
+    assert plant.store.gaps("U1", 0, 100) == [g.gap for g in gaps[:3] + gaps[4:]]
 
 
 async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothing_twice(
