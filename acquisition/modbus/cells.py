@@ -1,4 +1,4 @@
-"""`Cell`: where one number stands in a device, and how its bytes are to be read."""
+"""`Cell`: address, type and byte order of one number in a device."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -6,15 +6,11 @@ from enum import StrEnum
 import numpy as np
 
 from acquisition.errors import ConfigError
-
-REGISTER_FUNCTIONS = (3, 4)
-BIT_FUNCTIONS = (1, 2)
-FUNCTIONS = (*BIT_FUNCTIONS, *REGISTER_FUNCTIONS)
+from acquisition.modbus.requests import ADDRESS_SPACE, REGISTER_FUNCTIONS, SPAN_FUNCTIONS
 
 BASES = (0, 1, 10001, 30001, 40001, 100001, 300001, 400001)
 """Numbers that manuals give to the first register of a table."""
 
-ADDRESS_SPACE = 0x10000
 BITS_PER_REGISTER = 16
 
 
@@ -33,7 +29,7 @@ class MapError(ConfigError):
 
 
 class NumberType(StrEnum):
-    """What a number's bytes stand for."""
+    """Type of a number."""
 
     INT16 = "int16"
     UINT16 = "uint16"
@@ -56,17 +52,15 @@ DTYPES = {
 """As numpy reads them once their bytes are in the order ABCD."""
 
 N_BYTES = {type_: int(name[-1]) for type_, name in DTYPES.items()}
-
-
 FLOATS = (NumberType.FLOAT32, NumberType.FLOAT64)
 INTEGERS = (NumberType.INT16, NumberType.UINT16, NumberType.INT32, NumberType.UINT32)
 
 
 def reads_as(found: float, type_: NumberType, number: float) -> bool:
-    """Whether a number that was read is the one that a manual writes.
+    """Whether a number that was read is the one in a manual.
 
-    Of integers the bits count, so that 0x8000 is -32768; a float of 32 bits is only the nearest one
-    to what is written.
+    Integers are compared by their bits, so that 0x8000 is -32768; a number in the manual is
+    rounded to float32 before it is compared with one.
     """
     if type_ in INTEGERS:
         return number % 1 == 0 and (int(found) - int(number)) % (1 << 8 * N_BYTES[type_]) == 0
@@ -77,10 +71,10 @@ def reads_as(found: float, type_: NumberType, number: float) -> bool:
 
 
 class ByteOrder(StrEnum):
-    """In which order four bytes come; A is the most significant.
+    """Order in which four bytes come; A is the most significant.
 
-    Words first to last and bytes within a word may each be exchanged. Of a single register only
-    the bytes can be, and of four registers all words are.
+    The order of the words and the order of the bytes in each word may each be reversed. A single
+    register has only the second; of four registers all words are reversed.
     """
 
     ABCD = "ABCD"
@@ -100,7 +94,7 @@ class ByteOrder(StrEnum):
 
     @property
     def pair(self) -> str:
-        """The same of a single register: "AB" or "BA"."""
+        """Byte order of a single register: "AB" or "BA"."""
         return "BA" if self.low_byte_first else "AB"
 
 
@@ -125,7 +119,7 @@ class Cell:
     bit: int | None = None
 
     def __post_init__(self) -> None:
-        if self.function not in FUNCTIONS:
+        if self.function not in SPAN_FUNCTIONS:
             raise MapError(f"must be 1, 2, 3 or 4, got {self.function}", "function")
         is_bit, in_register = self.type is NumberType.BIT, self.function in REGISTER_FUNCTIONS
         if not in_register and not is_bit:
@@ -141,7 +135,7 @@ class Cell:
 
     @property
     def n_places(self) -> int:
-        """Registers that it takes, or 1 bit of functions 1 and 2."""
+        """Addresses that it takes: registers, or one bit of functions 1 and 2."""
         return N_BYTES[self.type] // 2
 
     def start(self, base: int) -> int:

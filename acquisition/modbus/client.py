@@ -1,60 +1,83 @@
-"""`ModbusClient`: what can be read from a Modbus device, over TCP or RTU; nothing can be written.
+"""`ModbusClient`: reads a Modbus device over TCP or RTU; nothing can be written.
 
 pymodbus serves the simulated devices; why it does not read real ones is in decision record 31.
 """
 
 import asyncio
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from itertools import count
 
+from acquisition.delivery.names import KnownAddresses
 from acquisition.delivery.stopping import let_stop_through
+from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
+from acquisition.modbus.connection import (
+    CLOSED,
+    ReplyProtocol,
+    SilenceError,
+    open_line,
+    reason_of,
+)
 from acquisition.modbus.framing import Asked
-from acquisition.modbus.identity import Identification, require_identity
-from acquisition.modbus.refusals import BUSY, refusal_error
-from acquisition.modbus.reply_protocol import CLOSED, ReplyProtocol, SilenceError, reason_of
+from acquisition.modbus.identity import ExpectedRegisters, Identification, Identity
 from acquisition.modbus.requests import (
+    BUSY,
     EXCEPTION_BIT,
-    READ_COILS,
-    READ_DISCRETE_INPUTS,
     READ_HOLDING_REGISTERS,
-    READ_INPUT_REGISTERS,
     ReadRequest,
-    bits_request,
+    Span,
+    exception_error,
     fifo_registers,
     fifo_request,
     identification_objects,
     identification_request,
-    registers_request,
+    span_requests,
 )
-from acquisition.modbus.serial_line import open_line
 from acquisition.modbus.transport import (
-    ADDRESS_SPACE,
     ConnectionUse,
     LinkSettings,
     SerialTransport,
     TcpTransport,
 )
 
-_MAX_BITS_PER_READ = 2000
+_N_TRANSACTIONS = 65_000
+"""Ids are 1 to this; some devices answer to 0 as to any."""
+
 _MAX_IDENTIFICATION_REPLIES = 8
+_N_IDENTITY_TRIES = 2
+"""A reply that was changed on the way is not another device."""
+
 _MAX_SILENCE_TRIES = 5
+_MAX_CLOSED_BURSTS = 2
 _BUSY_WAIT_S = 0.05
 """Before a device that is busy is asked again: some replies, and less than a poll period."""
 
 
 class ModbusClient:
-    """One device, and the connection to it.
+    """One device, and the connection to it; a closed client can be opened again.
 
     The connection is closed after a wrong or a missing reply, so that a late reply is never taken
-    for the next one. A serial line stays the same line when it is opened again: all bytes are
-    discarded until the line has been silent for `timeout_s`. With `ConnectionUse.PER_REPLY` each
-    request opens and closes a connection of its own.
+    for the next one. Transactions are numbered on from one connection to the next, because a
+    gateway may pass a late reply on to the next connection. A serial line stays the same line when
+    it is opened again: all bytes are discarded until the line has been silent for `timeout_s`. With
+    `ConnectionUse.PER_REPLY` each request opens and closes a connection of its own.
+
+    Attributes
+    ----------
+    requests_in_flight
+        Most requests that are sent before the first is answered: as the settings say; one as soon
+        as the device has not answered several in order, or has closed the connection on them twice
+        running.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
         self._settings = settings
         self._protocol = ReplyProtocol(settings.transport)
+        self._addresses: KnownAddresses | None = None
+        self._transactions = (1 + n % _N_TRANSACTIONS for n in count())
+        self._n_closed_bursts = 0
+        self.requests_in_flight = settings.requests_in_flight
 
     @property
     def where(self) -> str:
@@ -66,8 +89,24 @@ class ModbusClient:
         """Whether one connection serves all requests, so that all go to the same device."""
         return self._settings.connection is ConnectionUse.KEPT
 
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        """Open the connection, and close it when the context is left.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As `open`; LinkError too if the device's identity is no right reply.
+        """
+        try:
+            with wrong_replies_drop_the_link():
+                await self.open()
+            yield
+        finally:
+            self.close()
+
     async def open(self) -> None:
-        """Connect, on a serial line wait until it is silent, and see whether the device is right.
+        """Connect, on a serial line wait until it is silent, and check the device's identity.
 
         Raises
         ------
@@ -77,7 +116,7 @@ class ModbusClient:
         ConfigError
             If there can be no such host, or the device is not the expected one.
         FrameError
-            If it answers nonsense when it is asked who it is.
+            If a reply about its identity is not the right one.
         """
         await self._connect()
         if not self.is_kept:
@@ -85,92 +124,83 @@ class ModbusClient:
         await self.require_device()
 
     async def require_device(self) -> None:
-        """See whether the device is right, if the settings say how to know it.
+        """Refuse another device than the expected one, if the settings name one.
 
         Raises
         ------
-        LinkError, FrameError, ConfigError
-            As `open`.
+        ConfigError
+            Naming what was found and what was expected.
+        LinkError, FrameError
+            As `read`.
         """
-        if self._settings.identity is not None:
-            await require_identity(self, self._settings.identity)
+        identity = self._settings.identity
+        if identity is None:
+            return
+        for _ in range(_N_IDENTITY_TRIES):
+            misfit = await self._misfit(identity)
+            if misfit is None:
+                return
+        raise ConfigError(f"{self.where}: another device answers: {misfit}")
 
     def close(self) -> None:
         """Close the connection; again is harmless."""
         self._protocol.close()
 
     async def read(
-        self, address: int, n_registers: int, function: int = READ_HOLDING_REGISTERS
+        self, address: int, n_wanted: int, function: int = READ_HOLDING_REGISTERS
     ) -> bytes:
-        """Read registers in as many requests as it takes.
+        """Read registers, big-endian words, or bits, eight a byte and the first one lowest.
 
         Parameters
         ----------
-        function
-            3 (holding registers) or 4 (input registers).
+        address, n_wanted, function
+            As of a `Span`.
 
-        Returns
-        -------
-        bytes
-            ``2 * n_registers`` bytes, big-endian words.
+        Raises
+        ------
+        LinkError, FrameError, ConfigError
+            As `read_into`; ConfigError too if no device can have these.
+        """
+        span = Span(address, n_wanted, function)
+        content = bytearray(span.n_bytes)
+        await self.read_into([span], memoryview(content))
+        return bytes(content)
+
+    async def read_into(self, spans: Sequence[Span], out: memoryview) -> None:
+        """Read spans in as many requests as it takes, `requests_in_flight` at a time.
+
+        Parameters
+        ----------
+        out
+            Filled with the content of the spans one after another; as long as that.
 
         Raises
         ------
         LinkError
             If the device does not answer, or answers that it cannot now.
         FrameError
-            If an answer is not the one to its request.
+            If a reply is not the one to its request.
         ConfigError
-            If the device says that it has no such registers, or there can be none.
+            If the device answers that it has no such registers or function.
         """
-        make = partial(registers_request, function=function)
-        functions = (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS)
         step = self._settings.max_registers
-        return await self._read(make, functions, address, n_registers, function, step)
+        requests = [request for span in spans for request in span_requests(span, step)]
+        at = 0
+        for reply in await self._ask(requests):
+            stop = at + len(reply) - 2
+            out[at:stop] = reply[2:]
+            at = stop
 
-    async def read_each(
-        self, addresses: Sequence[int], function: int = READ_HOLDING_REGISTERS
-    ) -> bytes:
-        """Read single registers, each with a request of its own.
-
-        Raises
-        ------
-        LinkError, FrameError, ConfigError
-            As `read`.
-        """
-        requests = [registers_request(address, 1, function) for address in addresses]
-        return b"".join([pdu[2:] for pdu in await self._ask(requests)])
-
-    async def read_bits(
-        self, address: int, n_bits: int, function: int = READ_DISCRETE_INPUTS
-    ) -> bytes:
-        """Read coils (function 1) or discrete inputs (2).
-
-        Returns
-        -------
-        bytes
-            Eight bits a byte, the first one lowest; bits past the last one mean nothing.
+    async def read_fifos(self, addresses: Sequence[int]) -> list[bytes]:
+        """Read queues of 0 to 31 registers, big-endian words; one for each address.
 
         Raises
         ------
         LinkError, FrameError, ConfigError
-            As `read`.
+            As `read_into`; a FrameError too if the device claims more than 31.
         """
-        make = partial(bits_request, function=function)
-        functions = (READ_COILS, READ_DISCRETE_INPUTS)
-        return await self._read(make, functions, address, n_bits, function, _MAX_BITS_PER_READ)
-
-    async def read_fifo(self, address: int) -> bytes:
-        """Read a queue of 0 to 31 registers, big-endian words.
-
-        Raises
-        ------
-        LinkError, FrameError, ConfigError
-            As `read`; a FrameError too if the device claims more than 31.
-        """
-        self._require_in_space(address, 1)
-        [pdu] = await self._ask([fifo_request(address)])
-        return fifo_registers(pdu)
+        replies = await self._ask([fifo_request(address) for address in addresses])
+        return [fifo_registers(reply) for reply in replies]
 
     async def identify(self) -> Identification:
         """Read vendor, product code and revision, by function 43/14.
@@ -178,93 +208,75 @@ class ModbusClient:
         Raises
         ------
         LinkError, FrameError, ConfigError
-            As `read`; ConfigError too if the device has no such function.
+            As `read_into`; a FrameError too if the identification has no end.
         """
         objects: dict[int, bytes] = {}
         following: int | None = 0
         for _ in range(_MAX_IDENTIFICATION_REPLIES):
-            [pdu] = await self._ask([identification_request(following or 0)])
-            found, following = identification_objects(pdu)
+            [reply] = await self._ask([identification_request(following or 0)])
+            found, following = identification_objects(reply)
             objects |= found
             if following is None:
                 return Identification.of_objects(objects)
         self.close()
         raise FrameError(f"{self.where}: the identification has no end")
 
-    async def _read(
-        self,
-        make: Callable[[int, int], ReadRequest],
-        functions: Sequence[int],
-        address: int,
-        n_wanted: int,
-        function: int,
-        step: int,
-    ) -> bytes:
-        self._require_in_space(address, n_wanted)
-        if function not in functions:
-            raise ConfigError(f"modbus: function is {function}, allowed are {sorted(functions)}")
-        stop = address + n_wanted
-        requests = [make(at, min(step, stop - at)) for at in range(address, stop, step)]
-        return b"".join([pdu[2:] for pdu in await self._ask(requests)])
+    async def _misfit(self, identity: Identity) -> str | None:
+        if isinstance(identity, ExpectedRegisters):
+            n_words = len(identity.words)
+            found = await self.read(identity.address, n_words, identity.function)
+            return identity.misfit(found)
+        return identity.misfit(await self.identify())
 
-    async def _ask(self, requests: Sequence[ReadRequest]) -> list[bytes]:
-        """Replies to requests, from their function codes on, some requests in flight at a time."""
-        replies: list[bytes] = []
+    async def _ask(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
+        """Replies to requests, from their function codes on."""
+        replies: list[memoryview] = []
         while len(replies) < len(requests):
-            stop = len(replies) + self._settings.in_flight.now
-            burst = requests[len(replies) : stop]
-            found = await self._exchange(burst)
-            for request, pdu in zip(burst, found, strict=True):
-                if pdu[0] & EXCEPTION_BIT:
-                    pdu = await self._asked_again(request, pdu[1])
-                replies.append(pdu)
+            burst = requests[len(replies) : len(replies) + self.requests_in_flight]
+            for request, reply in zip(burst, await self._exchange(burst), strict=True):
+                is_refusal = reply[0] & EXCEPTION_BIT
+                replies.append(await self._ask_again(request, reply) if is_refusal else reply)
         return replies
 
-    async def _asked_again(self, request: ReadRequest, refusal: int) -> bytes:
+    async def _ask_again(self, request: ReadRequest, reply: memoryview) -> memoryview:
         """Ask a device that is busy again, for as long as a reply may take."""
         for _ in range(int(self._settings.timeout_s / _BUSY_WAIT_S)):
-            if refusal != BUSY:
+            if reply[1] != BUSY:
                 break
             await asyncio.sleep(_BUSY_WAIT_S)
-            [pdu] = await self._exchange([request])
-            if not pdu[0] & EXCEPTION_BIT:
-                return pdu
-            refusal = pdu[1]
-        raise refusal_error(self.where, refusal, request.intent)
+            [reply] = await self._exchange([request])
+            if not reply[0] & EXCEPTION_BIT:
+                return reply
+        raise exception_error(self.where, reply[1], request)
 
-    async def _exchange(self, burst: Sequence[ReadRequest]) -> list[bytes]:
+    async def _exchange(self, burst: Sequence[ReadRequest]) -> list[memoryview]:
         """Send requests once, on a connection of its own if each is to have one."""
-        in_flight, is_burst = self._settings.in_flight, len(burst) > 1
+        unit, transport = self._settings.device_id, self._settings.transport
         try:
             if not self.is_kept:
                 await self._connect()
-            replies = await self._sent(burst)
-        except (SilenceError, FrameError) as error:
+            if isinstance(transport, SerialTransport):
+                await asyncio.sleep(transport.frame_gap_s)
+            asked = [Asked(request, unit, next(self._transactions)) for request in burst]
+            replies = await self._protocol.ask(asked, self._settings.timeout_s)
+        except (AcquisitionError, asyncio.CancelledError) as error:
             self.close()
-            if is_burst:
-                in_flight.stalled()
+            if len(burst) > 1 and self._shows_too_many(error):
+                self.requests_in_flight = 1
                 words = f"{error}, {len(burst)} requests in flight; one at a time from now on"
                 raise type(error)(words) from error
             raise
-        except (AcquisitionError, asyncio.CancelledError) as error:
-            self.close()
-            if is_burst and isinstance(error, LinkError):
-                in_flight.cut()
-            raise
-        in_flight.answered()
+        self._n_closed_bursts = 0
         if not self.is_kept:
             self.close()
         return replies
 
-    async def _sent(self, burst: Sequence[ReadRequest]) -> list[bytes]:
-        unit, transport = self._settings.device_id, self._settings.transport
-        match transport:
-            case SerialTransport(frame_gap_s=frame_gap_s):
-                await asyncio.sleep(frame_gap_s)
-                asked = [Asked(request, unit) for request in burst]
-            case TcpTransport(transactions=transactions):
-                asked = [Asked(request, unit, next(transactions)) for request in burst]
-        return await self._protocol.ask(asked, self._settings.timeout_s)
+    def _shows_too_many(self, error: BaseException) -> bool:
+        """Whether the device cannot take several requests, by the error that they ended with."""
+        if isinstance(error, SilenceError | FrameError):
+            return True
+        self._n_closed_bursts += isinstance(error, LinkError)
+        return isinstance(error, LinkError) and self._n_closed_bursts >= _MAX_CLOSED_BURSTS
 
     async def _connect(self) -> None:
         self._protocol.close()
@@ -282,10 +294,12 @@ class ModbusClient:
             transport.host.encode("idna")
         except ValueError as error:  # a host name that no resolver can even be asked for
             raise ConfigError(f"{self.where}: {error}") from error
+        if self._addresses is None:
+            self._addresses = KnownAddresses(transport.host, transport.port)
         timeout_s = self._settings.timeout_s
         why = f"no connection within {timeout_s} s"
         try:
-            for address in await transport.addresses.within(timeout_s):
+            for address in await self._addresses.within(timeout_s):
                 try:
                     async with asyncio.timeout(timeout_s):
                         await self._connect_at(address, transport)
@@ -308,7 +322,7 @@ class ModbusClient:
         self._protocol = protocol
 
     async def _await_silence(self) -> None:
-        """Throw away what still comes, until nothing has come for the time a reply may take."""
+        """Discard what still comes, until nothing has come for the time a reply may take."""
         protocol, timeout_s = self._protocol, self._settings.timeout_s
         try:
             for _ in range(_MAX_SILENCE_TRIES):
@@ -325,10 +339,3 @@ class ModbusClient:
         except (LinkError, asyncio.CancelledError):
             self.close()
             raise
-
-    def _require_in_space(self, address: int, n_wanted: int) -> None:
-        if not 0 <= address < address + n_wanted <= ADDRESS_SPACE:
-            raise ConfigError(
-                f"{self.where}: {n_wanted} at {address} are asked, addresses are 0 to"
-                f" {ADDRESS_SPACE - 1}"
-            )

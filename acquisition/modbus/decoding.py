@@ -1,23 +1,16 @@
-"""From the bytes of all replies to the numbers of all cells, and to the values of a map."""
+"""Decoding: contents of all spans to the numbers of cells, and to the values of a map."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-import numpy.typing as npt
 
-from acquisition.modbus.cells import (
-    BIT_FUNCTIONS,
-    DTYPES,
-    N_BYTES,
-    ByteOrder,
-    Cell,
-    NumberType,
-    reads_as,
-)
+from acquisition.modbus.cells import DTYPES, N_BYTES, ByteOrder, Cell, NumberType, reads_as
 from acquisition.modbus.read_plan import ReadPlan, plan_reads
-from acquisition.modbus.register_map import FlagCheck, Meaning, RegisterMap
+from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
+from acquisition.modbus.requests import BIT_FUNCTIONS
 from core.arrays import FloatArray
 
 
@@ -32,7 +25,7 @@ class ValueState(IntEnum):
 
 @dataclass(frozen=True)
 class MapReading:
-    """What one poll has found.
+    """Values of a map from one poll.
 
     Parameters
     ----------
@@ -41,9 +34,9 @@ class MapReading:
     states
         One for each value.
     time_ns
-        By the device's clock, if the map has one and it makes sense.
+        UTC by the device's clock; None without a clock, or if there is no such time.
     alive
-        What must change from time to time, if the device lives.
+        Bytes that change from time to time while the device lives.
     """
 
     values: FloatArray
@@ -53,46 +46,38 @@ class MapReading:
 
 
 class CellDecoder:
-    """Numbers of cells from the bytes of all replies of a plan."""
+    """Numbers of cells from the contents of all spans of a plan."""
 
     def __init__(self, cells: Sequence[Cell], plan: ReadPlan) -> None:
-        self._n_cells = len(cells)
-        self.n_bytes = sum(request.n_bytes for request in plan.requests)
-        self._groups = [
-            (np.dtype(DTYPES[type_]), np.array(rows), _byte_positions(type_, rows, cells, plan))
-            for type_ in NumberType
-            if (rows := _rows_in_registers(type_, cells))
-        ]
-        bits = [(n, c.bit) for n, c in enumerate(cells) if c.bit is not None]
-        self._bit_rows = np.array([n for n, _ in bits], dtype=np.intp)
-        self._bits = np.array([bit for _, bit in bits], dtype=np.int64)
-        single = [(n, c) for n, c in enumerate(cells) if c.function in BIT_FUNCTIONS]
-        self._single_rows = np.array([n for n, _ in single], dtype=np.intp)
-        self._single_bytes = np.array([plan.byte_of(c) for _, c in single], dtype=np.intp)
-        self._single_bits = np.array([plan.bit_of(c) for _, c in single], dtype=np.intp)
+        self._n_bytes = plan.n_bytes
+        self._places: dict[Cell, tuple[tuple[int, ...], np.dtype[np.generic], int | None]] = {}
+        for cell in cells:
+            start = plan.byte_of(cell)
+            if cell.function in BIT_FUNCTIONS:
+                self._places[cell] = (start,), np.dtype(np.uint8), plan.bit_of(cell)
+                continue
+            positions = (start + n for n in byte_permutation(cell.type, cell.byte_order))
+            self._places[cell] = tuple(positions), np.dtype(DTYPES[cell.type]), cell.bit
 
-    def numbers(self, content: bytes) -> FloatArray:
-        """(n_cells,) as they stand in the device.
+    def numbers(self, content: bytes) -> Mapping[Cell, float]:
+        """Numbers of the cells, before any scale.
 
         Raises
         ------
         ValueError
-            If the content has not the length of the plan's replies.
+            If the content has not the length of the plan's.
         """
-        if len(content) != self.n_bytes:
-            raise ValueError(f"{len(content)} bytes instead of {self.n_bytes}")
-        data = np.frombuffer(content, dtype=np.uint8)
-        numbers = np.zeros(self._n_cells)
-        for dtype, rows, positions in self._groups:
-            numbers[rows] = data[positions].view(dtype)[:, 0]
-        words = numbers[self._bit_rows].astype(np.int64)
-        numbers[self._bit_rows] = words >> self._bits & 1
-        numbers[self._single_rows] = data[self._single_bytes] >> self._single_bits & 1
+        if len(content) != self._n_bytes:
+            raise ValueError(f"{len(content)} bytes instead of {self._n_bytes}")
+        numbers = {}
+        for cell, (positions, dtype, bit) in self._places.items():
+            number = np.frombuffer(bytes([content[n] for n in positions]), dtype)[0].item()
+            numbers[cell] = float(number if bit is None else number >> bit & 1)
         return numbers
 
 
 class MapDecoder:
-    """Values of a map from the bytes of all replies of its plan.
+    """Values of a map from the contents of all spans of its plan.
 
     Raises
     ------
@@ -103,19 +88,8 @@ class MapDecoder:
     def __init__(self, registers: RegisterMap) -> None:
         self.map = registers
         self.plan = plan_reads(registers)
-        cells = [cell for cell, _ in registers.cells()]
-        self._cells = CellDecoder(cells, self.plan)
-        index = {cell: n for n, cell in enumerate(cells)}
-        self._index = index
-        values = registers.values
-        self._own = np.array([index[value.cell] for value in values], dtype=np.intp)
-        self._scale = np.array([value.scale for value in values])
-        self._offset = np.array([value.offset for value in values])
-        self._below = np.array([value.invalid_below for value in values])
-        self._above = np.array([value.invalid_above for value in values])
-        self._time = registers.time
-        time_cells = list(registers.time.cells()) if registers.time else []
-        self._time_rows = [index[cell] for cell in time_cells]
+        self._cells = CellDecoder([cell for cell, _ in registers.cells()], self.plan)
+        self._time_cells = list(registers.time.cells()) if registers.time else []
 
     def read(self, content: bytes) -> MapReading:
         """Decode one poll.
@@ -123,62 +97,57 @@ class MapDecoder:
         Parameters
         ----------
         content
-            All replies, one after the other.
+            Of all spans, one after the other.
         """
         numbers = self._cells.numbers(content)
-        raw = numbers[self._own]
-        values = self._scaled(raw, numbers)
-        states = tuple(map(ValueState, self._states(raw, values, numbers).tolist()))
-        time = None
-        if self._time is not None:
-            time = self._time.time_ns(numbers[self._time_rows].tolist())
-        return MapReading(values, states, time, self._alive(numbers, content))
-
-    def _scaled(self, raw: FloatArray, numbers: FloatArray) -> FloatArray:
-        scaled = raw.copy()
-        for n, value in enumerate(self.map.values):
-            if value.scale_register is not None:
-                register = numbers[self._index[value.scale_register.cell]]
-                scaled[n] *= register / value.scale_register.divisor if register else np.nan
-            elif value.full_scale is not None:
-                span = value.full_scale
-                low, high = (self._end(end, numbers) for end in (span.minimum, span.maximum))
-                share = (raw[n] - span.raw_minimum) / (span.raw_maximum - span.raw_minimum)
-                scaled[n] = low + share * (high - low) if low != high else np.nan
-        result: FloatArray = scaled * self._scale + self._offset
-        return result
-
-    def _end(self, end: float | Cell, numbers: FloatArray) -> float:
-        return float(numbers[self._index[end]]) if isinstance(end, Cell) else end
-
-    def _states(
-        self, raw: FloatArray, values: FloatArray, numbers: FloatArray
-    ) -> npt.NDArray[np.int64]:
-        states = np.zeros(raw.size, dtype=np.int64)
-        valid = np.isfinite(values) & (raw >= self._below) & (raw <= self._above)
-        states[~valid] = ValueState.INVALID
-        for n, value in enumerate(self.map.values):
-            span = value.full_scale
-            if span is not None and not span.raw_minimum < raw[n] < span.raw_maximum:
-                states[n] = max(states[n], ValueState.CLIPPED)
-            if any(reads_as(raw[n], value.cell.type, number) for number in value.invalid_values):
-                states[n] = ValueState.INVALID
-            for flag in value.flags:
-                word = int(numbers[self._index[flag.cell]])
-                states[n] = max(states[n], flag_state(flag, word))
-        return states
-
-    def _alive(self, numbers: FloatArray, content: bytes) -> bytes:
-        """The heartbeat, else the time, else all that was read."""
+        times = [numbers[cell] for cell in self._time_cells]
+        values = [_value(value, numbers) for value in self.map.values]
+        alive = content
         if self.map.heartbeat is not None:
-            return bytes(numbers[self._index[self.map.heartbeat]].tobytes())
-        if self._time_rows:
-            return numbers[self._time_rows].tobytes()
-        return content
+            alive = np.float64(numbers[self.map.heartbeat]).tobytes()
+        elif times:
+            alive = np.array(times).tobytes()
+        return MapReading(
+            values=np.array(values),
+            states=tuple(
+                _state(value, numbers, found)
+                for value, found in zip(self.map.values, values, strict=True)
+            ),
+            time_ns=None if self.map.time is None else self.map.time.time_ns(times),
+            alive=alive,
+        )
+
+
+def _value(value: MapValue, numbers: Mapping[Cell, float]) -> float:
+    """Value in the unit of its channel; not a number where its range is empty."""
+    scaled = numbers[value.cell]
+    if value.scale_register is not None:
+        register = numbers[value.scale_register.cell]
+        scaled *= register / value.scale_register.divisor if register else math.nan
+    elif value.full_scale is not None:
+        span = value.full_scale
+        low, high = (
+            numbers[end] if isinstance(end, Cell) else end for end in (span.minimum, span.maximum)
+        )
+        share = (scaled - span.raw_minimum) / (span.raw_maximum - span.raw_minimum)
+        scaled = low + share * (high - low) if low != high else math.nan
+    return scaled * value.scale + value.offset
+
+
+def _state(value: MapValue, numbers: Mapping[Cell, float], found: float) -> ValueState:
+    """The worst of what range, invalid numbers and status registers say of a value."""
+    raw, span = numbers[value.cell], value.full_scale
+    states = [flag_state(flag, int(numbers[flag.cell])) for flag in value.flags]
+    if span is not None and not span.raw_minimum < raw < span.raw_maximum:
+        states.append(ValueState.CLIPPED)
+    is_valid = math.isfinite(found) and value.invalid_below <= raw <= value.invalid_above
+    if not is_valid or any(reads_as(raw, value.cell.type, n) for n in value.invalid_values):
+        states.append(ValueState.INVALID)
+    return max(states, default=ValueState.OK)
 
 
 def flag_state(flag: FlagCheck, word: int) -> ValueState:
-    """What a status register says of a value."""
+    """State of a value by its status register."""
     masked = word & flag.mask
     if flag.set_means is Meaning.BAD:
         return ValueState.FLAGGED if masked else ValueState.OK
@@ -191,26 +160,9 @@ def flag_state(flag: FlagCheck, word: int) -> ValueState:
 
 
 def byte_permutation(type_: NumberType, order: ByteOrder) -> list[int]:
-    """Where the bytes of a number stand, most significant first, counted from its first one."""
+    """Positions of a number's bytes, most significant first, counted from its first byte."""
     n_words = N_BYTES[type_] // 2
     words = range(n_words)
     ordered = reversed(words) if order.low_word_first else words
     pair = (1, 0) if order.low_byte_first else (0, 1)
     return [2 * word + byte for word in ordered for byte in pair]
-
-
-def _rows_in_registers(type_: NumberType, cells: Sequence[Cell]) -> list[int]:
-    return [n for n, c in enumerate(cells) if c.type is type_ and c.function not in BIT_FUNCTIONS]
-
-
-def _byte_positions(
-    type_: NumberType, rows: Sequence[int], cells: Sequence[Cell], plan: ReadPlan
-) -> npt.NDArray[np.intp]:
-    """(n_rows, n_bytes) of the content, most significant byte first."""
-    return np.array(
-        [
-            [plan.byte_of(cells[n]) + p for p in byte_permutation(type_, cells[n].byte_order)]
-            for n in rows
-        ],
-        dtype=np.intp,
-    )

@@ -7,11 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import FrameError
-from acquisition.modbus.cells import ADDRESS_SPACE, MapError
+from acquisition.modbus.cells import MapError
+from acquisition.modbus.requests import ADDRESS_SPACE, MAX_FIFO_REGISTERS
 from core.arrays import CountArray
-
-MAX_FIFO_REGISTERS = 31
-"""Modbus Application Protocol 1.1b3, 6.18: a longer queue cannot be read."""
 
 
 class FifoKind(StrEnum):
@@ -44,7 +42,7 @@ class FifoPiece:
 
 @dataclass(frozen=True, kw_only=True)
 class FifoLayout:
-    """Where the queues are and what is in them.
+    """Addresses of the queues, and the form of their records.
 
     An interleaved queue holds records: a counter of samples, if the device counts, then one sample
     of each channel. A queue of one channel holds the counter of its first sample, then samples.
@@ -80,20 +78,15 @@ class FifoLayout:
                 f" {MAX_FIFO_REGISTERS}: use a queue for each channel, or fewer channels",
                 "addresses",
             )
-        self._require_counter()
-
-    def _require_counter(self) -> None:
-        if self.has_counter:
-            return
-        if self.kind is FifoKind.PER_CHANNEL:
+        if self.kind is FifoKind.PER_CHANNEL and not self.has_counter:
             raise MapError(
-                "must be true with a queue for each channel: without it nobody knows which samples"
+                "must be true with a queue for each channel: only a counter shows which samples"
                 " belong together",
                 "has_counter",
             )
-        if not self.removes:
+        if not self.removes and not self.has_counter:
             raise MapError(
-                "must be true if reading does not remove: without it nobody knows which samples are"
+                "must be true if reading does not remove: only a counter shows which samples are"
                 " new",
                 "has_counter",
             )
@@ -112,7 +105,7 @@ class FifoLayout:
         return MAX_FIFO_REGISTERS - 1
 
     def decode(self, data: bytes) -> FifoPiece:
-        """Take a reading of one queue apart.
+        """Decode one reading of one queue.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """`FifoSource`: a device whose samples are read from queues, by function 0x18."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
@@ -17,7 +17,7 @@ from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.counted_samples import CountedSamples
 from acquisition.modbus.fifo_assembly import ChannelAssembly, PlacedSamples, place_records
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
-from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.transport import LinkSettings, require_above_zero
 from acquisition.modbus.uncounted_samples import UncountedSamples
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
@@ -44,15 +44,13 @@ class FifoSettings(LinkSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("poll_period_s", "stale_after_s", "loss_tolerance_s"):
-            if not 0.0 < getattr(self, name) < float("inf"):
-                raise ConfigError(f"modbus: {name} is {getattr(self, name)}, must be above 0")
+        require_above_zero(self, "poll_period_s", "stale_after_s", "loss_tolerance_s")
 
 
 class FifoSource:
-    """Samples of one unit from queues; a reading is never repeated, for it may remove.
+    """Samples of one unit from queues; a reading is never repeated, because it may remove samples.
 
-    It measures no slow values: all that the calibration names are not measured.
+    It has no slow values: all those of the calibration are not measured.
     """
 
     def __init__(
@@ -68,6 +66,7 @@ class FifoSource:
             )
         self._settings, self._layout = settings, layout
         self._calibration, self._clock = calibration, clock
+        self._client = ModbusClient(settings)
         self._delivery = Delivery(calibration, stamped=False)
         self._stamps = HostStamps(calibration.rate_hz)
         self._freshness = Freshness("the newest sample", settings.stale_after_s)
@@ -87,27 +86,20 @@ class FifoSource:
         Raises
         ------
         LinkError
-            If the device does not answer, answers nonsense, its data stand still, or it is faster
+            If the device does not answer, answers wrongly, its data stand still, or it is faster
             than the link.
         ConfigError
             If it has no such queue.
         """
-        link = ModbusClient(self._settings)
-        try:
+        async with self._client.connected():
             with wrong_replies_drop_the_link():
-                await link.open()
-                await self._begin(link)
+                await self._begin()
             self._freshness.opened(self._clock.monotonic_s())
-            blocks = self._blocks(link)
-            try:
+            async with aclosing(self._blocks()) as blocks:
                 yield blocks
-            finally:
-                await blocks.aclose()
-        finally:
-            link.close()
 
-    async def _begin(self, link: ModbusClient) -> None:
-        """Throw away what can no longer be told from new samples."""
+    async def _begin(self) -> None:
+        """Discard samples that cannot be told from new ones any more."""
         self._channels.forget()
         uncounted = not self._layout.has_counter
         if uncounted and self._connections:
@@ -117,10 +109,10 @@ class FifoSource:
             return
         if uncounted or self._counted.is_ambiguous(self._clock.monotonic_s()):
             begun_s = self._clock.monotonic_s()
-            while not self._is_drained(await self._read(link)):
+            while not self._is_drained(await self._read()):
                 self._require_in_time(self._clock.monotonic_s() - begun_s)
 
-    async def _blocks(self, link: ModbusClient) -> AsyncGenerator[SampleBlock, None]:
+    async def _blocks(self) -> AsyncGenerator[SampleBlock, None]:
         waiting: list[PlacedSamples] = []
         arrived = Arrival.now(self._clock)
         reading_s = 0.0
@@ -128,7 +120,7 @@ class FifoSource:
             begun_s = self._clock.monotonic_s()
             try:
                 with wrong_replies_drop_the_link():
-                    pieces = await self._read(link)
+                    pieces = await self._read()
                     arrived = Arrival.now(self._clock)
                     waiting += self._place(pieces, arrived.steady_s)
                 drained = self._is_drained(pieces)
@@ -142,7 +134,7 @@ class FifoSource:
                 continue
             self._counted.note_seen_all(arrived.steady_s)
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
-                waiting.clear()  # nobody knows where among these the loss is
+                waiting.clear()  # where among these the loss is remains unknown
                 self._uncounted.begin()
             for block in self._delivered(waiting, arrived):
                 yield block
@@ -151,9 +143,9 @@ class FifoSource:
             await self._clock.sleep(self._settings.poll_period_s)
 
     def _saved(self, waiting: list[PlacedSamples], arrived: Arrival) -> list[SampleBlock]:
-        """What a lost link leaves: the queue has given it away, and will not give it again.
+        """Blocks of the samples before a link was lost: the queue will not give them again.
 
-        Of samples that are not counted nobody knows whether any are missing among them.
+        Without a counter, a loss among them cannot be excluded, and they are dropped.
         """
         return self._delivered(waiting, arrived) if self._layout.has_counter else []
 
@@ -161,10 +153,9 @@ class FifoSource:
         raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
         return self._delivery.take_together(raw_blocks, arrived)
 
-    async def _read(self, link: ModbusClient) -> list[FifoPiece]:
-        return [
-            self._layout.decode(await link.read_fifo(address)) for address in self._layout.addresses
-        ]
+    async def _read(self) -> list[FifoPiece]:
+        contents = await self._client.read_fifos(self._layout.addresses)
+        return [self._layout.decode(content) for content in contents]
 
     def _place(self, pieces: list[FifoPiece], now_s: float) -> list[PlacedSamples]:
         if self._layout.kind is FifoKind.PER_CHANNEL:
@@ -173,7 +164,7 @@ class FifoSource:
         return place_records(pieces[0], samples, now_s)
 
     def _is_drained(self, pieces: list[FifoPiece]) -> bool:
-        """Whether the queues have given all they had."""
+        """Whether the queues are empty after this reading."""
         full = any(piece.n_samples >= self._layout.most_samples for piece in pieces)
         return not self._layout.removes or not full
 

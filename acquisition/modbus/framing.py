@@ -1,12 +1,11 @@
 """Framing, TCP and RTU: a request as bytes, and the one reply that it allows out of bytes.
 
-The answer to a read is known in advance but for the values; whatever differs is a fault. Judging
-stops at the first fault: what follows one cannot be told apart from it.
+All of a right reply but its values is known from its request; any other byte is a fault. Judging
+stops at the first fault, because nothing that follows it can be trusted.
 """
 
 import struct
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from acquisition.errors import FrameError
 from acquisition.modbus.requests import MAX_PDU_BYTES, ReadRequest
@@ -15,9 +14,8 @@ _MBAP = struct.Struct(">HHHB")
 _POLYNOMIAL, _CRC_START = 0xA001, 0xFFFF
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A request that was sent to a unit and not answered yet; `transaction` counts over TCP."""
+class Asked(NamedTuple):
+    """A request that is in flight to a unit; RTU has no transaction."""
 
     request: ReadRequest
     unit: int
@@ -25,7 +23,7 @@ class Asked:
 
 
 class Framing(Protocol):
-    """How requests and replies lie on a wire."""
+    """Form of requests and replies on a wire."""
 
     def frame(self, asked: Asked) -> bytes:
         """Bytes of a request."""
@@ -60,15 +58,16 @@ class TcpFraming:
         if len(data) <= _MBAP.size:
             return None
         transaction, protocol, length, unit = _MBAP.unpack_from(data)
-        _require_equal("transaction id", transaction, asked.transaction)
-        _require_equal("protocol id", protocol, 0)
-        _require_equal("unit id", unit, asked.unit)
-        pdu = data[_MBAP.size : _MBAP.size + max(length - 1, 1)]
-        n_least, n_told = asked.request.least_bytes(pdu), length - 1
+        found, expected = (transaction, protocol, unit), (asked.transaction, 0, asked.unit)
+        if found != expected:
+            raise FrameError(f"transaction, protocol and unit id are {found}, expected {expected}")
+        n_stated = length - 1
+        pdu = data[_MBAP.size : _MBAP.size + max(n_stated, 1)]
+        n_arrived, n_least = len(pdu), asked.request.least_bytes(pdu)
         # a reply whose length is not known from the request has to agree with itself
-        if n_told < n_least or n_told > MAX_PDU_BYTES or (len(pdu) >= n_least < n_told):
+        if n_stated < n_least or n_stated > MAX_PDU_BYTES or (n_arrived >= n_least < n_stated):
             raise FrameError(f"length is {length}, expected {n_least + 1}")
-        return (_MBAP.size + n_told, pdu) if len(pdu) == n_told else None
+        return (_MBAP.size + n_stated, pdu) if n_arrived == n_stated else None
 
 
 class RtuFraming:
@@ -83,7 +82,8 @@ class RtuFraming:
         """Judge received bytes; see `Framing`."""
         if len(data) < 2:
             return None
-        _require_equal("unit id", data[0], asked.unit)
+        if data[0] != asked.unit:
+            raise FrameError(f"unit id is {data[0]}, expected {asked.unit}")
         end = 1 + asked.request.least_bytes(data[1:])
         if len(data) < end + 2:
             return None
@@ -108,8 +108,3 @@ def crc16(data: bytes | memoryview) -> int:
     for byte in data:
         crc = crc >> 8 ^ _CRC_OF_BYTE[(crc ^ byte) & 0xFF]
     return crc
-
-
-def _require_equal(name: str, found: int, expected: int) -> None:
-    if found != expected:
-        raise FrameError(f"{name} is {found}, expected {expected}")

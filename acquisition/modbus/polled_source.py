@@ -1,11 +1,11 @@
 """`PolledSource`: registers that are read again and again as a sample source.
 
-A sample is a poll, its index the number of the poll's tick: whatever was missed is an exact jump.
+A sample is a poll, its index the number of the poll's tick: a missed poll is an exact gap.
 """
 
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
-from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from contextlib import aclosing, asynccontextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,69 +19,89 @@ from acquisition.delivery.raw import RawBlock
 from acquisition.delivery.ticks import Ticks
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError
-from acquisition.modbus.cells import BIT_FUNCTIONS, reads_as
+from acquisition.modbus.cells import reads_as
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import CellDecoder, MapDecoder, MapReading, ValueState
 from acquisition.modbus.read_plan import ReadPlan, plan_signature
 from acquisition.modbus.register_map import RegisterMap
-from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.transport import LinkSettings, require_above_zero
 from core.samples.blocks import SampleBlock
+from core.spectra.vector_rows import VectorPart, VectorRow
 
-
-class MapReader:
-    """One device's map. One request is outstanding at a time, and none is repeated."""
-
-    def __init__(self, link: ModbusClient, decoder: MapDecoder) -> None:
-        self._link, self._decoder = link, decoder
-
-    async def read(self) -> MapReading:
-        """Read everything once; from the right device, also if connections are not kept.
-
-        Raises
-        ------
-        LinkError, FrameError, ConfigError
-            As the link does.
-        """
-        if not self._link.is_kept:
-            await self._link.require_device()
-            await self.require_signature()
-        return self._decoder.read(await self.content())
-
-    async def content(self) -> bytes:
-        """All replies, one after the other."""
-        return await self._replies(self._decoder.plan)
-
-    async def require_signature(self) -> None:
-        """Refuse a device that is another one than configured.
-
-        Raises
-        ------
-        ConfigError
-            Naming register, what was found and what was expected.
-        """
-        signature = self._decoder.map.signature
-        plan = plan_signature(self._decoder.map)
-        decoder = CellDecoder([s.cell for s in signature], plan)
-        found = decoder.numbers(await self._replies(plan))
-        for part, number in zip(signature, found.tolist(), strict=True):
-            if not reads_as(number, part.cell.type, part.expected):
-                raise ConfigError(
-                    f"{self._link.where}: another device than configured: register"
-                    f" {part.cell.address} is {number:g}, expected {part.expected:g}"
-                )
-
-    async def _replies(self, plan: ReadPlan) -> bytes:
-        replies = []
-        for request in plan.requests:
-            read = self._link.read_bits if request.function in BIT_FUNCTIONS else self._link.read
-            replies.append(await read(request.start, request.count, request.function))
-        return b"".join(replies)
-
-
-_LEAST_STAMP_STEPS = 2.0
+_MIN_STAMP_STEPS = 2.0
 """A device's clock must tell neighbouring polls apart, or its stamps would seem to stand still."""
 
 _LARGEST = float(np.finfo(np.float32).max)
+_UNLIMITED = ChannelCalibration(
+    full_scale_v=_LARGEST, unit_per_v=1.0, ok_min_v=-float("inf"), ok_max_v=float("inf")
+)
+"""Of a vector: a rack states engineering units and judges its transducers itself."""
+
+
+class MapReader:
+    """Reads all values of one device's register map; no request is repeated."""
+
+    def __init__(self, settings: LinkSettings, decoder: MapDecoder) -> None:
+        self._client, self._decoder = ModbusClient(settings), decoder
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator[None]:
+        """Open the link and check identity and signature; leaving the context closes the link.
+
+        Raises
+        ------
+        LinkError
+            If the device does not answer, or answers wrongly.
+        ConfigError
+            If it is another device, naming what was found and what was expected.
+        """
+        async with self._client.connected():
+            with wrong_replies_drop_the_link():
+                await self._require_signature()
+            yield
+
+    async def read(self) -> MapReading:
+        """Read and decode everything once; from the right device, also if connections are not kept.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As `connected`.
+        """
+        with wrong_replies_drop_the_link():
+            if not self._client.is_kept:
+                await self._client.require_device()
+                await self._require_signature()
+            return self._decoder.read(await self._content(self._decoder.plan))
+
+    async def content(self) -> bytes:
+        """Read everything once: the bytes that `MapDecoder.read` takes.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As `connected`.
+        """
+        with wrong_replies_drop_the_link():
+            return await self._content(self._decoder.plan)
+
+    async def _require_signature(self) -> None:
+        signature = self._decoder.map.signature
+        plan = plan_signature(self._decoder.map)
+        decoder = CellDecoder([part.cell for part in signature], plan)
+        numbers = decoder.numbers(await self._content(plan))
+        for part in signature:
+            number = numbers[part.cell]
+            if not reads_as(number, part.cell.type, part.expected):
+                raise ConfigError(
+                    f"{self._client.where}: another device than configured: register"
+                    f" {part.cell.address} is {number:g}, expected {part.expected:g}"
+                )
+
+    async def _content(self, plan: ReadPlan) -> bytes:
+        content = bytearray(plan.n_bytes)
+        await self._client.read_into(plan.spans, memoryview(content))
+        return bytes(content)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,27 +122,23 @@ class PolledSettings(LinkSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0.0 < self.poll_period_s < float("inf"):
-            raise ConfigError(f"modbus: poll_period_s is {self.poll_period_s}, must be above 0")
+        require_above_zero(self, "poll_period_s")
         if not 2.0 * self.poll_period_s <= self.stale_after_s:
             raise ConfigError(
                 f"modbus: stale_after_s is {self.stale_after_s}, must be at least two poll periods"
             )
 
     def require_fit(self, registers: RegisterMap) -> None:
-        """Refuse to ask a device faster than its manual allows.
+        """Refuse to poll a device faster than its manual allows.
 
         Raises
         ------
         ConfigError
             With what is allowed.
         """
-        for key, least in (
-            ("poll_period_s", registers.min_poll_period_s),
-            ("timeout_s", registers.min_timeout_s),
-        ):
-            if getattr(self, key) < least:
-                found = getattr(self, key)
+        for key in ("poll_period_s", "timeout_s"):
+            found, least = getattr(self, key), getattr(registers, f"min_{key}")
+            if found < least:
                 raise ConfigError(f"modbus: {key} is {found}, the map asks for {least} or more")
         if self.max_registers < registers.max_registers:
             raise ConfigError(
@@ -144,7 +160,7 @@ class PolledSource:
     Raises
     ------
     ConfigError
-        If the map cannot be read, lacks a row, or wants to be asked less often.
+        If the map cannot be read, lacks a row, or forbids so short a poll period or time-out.
     """
 
     def __init__(
@@ -156,15 +172,24 @@ class PolledSource:
         clock: Clock,
     ) -> None:
         settings.require_fit(registers)
-        self._settings, self._clock = settings, clock
-        self._decoder = MapDecoder(registers)
-        self._assembly = _Assembly(registers, rows, calibration, 1.0 / settings.poll_period_s)
+        if len(rows) != len(calibration.channels):
+            raise ConfigError(f"modbus: {len(rows)} rows for {len(calibration.channels)} channels")
+        self._clock = clock
+        self._rate_hz = 1.0 / settings.poll_period_s
+        self._rows = [position_of(row, registers) for row in rows]
+        position = {id_: n for n, id_ in enumerate(registers.ids)}
+        self._slow = [position.get(slow.id) for slow in calibration.slow]
+        self._full_scale = [
+            min(abs(channel.full_scale_v * channel.unit_per_v), _LARGEST)
+            for channel in calibration.channels
+        ]
+        self._reader = MapReader(settings, MapDecoder(registers))
         self._ticks = Ticks(clock, settings.poll_period_s)
         self._freshness = Freshness("nothing that is read", settings.stale_after_s)
-        self._stamps = HostStamps(1.0 / settings.poll_period_s)
+        self._stamps = HostStamps(self._rate_hz)
         time = registers.time
         self._stamped = (
-            time is not None and settings.poll_period_s >= _LEAST_STAMP_STEPS * time.resolution_s
+            time is not None and settings.poll_period_s >= _MIN_STAMP_STEPS * time.resolution_s
         )
         self._delivery = Delivery(calibration, stamped=self._stamped, samples_when_asked=True)
 
@@ -175,91 +200,95 @@ class PolledSource:
         Raises
         ------
         LinkError
-            If the device does not answer, answers nonsense, or its data stand still.
+            If the device does not answer, answers wrongly, or its data stand still.
         ConfigError
             If it is not the configured device, or lacks a register.
         """
-        link = ModbusClient(self._settings)
-        try:
-            with wrong_replies_drop_the_link():
-                await link.open()
-                reader = MapReader(link, self._decoder)
-                await reader.require_signature()
+        async with self._reader.connected():
             self._freshness.opened(self._clock.monotonic_s())
-            blocks = self._blocks(reader)
-            try:
+            async with aclosing(self._blocks()) as blocks:
                 yield blocks
-            finally:
-                await blocks.aclose()
-        finally:
-            link.close()
 
-    async def _blocks(self, reader: MapReader) -> AsyncGenerator[SampleBlock, None]:
+    async def _blocks(self) -> AsyncGenerator[SampleBlock, None]:
         while True:
             tick = await self._ticks.next()
             polled_ns = self._clock.now_ns()
-            with wrong_replies_drop_the_link():
-                reading = await reader.read()
+            reading = await self._reader.read()
             self._freshness.note(reading.alive, self._clock.monotonic_s())
             self._stamps.add(self._ticks.epoch, tick, polled_ns)
             time_ns = reading.time_ns if self._stamped else None
             start_ns = self._stamps.start_ns(tick) if time_ns is None else time_ns
-            raw = self._assembly.block(reading, self._ticks.epoch, tick, start_ns)
+            raw = self._raw_block(reading, tick, start_ns)
             arrived = Arrival.now(self._clock)
             for block in self._delivery.take(raw, arrived, has_stamp=time_ns is not None):
                 yield block
 
-
-class _Assembly:
-    """From the values of a map to a raw block of one sample."""
-
-    def __init__(
-        self,
-        registers: RegisterMap,
-        rows: Sequence[str],
-        calibration: UnitCalibration,
-        rate_hz: float,
-    ) -> None:
-        place = {id_: n for n, id_ in enumerate(registers.ids)}
-        for row in rows:
-            if row not in place:
-                raise ConfigError(f"modbus: the register map has no value for {row!r}")
-        if len(rows) != len(calibration.channels):
-            raise ConfigError(f"modbus: {len(rows)} rows for {len(calibration.channels)} channels")
-        self._rate_hz = rate_hz
-        self._rows = [place[row] for row in rows]
-        self._slow = [place.get(slow.id) for slow in calibration.slow]
-        self._full_scale = [_full_scale(channel) for channel in calibration.channels]
-
-    def block(self, reading: MapReading, epoch: int, index: int, start_ns: int) -> RawBlock:
-        cells = [
+    def _raw_block(self, reading: MapReading, index: int, start_ns: int) -> RawBlock:
+        samples = [
             _sample(float(reading.values[n]), reading.states[n], full_scale)
             for n, full_scale in zip(self._rows, self._full_scale, strict=True)
         ]
         return RawBlock(
-            epoch=epoch,
+            epoch=self._ticks.epoch,
             first_index=index,
             start_ns=start_ns,
             rate_hz=self._rate_hz,
-            counts=np.array(cells, dtype=np.float32)[:, np.newaxis],
+            counts=np.array(samples, dtype=np.float32)[:, np.newaxis],
             ok=tuple(reading.states[n] is not ValueState.FLAGGED for n in self._rows),
-            slow=tuple(slow_number(reading, n) for n in self._slow),
+            slow=tuple(float("nan") if n is None else slow_number(reading, n) for n in self._slow),
         )
 
 
-def slow_number(reading: MapReading, place: int | None) -> float:
-    """A slow value, not a number where there is none that may be believed."""
-    if place is None or reading.states[place] is not ValueState.OK:
-        return float("nan")
-    return float(reading.values[place])
+def vector_calibration(
+    calibration: UnitCalibration, channels: Sequence[str], rows: Sequence[VectorRow]
+) -> UnitCalibration:
+    """Calibration of a vector rack: one sample for each poll, one row for each vector.
+
+    Only a gap has the limits of its transducer.
+
+    Parameters
+    ----------
+    calibration
+        Of the unit's physical channels.
+    channels
+        Their ids, in the same order.
+
+    Raises
+    ------
+    LookupError
+        If a row is of a channel that is not there.
+    """
+    by_id = dict(zip(channels, calibration.channels, strict=True))
+    return replace(
+        calibration,
+        channels=tuple(
+            by_id[row.channel] if row.part is VectorPart.GAP else _UNLIMITED for row in rows
+        ),
+        block_samples=1,
+    )
 
 
-def _full_scale(channel: ChannelCalibration) -> float:
-    return min(abs(channel.full_scale_v * channel.unit_per_v), _LARGEST)
+def position_of(id_: str, registers: RegisterMap) -> int:
+    """Position of a value among those of a map.
+
+    Raises
+    ------
+    ConfigError
+        If the map has none of this id.
+    """
+    if id_ not in registers.ids:
+        raise ConfigError(f"modbus: the register map has no value for {id_!r}")
+    return registers.ids.index(id_)
+
+
+def slow_number(reading: MapReading, position: int) -> float:
+    """A slow value; not a number unless its state is OK."""
+    is_ok = reading.states[position] is ValueState.OK
+    return float(reading.values[position]) if is_ok else float("nan")
 
 
 def _sample(value: float, state: ValueState, full_scale: float) -> float:
-    """What calibration understands: no number, or one at full scale, or the device's own."""
+    """A value as calibration takes it: not a number if invalid, at full scale if clipped."""
     if state is ValueState.INVALID or not abs(value) <= _LARGEST:
         return float("nan")
     if state is ValueState.CLIPPED:

@@ -1,62 +1,48 @@
-"""`ReadPlan`: the fewest requests that read all cells of a map and nothing it does not name."""
+"""`ReadPlan`: the fewest requests that read all cells of a map, and no register beside them."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from acquisition.modbus.cells import BIT_FUNCTIONS, BITS_PER_REGISTER, Cell, MapError
+from acquisition.modbus.cells import BITS_PER_REGISTER, Cell, MapError
 from acquisition.modbus.register_map import RegisterMap, Together
-
-
-@dataclass(frozen=True)
-class ReadRequest:
-    """One read; addresses count from 0, as on the wire, in bits for functions 1 and 2."""
-
-    function: int
-    start: int
-    count: int
-
-    @property
-    def stop(self) -> int:
-        """First address after it."""
-        return self.start + self.count
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes of its reply."""
-        return -(-self.count // 8) if self.function in BIT_FUNCTIONS else 2 * self.count
-
-    def holds(self, function: int, start: int, stop: int) -> bool:
-        """Whether these addresses are in it."""
-        return self.function == function and self.start <= start and stop <= self.stop
+from acquisition.modbus.requests import BIT_FUNCTIONS, Span
 
 
 @dataclass(frozen=True)
 class ReadPlan:
-    """Requests in the order in which they are sent.
+    """Spans in the order in which they are read, each by one request.
 
-    Their replies, one after the other, are the bytes that cells are found in.
+    Their contents, one after the other, are the bytes that cells are found in.
     """
 
-    requests: tuple[ReadRequest, ...]
+    spans: tuple[Span, ...]
     base: int
 
-    def request_of(self, cell: Cell) -> int:
-        """Which request reads a cell."""
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all contents together."""
+        return sum(span.n_bytes for span in self.spans)
+
+    def span_of(self, cell: Cell) -> Span:
+        """Span that holds a cell."""
         start, stop = cell.start(self.base), cell.stop(self.base)
-        return next(n for n, r in enumerate(self.requests) if r.holds(cell.function, start, stop))
+        return next(
+            span
+            for span in self.spans
+            if span.function == cell.function and span.address <= start and stop <= span.stop
+        )
 
     def byte_of(self, cell: Cell) -> int:
-        """Where a cell begins in the bytes of all replies."""
-        number = self.request_of(cell)
-        request, before = self.requests[number], self.requests[:number]
-        places = cell.start(self.base) - request.start
+        """Where a cell begins in the bytes of all contents."""
+        span = self.span_of(cell)
+        places = cell.start(self.base) - span.address
         offset = places // 8 if cell.function in BIT_FUNCTIONS else 2 * places
-        return sum(r.n_bytes for r in before) + offset
+        return sum(s.n_bytes for s in self.spans[: self.spans.index(span)]) + offset
 
     def bit_of(self, cell: Cell) -> int:
         """Which bit of its byte a cell of functions 1 and 2 is."""
-        return (cell.start(self.base) - self.requests[self.request_of(cell)].start) % 8
+        return (cell.start(self.base) - self.span_of(cell).address) % 8
 
 
 Stretch = tuple[int, int]
@@ -75,7 +61,7 @@ def plan_reads(registers: RegisterMap) -> ReadPlan:
     plan = _plan(registers, [cell for cell, _ in registers.cells()], registers.together)
     for n, value in enumerate(registers.values):
         scale = value.scale_register
-        if scale is None or plan.request_of(value.cell) == plan.request_of(scale.cell):
+        if scale is None or plan.span_of(value.cell) == plan.span_of(scale.cell):
             continue
         first = min(value.cell.address, scale.cell.address)
         raise MapError(
@@ -87,12 +73,12 @@ def plan_reads(registers: RegisterMap) -> ReadPlan:
 
 
 def plan_signature(registers: RegisterMap) -> ReadPlan:
-    """Plan the reads that tell a device from others."""
+    """Plan the reads of a map's signature."""
     return _plan(registers, [signature.cell for signature in registers.signature], ())
 
 
 def _plan(registers: RegisterMap, cells: Sequence[Cell], together: Sequence[Together]) -> ReadPlan:
-    requests: list[ReadRequest] = []
+    spans: list[Span] = []
     for function in sorted({cell.function for cell in cells}):
         stretches = [
             (cell.start(registers.base), cell.stop(registers.base))
@@ -106,21 +92,18 @@ def _plan(registers: RegisterMap, cells: Sequence[Cell], together: Sequence[Toge
         ]
         is_bits = function in BIT_FUNCTIONS
         most = registers.max_registers * (BITS_PER_REGISTER if is_bits else 1)
-        requests += [
-            ReadRequest(function, start, stop - start)
-            for start, stop in _packed(
-                _whole([*stretches, *_wanted(blocks, stretches, registers)]),
-                registers.max_gap,
-                most,
-            )
+        whole = _whole([*stretches, *_wanted(blocks, stretches, registers)])
+        spans += [
+            Span(start, stop - start, function)
+            for start, stop in _packed(whole, registers.max_gap, most)
         ]
-    return ReadPlan(tuple(requests), registers.base)
+    return ReadPlan(tuple(spans), registers.base)
 
 
 def _wanted(
     blocks: Sequence[Stretch], stretches: Sequence[Stretch], registers: RegisterMap
 ) -> list[Stretch]:
-    """Blocks of which something is read at all."""
+    """Blocks that hold at least one cell that is read."""
     for (_, stop), (start, _) in pairwise(sorted(blocks)):
         if start < stop:
             raise MapError(
@@ -139,7 +122,7 @@ def _wanted(
 
 
 def _whole(stretches: Iterable[Stretch]) -> list[Stretch]:
-    """Join what shares a register: it has to be read as a whole."""
+    """Join stretches that share a register: they have to be read as a whole."""
     joined: list[Stretch] = []
     for start, stop in sorted(stretches):
         if joined and start < joined[-1][1]:
@@ -150,7 +133,7 @@ def _whole(stretches: Iterable[Stretch]) -> list[Stretch]:
 
 
 def _packed(stretches: Sequence[Stretch], max_gap: int, most: int) -> list[Stretch]:
-    """Put neighbours into one request as long as they fit: from left to right, that is fewest."""
+    """Put neighbours into one request while they fit; from left to right this needs the fewest."""
     packed: list[Stretch] = []
     for start, stop in stretches:
         if packed and start - packed[-1][1] <= max_gap and stop - packed[-1][0] <= most:

@@ -6,19 +6,21 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from acquisition.modbus.cells import (
-    ADDRESS_SPACE,
     BASES,
     FLOATS,
     INTEGERS,
     N_BYTES,
-    REGISTER_FUNCTIONS,
     Cell,
     MapError,
     NumberType,
 )
 from acquisition.modbus.device_time import DeviceTime
+from acquisition.modbus.requests import (
+    ADDRESS_SPACE,
+    MAX_REGISTERS_PER_READ,
+    REGISTER_FUNCTIONS,
+)
 
-MAX_REGISTERS = 125
 MAX_MASK = 0xFFFF
 
 
@@ -176,9 +178,9 @@ class Together:
     def __post_init__(self) -> None:
         if self.function not in REGISTER_FUNCTIONS:
             raise MapError(f"must be 3 or 4, got {self.function}", "function")
-        if not 1 <= self.count <= MAX_REGISTERS:
+        if not 1 <= self.count <= MAX_REGISTERS_PER_READ:
             raise MapError(
-                f"must be 1 to {MAX_REGISTERS}, which is all that one read can have,"
+                f"must be 1 to {MAX_REGISTERS_PER_READ}, which is all that one read can have,"
                 f" got {self.count}",
                 "count",
             )
@@ -223,7 +225,7 @@ class RegisterMap:
     heartbeat: Cell | None = None
     time: DeviceTime | None = None
     signature: tuple[Signature, ...] = ()
-    max_registers: int = MAX_REGISTERS
+    max_registers: int = MAX_REGISTERS_PER_READ
     max_gap: int = 0
     min_poll_period_s: float = 0.0
     min_timeout_s: float = 0.0
@@ -233,10 +235,10 @@ class RegisterMap:
         if self.base not in BASES:
             words = ", ".join(map(str, BASES[:-1]))
             raise MapError(f"must be {words} or {BASES[-1]}, got {self.base}", "base")
-        if not 1 <= self.max_registers <= MAX_REGISTERS:
-            raise MapError(f"must be 1 to {MAX_REGISTERS}", "max_registers")
-        if not 0 <= self.max_gap < MAX_REGISTERS:
-            raise MapError(f"must be 0 to {MAX_REGISTERS - 1}", "max_gap")
+        if not 1 <= self.max_registers <= MAX_REGISTERS_PER_READ:
+            raise MapError(f"must be 1 to {MAX_REGISTERS_PER_READ}", "max_registers")
+        if not 0 <= self.max_gap < MAX_REGISTERS_PER_READ:
+            raise MapError(f"must be 0 to {MAX_REGISTERS_PER_READ - 1}", "max_gap")
         object.__setattr__(self, "ids", tuple(value.id for value in self.values))
         self._require_in_space()
         self._require_apart()

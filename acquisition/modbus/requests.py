@@ -1,13 +1,13 @@
-"""Requests that only read, and for each of them how its answer must look.
+"""Requests that only read, and the reply that each of them allows.
 
-A reply is judged by its function code and what follows it (the PDU), the same over TCP and RTU.
+Requests and replies are taken from their function code on (the PDU), the same over TCP and RTU.
 """
 
 import struct
 from dataclasses import dataclass
-from typing import Protocol
+from functools import lru_cache
 
-from acquisition.errors import ConfigError, FrameError
+from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 
 READ_COILS = 1
 READ_DISCRETE_INPUTS = 2
@@ -15,190 +15,232 @@ READ_HOLDING_REGISTERS = 3
 READ_INPUT_REGISTERS = 4
 READ_FIFO_QUEUE = 0x18
 READ_IDENTIFICATION = 43
-READ_FUNCTIONS = (
-    READ_COILS,
-    READ_DISCRETE_INPUTS,
-    READ_HOLDING_REGISTERS,
-    READ_INPUT_REGISTERS,
-    READ_FIFO_QUEUE,
-    READ_IDENTIFICATION,
-)
+BIT_FUNCTIONS = (READ_COILS, READ_DISCRETE_INPUTS)
+REGISTER_FUNCTIONS = (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS)
+SPAN_FUNCTIONS = (*BIT_FUNCTIONS, *REGISTER_FUNCTIONS)
+READ_FUNCTIONS = (*SPAN_FUNCTIONS, READ_FIFO_QUEUE, READ_IDENTIFICATION)
 """The only function codes that can leave this process."""
 
-MAX_PDU_BYTES = 253
+ADDRESS_SPACE = 0x10000
+MAX_REGISTERS_PER_READ = 125
 MAX_FIFO_REGISTERS = 31
+"""Modbus Application Protocol 1.1b3, 6.18: a longer queue cannot be read."""
+
+MAX_PDU_BYTES = 253
 EXCEPTION_BIT = 0x80
+BUSY = 6
+"""The device could not take the request, and asks for it again later (MODBUS V1.1b3, section 7)."""
+
+_CONFIG_EXCEPTIONS = {1: "illegal function", 2: "illegal address", 3: "illegal value"}
+_PASSING_EXCEPTIONS = {
+    4: "device failure",
+    5: "acknowledge",
+    BUSY: "busy",
+    8: "memory parity error",
+    10: "gateway path unavailable",
+    11: "gateway target does not answer",
+}
+
+_MAX_BITS_PER_READ = 2000
 _EXCEPTION_BYTES = 2
-_MEI = b"\x0e"
-READ_BASIC = 1
-_READ_CODES = (READ_BASIC, 2, 3, 4)
+_MEI = 0x0E
+_READ_BASIC = 1
+_READ_CODES = (_READ_BASIC, 2, 3, 4)
 _IDENTIFICATION_HEAD = struct.Struct(">7B")
 _FIFO_HEAD = struct.Struct(">BHH")
-_ADDRESS_AND_COUNT = struct.Struct(">HH")
+_SPAN_REQUEST = struct.Struct(">BHH")
 
 
-class ReplyShape(Protocol):
-    """The reply that one outstanding request allows, apart from an exception."""
-
-    def least_bytes(self, pdu: memoryview) -> int:
-        """Bytes that the whole reply has, or at least has, by what has arrived of it.
-
-        Raises
-        ------
-        FrameError
-            If what has arrived can never become the right reply.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class CountedReply:
-    """Registers or bits: so many bytes, known from the request."""
-
-    n_bytes: int
-
-    def least_bytes(self, pdu: memoryview) -> int:
-        """Length of the reply, which is known in advance."""
-        if len(pdu) > 1 and pdu[1] != self.n_bytes:
-            raise FrameError(f"byte count is {pdu[1]}, expected {self.n_bytes}")
-        return 2 + self.n_bytes
-
-
-@dataclass(frozen=True)
-class FifoReply:
-    """A queue's registers: the reply says how many, at most 31."""
-
-    def least_bytes(self, pdu: memoryview) -> int:
-        """Length of the reply by its FIFO count."""
-        if len(pdu) < _FIFO_HEAD.size:
-            return _FIFO_HEAD.size
-        n_bytes: int
-        n_registers: int
-        _, n_bytes, n_registers = _FIFO_HEAD.unpack_from(pdu)
-        if n_registers > MAX_FIFO_REGISTERS:
-            raise FrameError(f"FIFO count is {n_registers}, allowed is 0 to {MAX_FIFO_REGISTERS}")
-        if n_bytes != 2 + 2 * n_registers:
-            raise FrameError(f"byte count is {n_bytes} with a FIFO count of {n_registers}")
-        return _FIFO_HEAD.size + 2 * n_registers
-
-
-@dataclass(frozen=True)
-class IdentificationReply:
-    """Objects of a device's identification, each with its own length."""
-
-    read_code: int
-
-    def least_bytes(self, pdu: memoryview) -> int:
-        """Length of the reply, as far as its objects are known."""
-        expected, found = _MEI + bytes((self.read_code,)), bytes(pdu[1:3])
-        if not expected.startswith(found):
-            raise FrameError(f"MEI type and read code are {found.hex()}, not {expected.hex()}")
-        if len(pdu) < _IDENTIFICATION_HEAD.size:
-            return _IDENTIFICATION_HEAD.size
-        end = _IDENTIFICATION_HEAD.size
-        for _ in range(pdu[6]):
-            if len(pdu) < end + 2:
-                end += 2
-                break
-            end += 2 + pdu[end + 1]
-        if end > MAX_PDU_BYTES:
-            raise FrameError(f"identification of more than {MAX_PDU_BYTES} bytes")
-        return end
-
-
-@dataclass(frozen=True)
-class ReadRequest:
-    """One request, and the reply that it allows.
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Consecutive registers, or bits, of a device.
 
     Parameters
     ----------
-    function, body
-        Function code, and what follows it.
-    shape
-        Of the reply, apart from an exception.
-    intent
-        What is asked for, in the words of the error if the device refuses; example: "a read of 2
-        at 100".
+    address
+        Of the first one, counted from 0 as on the wire.
+    count
+        Registers, or bits of functions 1 and 2.
+    function
+        1 (coils), 2 (discrete inputs), 3 (holding registers) or 4 (input registers).
 
     Raises
     ------
     ConfigError
-        If it is not one that only reads. Nothing else can be framed.
+        If no device can have them.
     """
 
-    function: int
-    body: bytes
-    shape: ReplyShape
-    intent: str
+    address: int
+    count: int
+    function: int = READ_HOLDING_REGISTERS
 
     def __post_init__(self) -> None:
-        is_read = self.function in READ_FUNCTIONS
-        if self.function == READ_IDENTIFICATION:
-            # function 43 carries other services too
-            is_read = self.body[:1] == _MEI and self.body[1] in _READ_CODES
-        if not is_read:
+        if self.function not in SPAN_FUNCTIONS:
+            raise ConfigError(f"modbus: function is {self.function}, allowed are 1, 2, 3 and 4")
+        if not 0 <= self.address < self.stop <= ADDRESS_SPACE:
             raise ConfigError(
-                f"function code {self.function} is never sent, only {READ_FUNCTIONS} to read"
+                f"modbus: {self.count} at {self.address} are asked, addresses are 0 to"
+                f" {ADDRESS_SPACE - 1}"
             )
 
     @property
-    def pdu(self) -> bytes:
-        """The request from its function code on."""
-        return bytes((self.function,)) + self.body
+    def stop(self) -> int:
+        """First address after it."""
+        return self.address + self.count
 
-    def least_bytes(self, pdu: memoryview) -> int:
-        """Bytes that the reply has or at least has: the one asked for, or an exception.
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of its content: two for each register, one for each eight bits."""
+        return -(-self.count // 8) if self.function in BIT_FUNCTIONS else 2 * self.count
+
+
+@dataclass(frozen=True, slots=True)
+class ReadRequest:
+    """One request: its bytes from the function code on.
+
+    Raises
+    ------
+    ConfigError
+        If it does not only read. Nothing else can be framed.
+    """
+
+    pdu: bytes
+
+    def __post_init__(self) -> None:
+        function = self.pdu[0]
+        # function 43 carries other services too
+        is_other_service = function == READ_IDENTIFICATION and (
+            len(self.pdu) < 3 or self.pdu[1] != _MEI or self.pdu[2] not in _READ_CODES
+        )
+        if function not in READ_FUNCTIONS or is_other_service:
+            raise ConfigError(
+                f"function code {function} is never sent, only {READ_FUNCTIONS} to read"
+            )
+
+    def __str__(self) -> str:
+        """What is asked for; example: "a read of 2 at 100, function 3"."""
+        match self.pdu[0]:
+            case 0x18:
+                return f"a read of the queue at {int.from_bytes(self.pdu[1:3], 'big')}"
+            case 43:
+                return "a read of its identification"
+        function, address, count = _SPAN_REQUEST.unpack(self.pdu)
+        return f"a read of {count} at {address}, function {function}"
+
+    def least_bytes(self, reply: memoryview) -> int:
+        """Bytes that the reply has, or has at least, by what has arrived of it.
+
+        Parameters
+        ----------
+        reply
+            What has arrived, from the function code on; at least that.
 
         Raises
         ------
         FrameError
-            If it can never become either.
+            If what has arrived can become neither the right reply nor an exception.
         """
-        if pdu[0] == self.function:
-            return self.shape.least_bytes(pdu)
-        if pdu[0] == self.function | EXCEPTION_BIT:
-            return _EXCEPTION_BYTES
-        raise FrameError(f"function code is {pdu[0]}, expected {self.function}")
+        function, found = self.pdu[0], reply[0]
+        if found != function:
+            if found == function | EXCEPTION_BIT:
+                return _EXCEPTION_BYTES
+            raise FrameError(f"function code is {found}, expected {function}")
+        if function == READ_FIFO_QUEUE:
+            return _fifo_bytes(reply)
+        if function == READ_IDENTIFICATION:
+            return _identification_bytes(reply, self.pdu[1:3])
+        count = self.pdu[3] << 8 | self.pdu[4]
+        n_bytes = 2 * count if function in REGISTER_FUNCTIONS else -(-count // 8)
+        if len(reply) > 1 and reply[1] != n_bytes:
+            raise FrameError(f"byte count is {reply[1]}, expected {n_bytes}")
+        return 2 + n_bytes
 
 
-def registers_request(address: int, count: int, function: int) -> ReadRequest:
-    """Registers by function 3 or 4."""
-    intent = f"a read of {count} at {address}, function {function}"
-    body = _ADDRESS_AND_COUNT.pack(address, count)
-    return ReadRequest(function, body, CountedReply(2 * count), intent)
+def _fifo_bytes(reply: memoryview) -> int:
+    """Length of a queue's reply, which states how many registers follow."""
+    if len(reply) < _FIFO_HEAD.size:
+        return _FIFO_HEAD.size
+    n_bytes: int
+    n_registers: int
+    _, n_bytes, n_registers = _FIFO_HEAD.unpack_from(reply)
+    if n_registers > MAX_FIFO_REGISTERS:
+        raise FrameError(f"FIFO count is {n_registers}, allowed is 0 to {MAX_FIFO_REGISTERS}")
+    if n_bytes != 2 + 2 * n_registers:
+        raise FrameError(f"byte count is {n_bytes} with a FIFO count of {n_registers}")
+    return _FIFO_HEAD.size + 2 * n_registers
 
 
-def bits_request(address: int, count: int, function: int) -> ReadRequest:
-    """Bits by function 1 or 2."""
-    intent = f"a read of {count} at {address}, function {function}"
-    body = _ADDRESS_AND_COUNT.pack(address, count)
-    return ReadRequest(function, body, CountedReply(-(-count // 8)), intent)
+def _identification_bytes(reply: memoryview, expected: bytes) -> int:
+    """Length of an identification, as far as its objects are known; each states its own."""
+    found = bytes(reply[1:3])
+    if not expected.startswith(found):
+        raise FrameError(f"MEI type and read code are {found.hex()}, not {expected.hex()}")
+    end = _IDENTIFICATION_HEAD.size
+    if len(reply) < end:
+        return end
+    for _ in range(reply[6]):
+        if len(reply) < end + 2:
+            end += 2
+            break
+        end += 2 + reply[end + 1]
+    if end > MAX_PDU_BYTES:
+        raise FrameError(f"identification of more than {MAX_PDU_BYTES} bytes")
+    return end
+
+
+@lru_cache(maxsize=1024)  # the spans of a device are read again in every poll
+def span_requests(span: Span, max_registers: int) -> tuple[ReadRequest, ...]:
+    """Requests that read a span, in the order of their addresses."""
+    step = _MAX_BITS_PER_READ if span.function in BIT_FUNCTIONS else max_registers
+    return tuple(
+        ReadRequest(_SPAN_REQUEST.pack(span.function, at, min(step, span.stop - at)))
+        for at in range(span.address, span.stop, step)
+    )
 
 
 def fifo_request(address: int) -> ReadRequest:
-    """A queue, by function 0x18."""
-    body = address.to_bytes(2, "big")
-    return ReadRequest(READ_FIFO_QUEUE, body, FifoReply(), f"a read of the queue at {address}")
+    """Request for a queue, by function 0x18.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such address.
+    """
+    pointer = Span(address, 1)
+    return ReadRequest(bytes((READ_FIFO_QUEUE,)) + pointer.address.to_bytes(2, "big"))
 
 
 def identification_request(first_object: int = 0) -> ReadRequest:
-    """The basic objects of function 43/14, from one of them on."""
-    body = _MEI + bytes((READ_BASIC, first_object))
-    shape = IdentificationReply(READ_BASIC)
-    return ReadRequest(READ_IDENTIFICATION, body, shape, "a read of its identification")
+    """Request for the basic objects of function 43/14, from one of them on."""
+    return ReadRequest(bytes((READ_IDENTIFICATION, _MEI, _READ_BASIC, first_object)))
 
 
-def fifo_registers(pdu: bytes) -> bytes:
+def fifo_registers(reply: memoryview) -> bytes:
     """Registers of a FIFO reply, big-endian words."""
-    return pdu[_FIFO_HEAD.size :]
+    return bytes(reply[_FIFO_HEAD.size :])
 
 
-def identification_objects(pdu: bytes) -> tuple[dict[int, bytes], int | None]:
-    """Objects of an identification reply by their number, and where to go on asking, if so."""
-    _, _, _, _, more_follows, next_object, n_objects = _IDENTIFICATION_HEAD.unpack_from(pdu)
+def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | None]:
+    """Objects of an identification by their number, and the next one to ask for, if any."""
+    _, _, _, _, more_follows, next_object, n_objects = _IDENTIFICATION_HEAD.unpack_from(reply)
     objects, at = {}, _IDENTIFICATION_HEAD.size
     for _ in range(n_objects):
-        number, n_bytes = pdu[at], pdu[at + 1]
-        objects[number] = pdu[at + 2 : at + 2 + n_bytes]
+        number, n_bytes = reply[at], reply[at + 1]
+        objects[number] = bytes(reply[at + 2 : at + 2 + n_bytes])
         at += 2 + n_bytes
     return objects, next_object if more_follows else None
+
+
+def exception_error(where: str, code: int, request: ReadRequest) -> AcquisitionError:
+    """Error that an exception reply stands for: LinkError if asking again later can help.
+
+    Parameters
+    ----------
+    where
+        Of the device, for the message.
+    code
+        Exception code of the reply.
+    """
+    kind = ConfigError if code in _CONFIG_EXCEPTIONS else LinkError
+    name = (_CONFIG_EXCEPTIONS | _PASSING_EXCEPTIONS).get(code, "unknown")
+    return kind(f"{where}: device answers exception {code} ({name}) to {request}")

@@ -1,12 +1,14 @@
-"""Following a block ring: which slots are new, which are lost, which are nonsense."""
+"""`RingFollower`: which slots of a block ring are new, lost, or refused."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import lru_cache
 
 from acquisition.delivery.epochs import Epochs
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.client import ModbusClient
+from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_profile import (
     HEADER_REGISTERS,
     U32,
@@ -14,7 +16,7 @@ from acquisition.modbus.ring_profile import (
     RingLayout,
     Slot,
     decode_header,
-    decode_slot,
+    decode_slots,
 )
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from core.samples.blocks import Rejection
@@ -24,17 +26,16 @@ _N_TRIES = 4
 
 
 class RingReader:
-    """One device's ring, as it is found: slots are not judged here."""
+    """One device's ring as it is found: slots are not judged here."""
 
-    def __init__(self, link: ModbusClient, base_address: int, function: int) -> None:
-        self._link = link
-        self._base = base_address
-        self._function = function
+    def __init__(self, client: ModbusClient, base_address: int, function: int) -> None:
+        self._client = client
+        self._header = Span(base_address, HEADER_REGISTERS, function)
 
     @property
     def where(self) -> str:
         """Host and port, or path of the serial port."""
-        return self._link.where
+        return self._client.where
 
     async def header(self) -> RingHeader:
         """Read and decode the header alone.
@@ -46,14 +47,14 @@ class RingReader:
         FrameError
             If its checksum is wrong, however often it is read.
         LinkError
-            As the link says.
+            As the client does.
         """
         n_tries = 0
         while True:
-            data = await self._registers(self._base, HEADER_REGISTERS)
+            content = await self._content([self._header])
             n_tries += 1
             try:
-                return decode_header(data)
+                return decode_header(content)
             except (ConfigError, FrameError) as error:
                 if n_tries == _N_TRIES:
                     raise type(error)(f"{self.where}: {error}") from error
@@ -64,50 +65,32 @@ class RingReader:
         Returns
         -------
         list
-            One slot for each sequence number asked.
+            One slot for each sequence number.
         """
-        found: list[Slot] = []
-        for address, n_slots in _runs(layout, sequences):
-            n_registers = (n_slots - 1) * layout.slot_stride + layout.slot_registers
-            data = memoryview(await self._registers(address, n_registers))
-            found += [
-                decode_slot(data[2 * layout.slot_stride * i :], layout) for i in range(n_slots)
-            ]
-        return found
+        spans: list[Span] = []
+        for sequence in sequences:
+            start, count = layout.slot_address(sequence), layout.slot_registers
+            if spans and spans[-1].stop == start:  # no padding between slots
+                start, count = spans[-1].address, spans.pop().count + count
+            spans.append(Span(start, count, self._header.function))
+        return decode_slots(await self._content(spans), layout)
 
-    async def _registers(self, address: int, n_registers: int) -> bytes:
-        return await self._link.read(address, n_registers, self._function)
-
-
-def _runs(layout: RingLayout, sequences: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Address and number of the slots that lie side by side and without padding."""
-    start, n_slots = 0, 0
-    for sequence in sequences:
-        address = layout.slot_address(sequence)
-        if n_slots and address == start + n_slots * layout.slot_stride and _dense(layout):
-            n_slots += 1
-            continue
-        if n_slots:
-            yield start, n_slots
-        start, n_slots = address, 1
-    if n_slots:
-        yield start, n_slots
-
-
-def _dense(layout: RingLayout) -> bool:
-    return layout.slot_stride == layout.slot_registers
+    async def _content(self, spans: Sequence[Span]) -> memoryview:
+        content = memoryview(bytearray(sum(span.n_bytes for span in spans)))
+        await self._client.read_into(spans, content)
+        return content
 
 
 _N_REREADS = 3
 """A device needs milliseconds to write a slot; still torn after this many round trips, it lies."""
 
-_AT_ONCE_S = 0.5
-"""Samples that are read before they are handed on: what a ring holds after an outage takes a slow
-line seconds, and would be asked for all over again if that fails before its end."""
+_MAX_READ_S = 0.5
+"""Longest stretch of samples in one poll. A ring that is read after an outage takes a slow line
+seconds, and all of it would be read again if that failed before its end."""
 
 
 class RingFollower:
-    """Where a reader stands in one device's ring, kept across connections.
+    """Position of a reader in one device's ring, kept across connections.
 
     On the first connection it starts with the newest slot. Later it continues after the last slot
     it has handled, as far back as the ring holds; the oldest slot is left alone, because the
@@ -136,7 +119,7 @@ class RingFollower:
 
     @property
     def newest(self) -> tuple[int, int] | None:
-        """Epoch and newest sequence the device has shown."""
+        """Epoch and newest sequence of the header read last; None before the first."""
         return None if self._header is None else (self._header.epoch, self._header.newest)
 
     async def header(self, reader: RingReader) -> RingHeader:
@@ -161,16 +144,16 @@ class RingFollower:
 
     @property
     def n_waiting(self) -> int:
-        """Slots that the device has shown and that were not read yet."""
+        """Slots up to the newest of the header that were not read yet."""
         return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
 
-    async def advance(self, reader: RingReader) -> list[RawBlock]:
-        """Read what is new, in order; of much only the first.
+    async def poll(self, reader: RingReader) -> list[RawBlock]:
+        """Read the new slots, in order; of many only the first.
 
         Raises
         ------
         LinkError, FrameError, ConfigError
-            As the reader does; nothing is forgotten then.
+            As the reader does; the next call then reads the same slots again.
         """
         header = await self.header(reader)
         await self._enter(reader, header)
@@ -182,7 +165,7 @@ class RingFollower:
         return self._placed(list(zip(wanted, found, strict=True)), header)
 
     async def _enter(self, reader: RingReader, header: RingHeader) -> None:
-        """Find the place to read from, when this is not simply the one after the last."""
+        """Set the position to read from where it is not simply the slot after the last."""
         before = self._header
         if before is None:
             self._timeline = Timeline(header.layout)
@@ -205,7 +188,7 @@ class RingFollower:
         self._header = header
 
     async def _require_again(self, reader: RingReader, header: RingHeader) -> None:
-        """Believe in another epoch only when the device says so twice.
+        """Accept another epoch only if a second reading of the header has it too.
 
         Otherwise one stale or changed reply would make old samples new.
         """
@@ -217,9 +200,9 @@ class RingFollower:
             )
 
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:
-        """Stand before the first slot of a new epoch, if the ring still holds it.
+        """Set the position to the first slot of a new epoch, if the ring still holds it.
 
-        Slots name their epoch, so that all can be looked at when the newest is of no help.
+        Slots contain their epoch, so that all can be read if the newest is not usable.
         """
         n_before = header.layout.n_slots
         if newest is not None:
@@ -229,7 +212,7 @@ class RingFollower:
     def _unread(self, header: RingHeader) -> list[int]:
         n_behind = ahead(header.newest, self._handled)
         n_there = min(n_behind, header.layout.n_slots - 1)
-        n_wanted = min(n_there, max(1, round(_AT_ONCE_S / header.layout.slot_duration_s)))
+        n_wanted = min(n_there, max(1, round(_MAX_READ_S / header.layout.slot_duration_s)))
         return [(header.newest - n_there + 1 + n) % U32 for n in range(n_wanted)]
 
     async def _newest_slot(self, reader: RingReader, header: RingHeader) -> Slot | None:
@@ -240,7 +223,7 @@ class RingFollower:
     async def _read(
         self, reader: RingReader, layout: RingLayout, wanted: Sequence[int]
     ) -> list[Slot]:
-        """Read slots, doubtful ones again: the device may be writing them just now."""
+        """Read slots, and doubtful ones again: the device may be writing them at this moment."""
         slots = await reader.slots(layout, wanted)
         for i, sequence in enumerate(wanted):
             for _ in range(_N_REREADS):
@@ -260,7 +243,7 @@ class RingFollower:
         return blocks
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
-        """Index of the slot's first sample; None if it was never written or is gone."""
+        """Index of the slot's first sample; None if it was never written or is overwritten."""
         if slot.blank or _overwritten_or_old(slot, sequence, header.layout):
             return None
         if slot.damage:
@@ -276,7 +259,7 @@ class RingFollower:
     def _raw_block(self, slot: Slot, index: int, header: RingHeader) -> RawBlock:
         rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
-        if self._timeline.n_resets != self._n_resets:  # the counters went back, and nobody told
+        if self._timeline.n_resets != self._n_resets:  # the counters went back in the same epoch
             self._n_resets = self._timeline.n_resets
             self._epochs.begin()
         return RawBlock(
@@ -285,20 +268,25 @@ class RingFollower:
             start_ns=slot.start_ns,
             rate_hz=header.layout.rate_mhz / 1000.0,
             counts=slot.counts,
-            ok=tuple(bool(slot.ok_bits >> c & 1) for c in range(header.layout.n_channels)),
+            ok=_verdicts(slot.ok_bits, header.layout.n_channels),
             slow=slot.slow,
             rejected=rejected,
         )
 
 
+@lru_cache(maxsize=256)
+def _verdicts(ok_bits: int, n_channels: int) -> tuple[bool, ...]:
+    return tuple(bool(ok_bits >> channel & 1) for channel in range(n_channels))
+
+
 def _overwritten_or_old(slot: Slot, sequence: int, layout: RingLayout) -> bool:
-    """Whether another slot lies here that belongs into the same place."""
+    """Whether another slot lies here, one that belongs into the same place of the ring."""
     other = slot.sequence != sequence
     return other and slot.sequence % layout.n_slots == sequence % layout.n_slots
 
 
 def _doubtful(slot: Slot, sequence: int, layout: RingLayout) -> bool:
-    """Whether a slot may look different when it is read again."""
+    """Whether a second reading of the slot may give something else."""
     if slot.blank:
         return False
     misplaced = slot.sequence != sequence and not _overwritten_or_old(slot, sequence, layout)

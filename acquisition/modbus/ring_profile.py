@@ -19,25 +19,30 @@ import struct
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.transport import ADDRESS_SPACE
+from acquisition.modbus.requests import ADDRESS_SPACE
 from core.arrays import CountArray
 from core.units import NS_PER_S
 
+MAGIC = 0x5057
+VERSION = 2
+HEADER_REGISTERS = 16
 MAX_CHANNELS = 32
 U32 = 1 << 32
 
-_HEAD_REGISTERS = 12
-_TRAILER_REGISTERS = 1
-_CRC_REGISTERS = 2
+_HEADER = struct.Struct(">5H3I3H")
+_SLOT_HEAD = struct.Struct(">6I")
+_HEAD_REGISTERS, _TRAILER_REGISTERS, _CRC_REGISTERS = 12, 1, 2
 
 
 @dataclass(frozen=True)
 class RingLayout:
-    """What stays the same while a device runs.
+    """Shape and place of a ring: what stays the same while a device runs.
 
     Parameters
     ----------
@@ -56,6 +61,19 @@ class RingLayout:
     n_slow: int
     ring_address: int
     slot_stride: int
+
+    @cached_property
+    def slot_type(self) -> np.dtype[Any]:
+        """Numbers of one slot as they lie in its registers; of a layout that is possible."""
+        return np.dtype(
+            [
+                ("head", ">u4", (6,)),
+                ("slow", ">f4", (self.n_slow,)),
+                ("counts", ">i2", (self.n_channels, self.samples_per_slot)),
+                ("trailer", ">u2"),
+                ("crc", ">u4"),
+            ]
+        )
 
     @property
     def slot_registers(self) -> int:
@@ -99,16 +117,9 @@ class RingLayout:
                 )
 
 
-MAGIC = 0x5057
-VERSION = 2
-HEADER_REGISTERS = 16
-
-_HEADER = struct.Struct(">5H3I3H")
-
-
 @dataclass(frozen=True)
 class RingHeader:
-    """The head of the ring: its layout and how far the device has come."""
+    """Header of a ring: its layout, the device's epoch and the sequence of the newest slot."""
 
     layout: RingLayout
     epoch: int
@@ -126,7 +137,7 @@ def encode_header(header: RingHeader) -> bytes:
     return data + zlib.crc32(data).to_bytes(4, "big")
 
 
-def decode_header(data: bytes) -> RingHeader:
+def decode_header(data: bytes | memoryview) -> RingHeader:
     """Read the first 16 registers of a device.
 
     Raises
@@ -148,20 +159,23 @@ def decode_header(data: bytes) -> RingHeader:
     expected = zlib.crc32(data[: _HEADER.size])
     if found != expected:
         raise FrameError(f"block ring: checksum of the header is {found:#x}, not {expected:#x}")
-    layout = RingLayout(
+    layout = _possible_layout(
         n_channels, samples_per_slot, n_slots, rate_mhz, n_slow, ring_address, slot_stride
     )
-    layout.require_possible()
     return RingHeader(layout, epoch, newest)
 
 
-_HEAD = struct.Struct(">6I")
-_CRC_BYTES = 4
+@lru_cache(maxsize=256)
+def _possible_layout(*fields: int) -> RingLayout:
+    """Layout of these fields, checked once for all polls."""
+    layout = RingLayout(*fields)
+    layout.require_possible()
+    return layout
 
 
 @dataclass(frozen=True)
 class Slot:
-    """One slot as it lies in the ring, numbers as they were found.
+    """One slot as it was read, unchecked.
 
     Parameters
     ----------
@@ -205,53 +219,49 @@ class Slot:
 
     @property
     def whole(self) -> bool:
-        """Whether nothing says that the slot was changed, by its writer or on the way."""
+        """Whether trailer and checksum show no change, by its writer or on the way."""
         return not self.torn and not self.damage
 
 
 def encode_slot(slot: Slot) -> bytes:
     """Registers of one slot."""
-    head = _HEAD.pack(
+    head = _SLOT_HEAD.pack(
         *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),
         *(slot.ok_bits, slot.epoch),
     )
     samples = slot.counts.astype(">i2").tobytes() + slot.trailer.to_bytes(2, "big")
     data = head + encode_slow(slot.slow) + samples
-    return data + (zlib.crc32(data) ^ slot.damage).to_bytes(_CRC_BYTES, "big")
+    return data + (zlib.crc32(data) ^ slot.damage).to_bytes(2 * _CRC_REGISTERS, "big")
 
 
-def decode_slot(data: bytes | memoryview, layout: RingLayout) -> Slot:
-    """Read one slot; what lies behind it is left alone."""
-    data = data[: 2 * layout.slot_registers]
-    sequence, first_index, seconds, microseconds, ok_bits, epoch = _HEAD.unpack_from(data)
-    at = _HEAD.size + 4 * layout.n_slow
-    n_counts = layout.n_channels * layout.samples_per_slot
-    counts = np.frombuffer(data, ">i2", n_counts, at).astype(np.int16)
-    end = at + 2 * n_counts
-    return Slot(
-        sequence=sequence,
-        first_index=first_index,
-        seconds=seconds,
-        microseconds=microseconds,
-        ok_bits=ok_bits,
-        counts=counts.reshape(layout.n_channels, layout.samples_per_slot),
-        trailer=int.from_bytes(data[end : end + 2], "big"),
-        epoch=epoch,
-        slow=decode_slow(data[_HEAD.size : at]),
-        damage=_damage(data),
-        blank=not any(data),
-    )
+def decode_slots(content: bytes | memoryview, layout: RingLayout) -> list[Slot]:
+    """Read slots that lie one behind the other."""
+    records = np.frombuffer(content, layout.slot_type)
+    counts = records["counts"].astype(np.int16)
+    heads, slow = records["head"].tolist(), records["slow"].tolist()
+    trailers, crcs = records["trailer"].tolist(), records["crc"].tolist()
+    n_bytes = records.itemsize
+    slots = []
+    for n, (sequence, first_index, seconds, microseconds, ok_bits, epoch) in enumerate(heads):
+        data = content[n * n_bytes : (n + 1) * n_bytes]
+        slots.append(
+            Slot(
+                sequence=sequence,
+                first_index=first_index,
+                seconds=seconds,
+                microseconds=microseconds,
+                ok_bits=ok_bits,
+                counts=counts[n],
+                trailer=trailers[n],
+                epoch=epoch,
+                slow=tuple(slow[n]),
+                damage=zlib.crc32(data[: -2 * _CRC_REGISTERS]) ^ crcs[n],
+                blank=not any(data),
+            )
+        )
+    return slots
 
 
 def encode_slow(values: Sequence[float]) -> bytes:
     """Slow values as registers, NaN where there is none."""
     return np.asarray(values, dtype=">f4").tobytes()
-
-
-def decode_slow(data: bytes | memoryview) -> tuple[float, ...]:
-    """Slow values from their registers."""
-    return tuple(np.frombuffer(data, dtype=">f4").tolist())
-
-
-def _damage(data: bytes | memoryview) -> int:
-    return zlib.crc32(data[:-_CRC_BYTES]) ^ int.from_bytes(data[-_CRC_BYTES:], "big")

@@ -1,7 +1,7 @@
 """`ModbusRingSource`: a DAQ with a block ring as a sample source."""
 
-from collections.abc import AsyncGenerator, AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
@@ -9,12 +9,13 @@ from acquisition.delivery.arrival import Arrival
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.ring_pace import out_of_step_s
-from acquisition.errors import ConfigError, FrameError, LinkError
+from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
+from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.requests import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
+from acquisition.modbus.requests import ADDRESS_SPACE, READ_HOLDING_REGISTERS, REGISTER_FUNCTIONS
 from acquisition.modbus.ring_follower import RingFollower, RingReader
 from acquisition.modbus.ring_profile import HEADER_REGISTERS
-from acquisition.modbus.transport import ADDRESS_SPACE, LinkSettings
+from acquisition.modbus.transport import LinkSettings, require_above_zero, require_between
 from core.samples.blocks import SampleBlock
 
 _MIN_STALE_SLOTS = 3
@@ -44,28 +45,20 @@ class ModbusRingSettings(LinkSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.function not in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
-            raise ConfigError(f"modbus: function is {self.function}, allowed are 3 and 4")
-        if not 0 <= self.base_address <= ADDRESS_SPACE - HEADER_REGISTERS:
-            raise ConfigError(
-                f"modbus: base_address is {self.base_address},"
-                f" allowed is 0 to {ADDRESS_SPACE - HEADER_REGISTERS}"
-            )
-        for name, value in (
-            ("poll_period_s", self.poll_period_s),
-            ("stale_after_s", self.stale_after_s),
-        ):
-            if not 0 < value < float("inf"):
-                raise ConfigError(f"modbus: {name} is {value}, must be above 0")
+        require_between(self, "function", *REGISTER_FUNCTIONS)
+        require_between(self, "base_address", 0, ADDRESS_SPACE - HEADER_REGISTERS)
+        require_above_zero(self, "poll_period_s", "stale_after_s")
 
 
 class ModbusRingSource:
-    """Samples of one unit from a block ring; remembers where it stood when connected again."""
+    """Samples of one unit from a block ring; a new connection continues after the last slot."""
 
     def __init__(
         self, settings: ModbusRingSettings, calibration: UnitCalibration, clock: Clock
     ) -> None:
         self._settings = settings
+        self._client = ModbusClient(settings)
+        self._reader = RingReader(self._client, settings.base_address, settings.function)
         self._delivery = Delivery(calibration)
         self._clock = clock
         self._follower = RingFollower(
@@ -85,26 +78,18 @@ class ModbusRingSource:
         Raises
         ------
         LinkError
-            If the device does not answer, answers nonsense, or its data stand still.
+            If the device does not answer, answers wrongly, or its data stand still.
         ConfigError
             If it is not a block ring, or not the configured one.
         """
-        link = ModbusClient(self._settings)
-        try:
-            with _nonsense_drops_the_link():
-                await link.open()
-                reader = RingReader(link, self._settings.base_address, self._settings.function)
-                await self._identify(reader)
-            blocks = self._blocks(reader)
-            try:
+        async with self._client.connected():
+            with wrong_replies_drop_the_link():
+                await self._identify()
+            async with aclosing(self._blocks()) as blocks:
                 yield blocks
-            finally:
-                await blocks.aclose()
-        finally:
-            link.close()
 
-    async def _identify(self, reader: RingReader) -> None:
-        header = await self._follower.header(reader)
+    async def _identify(self) -> None:
+        header = await self._follower.header(self._reader)
         self._slot_s = header.layout.slot_duration_s
         self._stale_after_s = max(self._settings.stale_after_s, _MIN_STALE_SLOTS * self._slot_s)
         if self._follower.newest == (header.epoch, header.newest):
@@ -112,13 +97,13 @@ class ModbusRingSource:
         else:
             self._fresh_at_s = self._clock.monotonic_s()
 
-    async def _blocks(self, reader: RingReader) -> AsyncGenerator[SampleBlock, None]:
+    async def _blocks(self) -> AsyncGenerator[SampleBlock, None]:
         period_s = out_of_step_s(self._settings.poll_period_s, self._slot_s)
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
-            with _nonsense_drops_the_link():
-                raw_blocks = await self._follower.advance(reader)
+            with wrong_replies_drop_the_link():
+                raw_blocks = await self._follower.poll(self._reader)
             arrived = Arrival.now(self._clock)
             n_waiting = self._follower.n_waiting
             read_for_s = arrived.steady_s - begun_s + n_waiting * self._slot_s
@@ -148,12 +133,3 @@ class ModbusRingSource:
                 f" stand still: no usable slot for {standing_s:.1f} s,"
                 f" the newest is {newest} of epoch {epoch}"
             )
-
-
-@contextmanager
-def _nonsense_drops_the_link() -> Iterator[None]:
-    """Turn a wrong reply into a lost link: on a stream, nothing after it can be trusted."""
-    try:
-        yield
-    except FrameError as exc:
-        raise LinkError(f"wrong reply, connection dropped: {exc}") from exc

@@ -1,25 +1,18 @@
-"""Where a Modbus device is: at a TCP address, or on a serial line."""
+"""Settings of a link: a TCP address or a serial line, and how the device wants to be asked."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
-from itertools import count
 from typing import Literal, TypeAlias, get_args
 
-from acquisition.delivery.names import KnownAddresses
 from acquisition.errors import ConfigError
 from acquisition.modbus.identity import Identity
+from acquisition.modbus.requests import MAX_REGISTERS_PER_READ
 
 Parity: TypeAlias = Literal["none", "even", "odd"]
 
-MAX_REGISTERS_PER_READ = 125
-ADDRESS_SPACE = 0x10000
 _MAX_REQUESTS_IN_FLIGHT = 16
-_N_TRANSACTIONS = 65_000
-"""Ids are 1 to this; some devices answer to 0 as to any."""
-
 _MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
-_MAX_SERIAL_DEVICE_ID = 247
+_MAX_TCP_DEVICE_ID, _MAX_SERIAL_DEVICE_ID = 255, 247
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
 _FRAME_GAP_CHARACTERS = 3.5
 _SHORTEST_FRAME_GAP_S = 0.00175
@@ -33,28 +26,16 @@ class TcpTransport:
     Parameters
     ----------
     host
-        Name or address.
+        Name or address; example: "192.0.2.17".
     port
         1 to 65535.
-
-    Attributes
-    ----------
-    addresses
-        Of the host, remembered from one connection to the next.
-    transactions
-        Id of each next request. They go on from one connection to the next: a gateway may pass a
-        late reply on to whoever is connected then.
     """
 
     host: str
     port: int = 502
-    addresses: KnownAddresses = field(init=False, repr=False, compare=False)
-    transactions: Iterator[int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        _require("port", self.port, 1, 65535)
-        object.__setattr__(self, "addresses", KnownAddresses(self.host, self.port))
-        object.__setattr__(self, "transactions", (1 + n % _N_TRANSACTIONS for n in count()))
+        require_between(self, "port", 1, 65535)
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"
@@ -82,8 +63,8 @@ class SerialTransport:
     stop_bits: Literal[1, 2] = 1
 
     def __post_init__(self) -> None:
-        _require("baudrate", self.baudrate, _MIN_BAUDRATE, _MAX_BAUDRATE)
-        _require("stop_bits", self.stop_bits, 1, 2)
+        require_between(self, "baudrate", _MIN_BAUDRATE, _MAX_BAUDRATE)
+        require_between(self, "stop_bits", 1, 2)
         if self.parity not in get_args(Parity):
             raise ConfigError(
                 f"modbus: parity is {self.parity!r}, allowed are {', '.join(get_args(Parity))}"
@@ -114,35 +95,6 @@ class ConnectionUse(StrEnum):
     PER_REPLY = "per_reply"
 
 
-class RequestsInFlight:
-    """How many requests a device is sent before it has answered the first.
-
-    Attributes
-    ----------
-    now
-        As wanted; one from the first time on that it did not answer all in order, or hung up twice
-        running.
-    """
-
-    def __init__(self, wanted: int) -> None:
-        self.now = wanted
-        self._n_cut = 0
-
-    def answered(self) -> None:
-        """Note that all were."""
-        self._n_cut = 0
-
-    def cut(self) -> None:
-        """Note that the connection was closed while some were in flight: by the device or not."""
-        self._n_cut += 1
-        if self._n_cut > 1:
-            self.stalled()
-
-    def stalled(self) -> None:
-        """Note that the device cannot take more than one."""
-        self.now = 1
-
-
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
     """How to reach a Modbus device, and how it wants to be asked.
@@ -165,10 +117,10 @@ class LinkSettings:
         Most requests that are sent at once, 1 to 16; over TCP, on a connection that is kept. Most
         devices answer them one after another and save the round trips; some lose all but one.
 
-    Attributes
-    ----------
-    in_flight
-        How many there may be now; remembered from one connection to the next.
+    Raises
+    ------
+    ConfigError
+        With the value that cannot be, and what is allowed.
     """
 
     transport: Transport
@@ -178,22 +130,45 @@ class LinkSettings:
     identity: Identity | None = None
     connection: ConnectionUse = ConnectionUse.KEPT
     requests_in_flight: int = 1
-    in_flight: RequestsInFlight = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        serial = isinstance(self.transport, SerialTransport)
-        if serial and self.connection is not ConnectionUse.KEPT:
+        is_serial, is_kept = (
+            isinstance(self.transport, SerialTransport),
+            self.connection is ConnectionUse.KEPT,
+        )
+        if is_serial and not is_kept:
             raise ConfigError("modbus: a serial line is kept, there are no connections on it")
-        _require("device_id", self.device_id, 1, _MAX_SERIAL_DEVICE_ID if serial else 255)
-        _require("max_registers", self.max_registers, 1, MAX_REGISTERS_PER_READ)
-        is_single = serial or self.connection is not ConnectionUse.KEPT
-        most = 1 if is_single else _MAX_REQUESTS_IN_FLIGHT
-        _require("requests_in_flight", self.requests_in_flight, 1, most)
-        object.__setattr__(self, "in_flight", RequestsInFlight(self.requests_in_flight))
-        if not 0 < self.timeout_s < float("inf"):
-            raise ConfigError(f"modbus: timeout_s is {self.timeout_s}, must be above 0")
+        require_between(
+            self, "device_id", 1, _MAX_SERIAL_DEVICE_ID if is_serial else _MAX_TCP_DEVICE_ID
+        )
+        require_between(self, "max_registers", 1, MAX_REGISTERS_PER_READ)
+        is_single = is_serial or not is_kept
+        require_between(self, "requests_in_flight", 1, 1 if is_single else _MAX_REQUESTS_IN_FLIGHT)
+        require_above_zero(self, "timeout_s")
 
 
-def _require(name: str, value: int, lowest: int, highest: int) -> None:
+def require_between(settings: object, name: str, lowest: int, highest: int) -> None:
+    """Refuse a setting outside its limits.
+
+    Raises
+    ------
+    ConfigError
+        With its name, its value and what is allowed.
+    """
+    value = getattr(settings, name)
     if not lowest <= value <= highest:
         raise ConfigError(f"modbus: {name} is {value}, allowed is {lowest} to {highest}")
+
+
+def require_above_zero(settings: object, *names: str) -> None:
+    """Refuse times that are not finite and above zero.
+
+    Raises
+    ------
+    ConfigError
+        With the name and value of the first such.
+    """
+    for name in names:
+        value = getattr(settings, name)
+        if not 0.0 < value < float("inf"):
+            raise ConfigError(f"modbus: {name} is {value}, must be above 0")

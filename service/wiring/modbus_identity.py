@@ -1,6 +1,6 @@
 """The identity of a Modbus device, as the adapter takes it."""
 
-from acquisition.modbus.identity import ExpectedIdentification, Identity, Signature
+from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identity
 from service.settings.modbus_identity import (
     IdentificationIdentity,
     IdentitySettings,
@@ -12,7 +12,7 @@ def identity_of(settings: IdentitySettings | None) -> Identity | None:
     """What the device must answer; None if any will do."""
     match settings:
         case SignatureIdentity():
-            return Signature(
+            return ExpectedRegisters(
                 address=settings.address, words=settings.words, function=settings.function
             )
         case IdentificationIdentity():

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError
-from acquisition.modbus.cells import BIT_FUNCTIONS
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.identity import Identification
 from acquisition.modbus.polled_source import MapReader
 from acquisition.modbus.register_map import RegisterMap
+from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
 from acquisition.modbus.ring_profile import RingHeader, Slot
 from acquisition.modbus.transport import LinkSettings
@@ -34,14 +34,10 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
     ConfigError
         If it has no such registers.
     """
-    link = ModbusClient(link_settings_of(device))
-    try:
+    client = ModbusClient(link_settings_of(device))
+    async with client.connected():
         with wrong_replies_drop_the_link():
-            await link.open()
-            read = link.read_bits if function in BIT_FUNCTIONS else link.read
-            return await read(address, count, function)
-    finally:
-        link.close()
+            return await client.read(address, count, function)
 
 
 async def read_map_once(
@@ -55,15 +51,9 @@ async def read_map_once(
         As `read_once`; ConfigError too if it is another device.
     """
     decoder = MapDecoder(registers)
-    link = ModbusClient(link_settings_of(device))
-    try:
-        with wrong_replies_drop_the_link():
-            await link.open()
-            reader = MapReader(link, decoder)
-            await reader.require_signature()
-            return decoder, await reader.content()
-    finally:
-        link.close()
+    reader = MapReader(link_settings_of(device), decoder)
+    async with reader.connected():
+        return decoder, await reader.content()
 
 
 async def read_ring_once(
@@ -76,16 +66,13 @@ async def read_ring_once(
     LinkError, ConfigError
         As `read_once`; ConfigError too if this is no block ring.
     """
-    link = ModbusClient(link_settings_of(device))
-    try:
+    client = ModbusClient(link_settings_of(device))
+    reader = RingReader(client, base_address, function)
+    async with client.connected():
         with wrong_replies_drop_the_link():
-            await link.open()
-            reader = RingReader(link, base_address, function)
             header = await reader.header()
             [slot] = await reader.slots(header.layout, [header.newest])
             return header, slot
-    finally:
-        link.close()
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
@@ -96,13 +83,10 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
     LinkError, ConfigError
         As `read_once`; ConfigError too if it does not say.
     """
-    link = ModbusClient(link_settings_of(device))
-    try:
+    client = ModbusClient(link_settings_of(device))
+    async with client.connected():
         with wrong_replies_drop_the_link():
-            await link.open()
-            return await link.identify()
-    finally:
-        link.close()
+            return await client.identify()
 
 
 async def measure_in_flight(
@@ -127,14 +111,14 @@ async def measure_in_flight(
     await read_once(device, address, 1, function)
     n_taken = 1
     for n_requests in range(2, most + 1):
-        link = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
+        client = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
+        spans = [Span(address, 1, function)] * n_requests
+        content = memoryview(bytearray(sum(span.n_bytes for span in spans)))
         try:
-            await link.open()
-            for _ in range(_TRIES_IN_FLIGHT):
-                await link.read_each([address] * n_requests, function)
+            async with client.connected():
+                for _ in range(_TRIES_IN_FLIGHT):
+                    await client.read_into(spans, content)
         except AcquisitionError:
             break
-        finally:
-            link.close()
         n_taken = n_requests
     return n_taken

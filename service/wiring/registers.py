@@ -6,9 +6,8 @@ from acquisition.clock import Clock
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
-from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.slow_values import PolledSlowValues
-from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.source import SampleSource
 from core.machine.unit import Unit
 from core.monitor.settings import AnalysisSettings

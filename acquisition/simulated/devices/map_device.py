@@ -64,7 +64,7 @@ class MapDevice:
         self.identification: Mapping[int, bytes] = {}
         self.frozen = self.on_demand = self.ended = False
         self._values = {value.id: value for value in registers.values}
-        self._first = next(iter(plan_reads(registers).requests))
+        self._first = next(iter(plan_reads(registers).spans))
         self._spoilt: dict[str, int] = {}
         self._beat = self._n_looks = 0
         first = self._feed.take()
@@ -124,7 +124,7 @@ class MapDevice:
         self._spoilt[fault] = self._spoilt.get(fault, 0) + count
 
     def _look(self, function: int, address: int) -> None:
-        if (function, address) != (self._first.function, self._first.start):
+        if (function, address) != (self._first.function, self._first.address):
             return
         self._n_looks += self.ended
         if self.on_demand:

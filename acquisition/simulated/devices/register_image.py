@@ -7,10 +7,11 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from acquisition.modbus.cells import BIT_FUNCTIONS, DTYPES, FLOATS, N_BYTES, Cell, NumberType
+from acquisition.modbus.cells import DTYPES, FLOATS, N_BYTES, Cell, NumberType
 from acquisition.modbus.decoding import byte_permutation
 from acquisition.modbus.device_time import EpochTime
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
+from acquisition.modbus.requests import BIT_FUNCTIONS
 from core.units import NS_PER_S
 
 _DEFAULT_RANGE = (-1000.0, 1000.0)

@@ -14,10 +14,10 @@ from rigs.polled import CALIBRATION, Follower, device_of, map_of, take
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.cells import Cell
 from acquisition.modbus.client import ModbusClient
+from acquisition.modbus.connection import ReplyProtocol
 from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import Signature
-from acquisition.modbus.reply_protocol import ReplyProtocol
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, TcpTransport
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
@@ -168,9 +168,9 @@ async def test_a_late_reply_that_a_gateway_passes_on_to_the_next_connection_is_n
     async def pass_on(request, reply, writer):  # noqa: ARG001
         writer.write(late[0])
 
+    link = ModbusClient(settings)
     for lie, error in ((keep, LinkError), (pass_on, FrameError)):
         hostile.lie = lie
-        link = ModbusClient(settings)
         await link.open()
         with pytest.raises(error):
             await link.read(len(late), 1)  # the same length, function and unit: only its id tells
@@ -178,9 +178,9 @@ async def test_a_late_reply_that_a_gateway_passes_on_to_the_next_connection_is_n
 
 async def test_transactions_are_numbered_on_from_connection_to_connection_and_never_zero(hostile):
     transport = TcpTransport(host="127.0.0.1", port=hostile.port)
-    *_, last = islice(transport.transactions, 64_998)
+    link = ModbusClient(LinkSettings(transport=transport))
+    *_, last = islice(link._transactions, 64_998)
     for _ in range(2):
-        link = ModbusClient(LinkSettings(transport=transport))
         await link.open()
         for _ in range(2):
             await link.read(0, 1)

@@ -136,7 +136,7 @@ def test_bits_are_found_in_registers_coils_and_discrete_inputs() -> None:
     }
     values = tuple(MapValue(id=id_, cell=cell) for id_, cell in bits.items())
     decoder = MapDecoder(RegisterMap(values=values, base=1, max_gap=10))
-    counts = [(r.function, r.start, r.count) for r in decoder.plan.requests]
+    counts = [(r.function, r.address, r.count) for r in decoder.plan.spans]
 
     assert counts == [(1, 1009, 1), (2, 1000, 10), (3, 2, 1)]
     replies = b"\xfe" + b"\x01\xfd" + b"\x80\x00"

@@ -9,14 +9,19 @@ from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.framing import Asked, RtuFraming, TcpFraming
 from acquisition.modbus.requests import (
     READ_FUNCTIONS,
-    CountedReply,
     ReadRequest,
+    Span,
     fifo_request,
     identification_request,
-    registers_request,
+    span_requests,
 )
 
 REGISTERS = b"\x03\x0a" + bytes(range(10))
+
+
+def registers(address: int, count: int) -> ReadRequest:
+    [request] = span_requests(Span(address, count), 125)
+    return request
 
 
 def tcp_frame(pdu: bytes) -> bytes:
@@ -33,7 +38,7 @@ on_both_wires = pytest.mark.parametrize(("framing", "frame"), WIRES.values(), id
 
 
 def asked(request: ReadRequest | None = None) -> Asked:
-    return Asked(request or registers_request(100, 5, 3), unit=1, transaction=7)
+    return Asked(request or registers(100, 5), unit=1, transaction=7)
 
 
 def reply(framing, data: bytes, request: ReadRequest | None = None) -> bytes | None:
@@ -52,7 +57,7 @@ def believed(framing, data: bytes, request: ReadRequest | None = None) -> bytes 
 
 def test_a_read_leaves_as_in_the_specification():
     # the worked example of the Modbus specification, with the checksum of its address and function
-    example = asked(registers_request(0x006B, 3, 3))
+    example = asked(registers(0x006B, 3))
     assert RtuFraming().frame(example).hex() == "0103006b00037417"
     assert TcpFraming().frame(example).hex() == "0007000000060103006b0003"
 
@@ -60,11 +65,11 @@ def test_a_read_leaves_as_in_the_specification():
 @pytest.mark.parametrize("function", range(256))
 def test_only_functions_that_read_can_be_formed(function):
     if function in READ_FUNCTIONS and function != 43:
-        ReadRequest(function, b"\0\0\0\1", CountedReply(2), "")
+        ReadRequest(bytes([function]) + b"\0\0\0\1")
         return
     for body in (b"\0\0\0\1", b"\x0d\x01\x00", b"\x0e\x00\x00", b"\x0e\x05\x00", b""):
         with pytest.raises(ConfigError, match=f"function code {function} is never sent"):
-            ReadRequest(function, body, CountedReply(2), "")
+            ReadRequest(bytes([function]) + body)
 
 
 @on_both_wires

@@ -7,7 +7,11 @@ import pytest
 
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.identity import ExpectedIdentification, Identification, Signature
+from acquisition.modbus.identity import (
+    ExpectedIdentification,
+    ExpectedRegisters,
+    Identification,
+)
 from acquisition.modbus.ring_source import ModbusRingSettings
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
@@ -18,10 +22,9 @@ async def test_every_kind_of_read_brings_what_the_device_has(linked, bench_serve
     await link.open()
     assert await link.read(100, 60) == bytes(range(120))
     assert await link.read(101, 3, function=4) == bytes(range(2, 8))
-    assert await link.read_bits(8, 12) == bench.bits[1:3]
-    assert await link.read_bits(8, 12, function=1) == bytes(2)
-    assert await link.read_fifo(7) == bytes(range(62))
-    assert await link.read_fifo(8) == b""
+    assert await link.read(8, 12, function=2) == bench.bits[1:3]
+    assert await link.read(8, 12, function=1) == bytes(2)
+    assert await link.read_fifos([7, 8]) == [bytes(range(62)), b""]
     assert await link.identify() == Identification("Acme", "DAQ-12", "1.4")
     assert bench_server.function_codes == {3: 1, 4: 1, 2: 1, 1: 1, 0x18: 2, 43: 1}
 
@@ -32,7 +35,7 @@ async def test_a_long_read_is_split_at_what_the_device_gives_at_once(linked, ben
     assert await link.read(100, 100) == bytes(range(200))
     assert bench_server.function_codes == {3: 15}
     bench.bits = bytes(range(251)) * 2
-    assert await link.read_bits(0, 3000) == bench.bits[:375]
+    assert await link.read(0, 3000, function=2) == bench.bits[:375]
     assert bench_server.function_codes[2] == 2
 
 
@@ -40,7 +43,7 @@ async def test_a_queue_that_claims_more_than_31_registers_is_refused(linked):
     link = linked()
     await link.open()
     with pytest.raises(FrameError, match="FIFO count is 32, allowed is 0 to 31"):
-        await link.read_fifo(9)
+        await link.read_fifos([9])
 
 
 async def test_what_the_device_does_not_have_is_a_config_error_that_says_what_was_asked(linked):
@@ -50,7 +53,7 @@ async def test_what_the_device_does_not_have_is_a_config_error_that_says_what_wa
     with pytest.raises(ConfigError, match=asked):
         await link.read(399, 2, function=4)
     with pytest.raises(ConfigError, match="a read of the queue at 10"):
-        await link.read_fifo(10)
+        await link.read_fifos([10])
 
 
 @pytest.mark.parametrize(
@@ -59,9 +62,9 @@ async def test_what_the_device_does_not_have_is_a_config_error_that_says_what_wa
         (lambda link: link.read(65_535, 2), "2 at 65535 are asked, addresses are 0 to 65535"),
         (lambda link: link.read(-1, 1), "1 at -1 are asked"),
         (lambda link: link.read(0, 0), "0 at 0 are asked"),
-        (lambda link: link.read(0, 1, function=6), r"function is 6, allowed are \[3, 4\]"),
-        (lambda link: link.read_bits(0, 1, function=5), r"function is 5, allowed are \[1, 2\]"),
-        (lambda link: link.read_fifo(65_536), "1 at 65536 are asked"),
+        (lambda link: link.read(0, 1, function=6), "function is 6, allowed are 1, 2, 3 and 4"),
+        (lambda link: link.read(0, 1, function=5), "function is 5, allowed are"),
+        (lambda link: link.read_fifos([65_536]), "1 at 65536 are asked"),
     ],
 )
 async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, bench_server):
@@ -128,7 +131,7 @@ ring = partial(ModbusRingSettings, transport=TCP)
         (on_line, {"connection": ConnectionUse.PER_REPLY}, "serial line is kept"),
         (on_line, {"requests_in_flight": 2}, "requests_in_flight is 2, allowed is 1 to 1"),
         (on_tcp, {"requests_in_flight": 17}, "requests_in_flight is 17, allowed is 1 to 16"),
-        (ring, {"function": 6}, "function is 6, allowed are 3 and 4"),
+        (ring, {"function": 6}, "function is 6, allowed is 3 to 4"),
         (ring, {"base_address": 65521}, "allowed is 0 to 65520"),
         (ring, {"poll_period_s": 0.0}, "poll_period_s is 0.0, must"),
         (ring, {"stale_after_s": float("inf")}, "stale_after_s is inf"),
@@ -141,8 +144,8 @@ def test_what_cannot_be_is_refused_with_value_and_limit(kind, wrong, complaint):
 
 async def test_the_expected_device_is_read_and_another_one_is_not(linked, bench_server):
     for identity in (
-        Signature(address=101, words=(0x0203, 0x0405)),
-        Signature(address=101, words=(0x0203,), function=4),
+        ExpectedRegisters(address=101, words=(0x0203, 0x0405)),
+        ExpectedRegisters(address=101, words=(0x0203,), function=4),
         ExpectedIdentification(vendor="Acme"),
         ExpectedIdentification(product_code="DAQ-12", revision="1.4"),
     ):
@@ -151,14 +154,14 @@ async def test_the_expected_device_is_read_and_another_one_is_not(linked, bench_
         assert await link.read(100, 1) == b"\0\1"
         link.close()
     bench_server.inject("word_order")  # one changed reply does not make another device
-    await linked(identity=Signature(address=101, words=(0x0203, 0x0405))).open()
+    await linked(identity=ExpectedRegisters(address=101, words=(0x0203, 0x0405))).open()
 
 
 @pytest.mark.parametrize(
     ("identity", "complaint"),
     [
         (
-            Signature(address=101, words=(0x0203, 0x0406)),
+            ExpectedRegisters(address=101, words=(0x0203, 0x0406)),
             "registers at 101 are 0x0203 0x0405, expected are 0x0203 0x0406",
         ),
         (ExpectedIdentification(vendor="Emca"), "vendor is 'Acme', expected is 'Emca'"),
@@ -191,7 +194,7 @@ async def test_an_identification_that_is_no_text_is_shown_and_does_no_harm(linke
 def test_a_signature_is_made_of_words():
     for words in ((), (0x10000,), (-1,)):
         with pytest.raises(ConfigError, match="signature is"):
-            Signature(address=0, words=words)
+            ExpectedRegisters(address=0, words=words)
 
 
 async def test_an_identification_in_parts_is_read_to_its_end_and_one_without_end_is_refused(

@@ -34,7 +34,7 @@ def flag(mask: int = 0xFFFF, set_means=Meaning.BAD, ok_values=(), clipped_values
 
 def requests(values, **settings) -> list[tuple[int, int, int]]:
     plan = plan_reads(RegisterMap(values=tuple(values), **settings))
-    return [(r.function, r.start, r.count) for r in plan.requests]
+    return [(r.function, r.address, r.count) for r in plan.spans]
 
 
 def at(function: int, address: int = 5, **settings) -> MapValue:
@@ -95,15 +95,15 @@ def test_every_cell_is_in_one_request_and_every_request_holds_cells(layout, most
         address += skipped + values[-1].cell.n_places
     plan = plan_reads(RegisterMap(values=tuple(values), max_registers=most, max_gap=gap))
 
-    read = [a for r in plan.requests for a in range(r.start, r.stop)]
+    read = [a for r in plan.spans for a in range(r.address, r.stop)]
     named = {a for v in values for a in range(v.cell.start(0), v.cell.stop(0))}
     assert len(read) == len(set(read))
     assert named <= set(read)
-    assert all(r.count <= most for r in plan.requests)
+    assert all(r.count <= most for r in plan.spans)
     if gap == 0:
         assert named == set(read)
     for v in values:
-        plan.request_of(v.cell)
+        plan.span_of(v.cell)
 
 
 @pytest.mark.parametrize(

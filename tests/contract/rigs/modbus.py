@@ -93,7 +93,7 @@ class RingRig(Rig):
 
     def forget_stalls(self) -> None:
         """Let the device have as many requests in flight again as at first."""
-        self._settings.in_flight.now = self.requests_in_flight
+        self.source._client.requests_in_flight = self.requests_in_flight
 
     @property
     def n_kept(self) -> int:

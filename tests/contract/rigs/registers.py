@@ -11,11 +11,10 @@ from acquisition.delivery.raw import RawBlock
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
-from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap, Together
 from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.modbus.transport import TcpTransport
-from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer

@@ -17,13 +17,13 @@ MAPS = Path(__file__).parents[3] / "deploy" / "maps"
 def test_every_example_can_be_read(path: Path) -> None:
     decoder = MapDecoder(load_map_file(path).register_map())
 
-    assert decoder.plan.requests
-    assert all(request.count <= 125 for request in decoder.plan.requests)
+    assert decoder.plan.spans
+    assert all(request.count <= 125 for request in decoder.plan.spans)
 
 
 def test_an_skf_like_rack_is_read_as_its_manual_demands() -> None:
     registers = load_map_file(MAPS / "vector-rack-skf-like.toml").register_map()
-    requests = [(r.start, r.count) for r in MapDecoder(registers).plan.requests]
+    requests = [(r.address, r.count) for r in MapDecoder(registers).plan.spans]
 
     assert (608, 14) in requests
     amplitude = registers.values[0]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from acquisition.modbus.identity import ExpectedIdentification, Signature
+from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
 from core.spectra.vector_rows import VectorPart, VectorRow
 from service.settings.base import MisfitError
 from service.settings.modbus_identity import IdentitySettings
@@ -152,7 +152,7 @@ IDENTITY: TypeAdapter[IdentitySettings] = TypeAdapter(IdentitySettings)
 
 def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
     signature = {"kind": "signature", "address": 1000, "words": [0x0102, 7], "function": 4}
-    assert identity_of(IDENTITY.validate_python(signature)) == Signature(
+    assert identity_of(IDENTITY.validate_python(signature)) == ExpectedRegisters(
         address=1000, words=(0x0102, 7), function=4
     )
     identification = {"kind": "identification", "vendor": "Acme", "revision": "1.4"}

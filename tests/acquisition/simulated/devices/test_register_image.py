@@ -30,10 +30,10 @@ class Device:
 
     def content(self) -> bytes:
         parts = []
-        for request in self.decoder.plan.requests:
+        for request in self.decoder.plan.spans:
             image = self.image
             read = image.read_bits if request.function in (1, 2) else image.read_registers
-            parts.append(read(request.function, request.start, request.count))
+            parts.append(read(request.function, request.address, request.count))
         return b"".join(parts)
 
     def read(self) -> MapReading:

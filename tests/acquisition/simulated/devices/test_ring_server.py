@@ -9,7 +9,7 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.ring_profile import decode_header, decode_slot, decode_slow
+from acquisition.modbus.ring_profile import decode_header, decode_slots
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.register_memory import RegisterMemory
@@ -136,7 +136,7 @@ async def test_another_modbus_client_reads_the_same_registers_and_changes_none(p
 
 def slot_in(device: RingDevice, sequence: int):
     data = device.memory.read(device.layout.slot_address(sequence), device.layout.slot_registers)
-    return decode_slot(data, device.layout)
+    return decode_slots(data, device.layout)[0]
 
 
 def test_header_slow_values_and_slots_lie_where_the_header_says(counting_feed):
@@ -145,7 +145,8 @@ def test_header_slow_values_and_slots_lie_where_the_header_says(counting_feed):
     header = decode_header(device.memory.read(100, 16))
     assert header.layout == device.layout
     assert (header.epoch, header.newest) == (7, 2)
-    np.testing.assert_array_equal(decode_slow(device.memory.read(116, 4)), (45.0, np.nan))
+    slow = np.frombuffer(device.memory.read(116, 4), ">f4")
+    np.testing.assert_array_equal(slow, (45.0, np.nan))
     slot = slot_in(device, 2)
     assert (slot.sequence, slot.first_index, slot.ok_bits, slot.torn) == (2, 100, 0b11, False)
     assert slot.start_ns == 1_767_225_600 * 10**9 + 166_666_000

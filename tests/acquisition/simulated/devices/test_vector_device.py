@@ -8,9 +8,8 @@ import pytest
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.modbus.decoding import MapDecoder
-from acquisition.modbus.polled_source import PolledSettings, PolledSource
+from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.transport import TcpTransport
-from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.devices.vector_device import VectorDevice
 from core.machine.unit import Bearing, Channel, Measurand, Unit
@@ -77,7 +76,7 @@ def rack(calibration) -> VectorDevice:
 def test_a_rack_states_amplitudes_phases_and_gaps_in_its_own_conventions(rack) -> None:
     decoder = MapDecoder(load_map_file(RACK).register_map())
     content = b"".join(
-        rack.image.read_registers(r.function, r.start, r.count) for r in decoder.plan.requests
+        rack.image.read_registers(r.function, r.address, r.count) for r in decoder.plan.spans
     )
     found = dict(zip(decoder.map.ids, decoder.read(content).values, strict=True))
 

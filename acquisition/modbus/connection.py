@@ -1,17 +1,21 @@
-"""`ReplyProtocol`: requests in flight, and the replies that come to them in the same order."""
+"""`ReplyProtocol`: requests in flight on one connection; `SerialLine`: a port as a connection."""
 
 import asyncio
 import errno
 import os
+import termios
 from collections import deque
 from collections.abc import Sequence
 
-from acquisition.errors import FrameError, LinkError
+import serial
+
+from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import Asked, Framing, RtuFraming, TcpFraming
 from acquisition.modbus.transport import SerialTransport, Transport
 
 CLOSED = "the device closed the connection"
 _SHOWN_BYTES = 16
+_RECEIVE_BYTES = 1024
 
 
 def reason_of(error: OSError | EOFError) -> str:
@@ -27,12 +31,12 @@ class SilenceError(LinkError):
 
 
 class ReplyProtocol(asyncio.Protocol):
-    """One connection to a device.
+    """One connection to a device: requests, and the replies to them in the same order.
 
     Attributes
     ----------
     unasked
-        What came while nothing was in flight, as words; empty if nothing did.
+        Description of bytes that came while nothing was in flight; empty if none did.
     """
 
     def __init__(self, transport: Transport) -> None:
@@ -42,8 +46,8 @@ class ReplyProtocol(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._in_flight: deque[Asked] = deque()
         self._received = b""
-        self._replies: list[bytes] = []
-        self._done: asyncio.Future[list[bytes]] | None = None
+        self._replies: list[memoryview] = []
+        self._done: asyncio.Future[list[memoryview]] | None = None
         self._watch: asyncio.TimerHandle
         self.unasked = ""
 
@@ -57,16 +61,16 @@ class ReplyProtocol(asyncio.Protocol):
         if self._transport is not None:
             self._transport.close()
 
-    async def ask(self, burst: Sequence[Asked], timeout_s: float) -> list[bytes]:
-        """Send requests at once; return the replies from their function codes on.
+    async def ask(self, burst: Sequence[Asked], timeout_s: float) -> list[memoryview]:
+        """Send requests by one write; return the replies from their function codes on.
 
         Raises
         ------
         LinkError
-            If the connection is closed, or the device does not answer each in time, counted from
-            the answer before.
+            If the connection is closed, or the device does not answer each request in time,
+            counted from the reply before.
         FrameError
-            If what comes is not the next answer, or came before anything was asked.
+            If what comes is not the next reply, or came before anything was asked.
         """
         transport = self._transport
         if transport is None or transport.is_closing():
@@ -91,7 +95,7 @@ class ReplyProtocol(asyncio.Protocol):
         self._transport = transport  # type: ignore[assignment]
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Tell who waits for a reply at once."""
+        """End a wait for replies at once."""
         self._fail(LinkError(f"{self._where}: {CLOSED}" + (f": {exc}" if exc else "")))
 
     def data_received(self, data: bytes) -> None:
@@ -113,33 +117,98 @@ class ReplyProtocol(asyncio.Protocol):
             found = self._framing.take(received[at:], self._in_flight[0])
             if found is None:
                 return at
-            n_bytes, pdu = found
+            n_bytes, reply = found
             at += n_bytes
             self._in_flight.popleft()
-            self._replies.append(bytes(pdu))
+            self._replies.append(reply)
         if at < len(received):
             raise FrameError(f"{len(received) - at} bytes follow the reply")
         if self._done is not None and not self._done.done():
             self._done.set_result(self._replies)
         return at
 
-    def _look_at_time(self, timeout_s: float, n_seen: int) -> None:
-        """Give up if no reply has come since it was looked last."""
-        if len(self._replies) == n_seen:
-            self._fail(SilenceError(f"{self._where}: {self._no_answer(timeout_s)}"))
-        else:
-            self._watch_for(timeout_s)
-
     def _watch_for(self, timeout_s: float) -> None:
         loop = asyncio.get_running_loop()
         self._watch = loop.call_later(timeout_s, self._look_at_time, timeout_s, len(self._replies))
 
-    def _no_answer(self, timeout_s: float) -> str:
+    def _look_at_time(self, timeout_s: float, n_seen: int) -> None:
+        """Give up if no reply has come since the last look."""
+        if len(self._replies) > n_seen:
+            self._watch_for(timeout_s)
+            return
+        words = f"no answer within {timeout_s} s"
         if self._received:
-            return f"{len(self._received)} bytes of an answer, and no more within {timeout_s} s"
-        return f"no answer within {timeout_s} s"
+            words = f"{len(self._received)} bytes of an answer, and no more within {timeout_s} s"
+        self._fail(SilenceError(f"{self._where}: {words}"))
 
     def _fail(self, error: LinkError | FrameError) -> None:
         self._in_flight.clear()
         if self._done is not None and not self._done.done():
             self._done.set_exception(error)
+
+
+class SerialLine(asyncio.Transport):
+    """A serial port as an asyncio transport: what arrives goes to a protocol."""
+
+    def __init__(self, port: serial.Serial, protocol: asyncio.Protocol) -> None:
+        super().__init__()
+        self._port, self._protocol = port, protocol
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(port.fileno(), self._receive)
+        protocol.connection_made(self)
+
+    def is_closing(self) -> bool:
+        """Whether it is closed."""
+        return not self._port.is_open
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        """Send a request; a port that does not take it at once is lost."""
+        try:
+            self._port.write(data)
+        except OSError as error:
+            self._lose(error)
+
+    def close(self) -> None:
+        """Give the port back; again is harmless."""
+        self._lose(None)
+
+    def _receive(self) -> None:
+        try:
+            data = self._port.read(_RECEIVE_BYTES)
+        except (OSError, TypeError) as error:  # pyserial subtracts from None where a line is gone
+            self._lose(OSError(str(error)))
+            return
+        if data:
+            self._protocol.data_received(data)
+
+    def _lose(self, error: OSError | None) -> None:
+        if self._port.is_open:
+            self._loop.remove_reader(self._port.fileno())
+            self._port.close()
+            self._protocol.connection_lost(error)
+
+
+def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLine:
+    """Open a port for this program alone.
+
+    Raises
+    ------
+    LinkError
+        If there is no such port, or another program has it.
+    ConfigError
+        If the port refuses its settings.
+    """
+    port = serial.Serial()
+    port.port, port.baudrate, port.stopbits = settings.device, settings.baudrate, settings.stop_bits
+    port.parity, port.exclusive, port.write_timeout = settings.parity[0].upper(), True, 0
+    try:
+        port.open()
+        port.timeout = 0  # configures it again: a port reports an ignored setting only then
+    except termios.error as error:  # of a port that exists but cannot be set up so
+        port.close()
+        kind = ConfigError if error.args[0] == errno.EINVAL else LinkError
+        raise kind(f"{settings}: the port refuses its settings: {error.args[-1]}") from None
+    except (OSError, EOFError) as error:
+        port.close()
+        raise LinkError(f"{settings}: {reason_of(error)}") from None
+    return SerialLine(port, protocol)
