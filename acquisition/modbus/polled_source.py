@@ -61,18 +61,14 @@ class MapReader:
             yield
 
     async def read(self) -> MapReading:
-        """Read and decode everything once; from the right device, also if connections are not kept.
+        """Read and decode all values; from the right device, also if connections are not kept.
 
         Raises
         ------
         LinkError, ConfigError
             As `connected`.
         """
-        with wrong_replies_drop_the_link():
-            if not self._client.is_kept:
-                await self._client.require_device()
-                await self._require_signature()
-            return self._decoder.read(await self._content(self._decoder.plan))
+        return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
         """Read everything once: the bytes that `MapDecoder.read` takes.
@@ -83,6 +79,9 @@ class MapReader:
             As `connected`.
         """
         with wrong_replies_drop_the_link():
+            if not self._client.is_kept:
+                await self._client.require_device()
+                await self._require_signature()
             return await self._content(self._decoder.plan)
 
     async def _require_signature(self) -> None:

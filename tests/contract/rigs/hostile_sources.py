@@ -17,7 +17,7 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from rigs.hostile_modbus import HostileLine, HostileServer, rtu_frame
 from rigs.modbus import InFlightRig, ModbusRig, ModbusRtuRig
-from rigs.registers import REGISTER_RIGS
+from rigs.registers import REGISTER_RIGS, ChannelFifoInFlightRig, VectorInFlightRig
 
 TIMEOUT_S = 0.25
 """A right reply takes milliseconds; a busy machine may take a hundred."""
@@ -253,6 +253,8 @@ KINDS = {
     for source, kind in [
         *(("ring", _ring(rig)) for rig in (ModbusRig, ModbusRtuRig)),
         ("ring in flight", _ring(InFlightRig)),
+        ("vector in flight", _kind(VectorInFlightRig)),
+        ("queues in flight", _kind(ChannelFifoInFlightRig)),
         *zip(_REGISTERS, map(_kind, REGISTER_RIGS), strict=True),
     ]
 }
@@ -285,8 +287,7 @@ class Trial:
 
         while self.n_told < n_lies:
             ear.n_honest, ear.lie = int(self._random.integers(MAX_HONEST)), lie
-            if isinstance(self._rig, InFlightRig):
-                self._rig.forget_stalls()
+            self._rig.forget_stalls()
             try:
                 await self._read()
             except (LinkError, ConfigError):

@@ -5,6 +5,7 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 from acquisition.clock import SystemClock
+from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
@@ -26,6 +27,7 @@ class Rig:
 
     absence: str
     keeps = True
+    requests_in_flight = 1
     n_kept = 0
     """Samples that have been offered, if the device keeps them all until they are read."""
 
@@ -36,6 +38,7 @@ class Rig:
         self._server: ModbusServer
         self.step_samples = 1
         self.source: SampleSource
+        self.client: ModbusClient
 
     async def __aexit__(self, *_: object) -> None:
         await self.pull()
@@ -46,6 +49,10 @@ class Rig:
 
     async def pull(self) -> None:
         await self._plug.aclose()
+
+    def forget_stalls(self) -> None:
+        """Let the device have as many requests in flight again as at first."""
+        self.client.requests_in_flight = self.requests_in_flight
 
     def _serve(self, device: ModbusDevice) -> ModbusServer:
         return ModbusTcpServer(device)
@@ -75,25 +82,21 @@ class RingRig(Rig):
     """A block ring; the plant runs when `run` is called."""
 
     shape = RingDeviceSettings()
-    requests_in_flight = 1
 
     async def __aenter__(self) -> "RingRig":
         self.device = RingDevice(self._feed, settings=self.shape)
         self.step_samples = self.shape.samples_per_slot
         self._server = self._serve(self.device)
         await self.plug_in()
-        self._settings = ModbusRingSettings(
+        settings = ModbusRingSettings(
             transport=self._transport(),
             poll_period_s=0.001,
             timeout_s=self.timeout_s,
             requests_in_flight=self.requests_in_flight,
         )
-        self.source = ModbusRingSource(self._settings, self._calibration, SystemClock())
+        self.source = ModbusRingSource(settings, self._calibration, SystemClock())
+        self.client = self.source._client
         return self
-
-    def forget_stalls(self) -> None:
-        """Let the device have as many requests in flight again as at first."""
-        self.source._client.requests_in_flight = self.requests_in_flight
 
     @property
     def n_kept(self) -> int:

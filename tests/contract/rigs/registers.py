@@ -71,11 +71,13 @@ class _PolledRig(Rig):
             transport=self._transport(),
             poll_period_s=1.0 / self._calibration.rate_hz,
             timeout_s=self.timeout_s,
+            requests_in_flight=self.requests_in_flight,
         )
         self._source = PolledSource(
             settings, registers(self.rows), self.rows, self._source_calibration(), self._clock
         )
         self.source = _Counted(self._source)
+        self.client = self._source._reader._client
         return self
 
     def _source_calibration(self):
@@ -144,12 +146,19 @@ class _FifoRig(Rig):
         self._beside = ModbusTcpServer(beside)
         await self._beside.__aenter__()
         settings = FifoSettings(
-            transport=self._transport(), poll_period_s=0.001, timeout_s=self.timeout_s
+            transport=self._transport(),
+            poll_period_s=0.001,
+            timeout_s=self.timeout_s,
+            requests_in_flight=self.requests_in_flight,
         )
         # patient, for a busy machine: no trouble of this device is part of any test here
         polled = PolledSettings(transport=TcpTransport(**self._beside.endpoint), timeout_s=60.0)
+        source = FifoSource(
+            settings, self.layout, without_slow(self._calibration, ids), self._clock
+        )
+        self.client = source._client
         self.source = JoinedSource(
-            FifoSource(settings, self.layout, without_slow(self._calibration, ids), self._clock),
+            source,
             PolledSlowValues(polled, registers(()), self._calibration.slow, SystemClock()),
         )
         return self
@@ -187,6 +196,18 @@ class ChannelFifoTcpRig(OnTcp, _FifoRig):
     """A queue for each channel, over Modbus TCP."""
 
     layout = FifoLayout(addresses=(1000, 1100), n_channels=2, kind=FifoKind.PER_CHANNEL)
+
+
+class VectorInFlightRig(VectorTcpRig):
+    """A vector rack, asked for all its registers at once."""
+
+    requests_in_flight = 6
+
+
+class ChannelFifoInFlightRig(ChannelFifoTcpRig):
+    """A queue for each channel, all asked at once."""
+
+    requests_in_flight = 6
 
 
 REGISTER_RIGS = [
