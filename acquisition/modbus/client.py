@@ -19,7 +19,7 @@ from acquisition.modbus.connection import (
     open_line,
     reason_of,
 )
-from acquisition.modbus.framing import Asked
+from acquisition.modbus.framing import PendingRequest
 from acquisition.modbus.identity import ExpectedRegisters, Identification, Identity
 from acquisition.modbus.requests import (
     BUSY,
@@ -51,7 +51,7 @@ _N_IDENTITY_TRIES = 2
 _MAX_SILENCE_TRIES = 5
 _MAX_CLOSED_BURSTS = 2
 _BUSY_WAIT_S = 0.05
-"""Before a device that is busy is asked again: some replies, and less than a poll period."""
+"""Wait before a request to a busy device is repeated: some replies, less than a poll period."""
 
 
 class ModbusClient:
@@ -186,7 +186,7 @@ class ModbusClient:
         step = self._settings.max_registers
         requests = [request for span in spans for request in span_requests(span, step)]
         at = 0
-        for reply in await self._ask(requests):
+        for reply in await self._replies(requests):
             stop = at + len(reply) - 2
             out[at:stop] = reply[2:]
             at = stop
@@ -199,7 +199,7 @@ class ModbusClient:
         LinkError, FrameError, ConfigError
             As `read_into`; a FrameError too if the device claims more than 31.
         """
-        replies = await self._ask([fifo_request(address) for address in addresses])
+        replies = await self._replies([fifo_request(address) for address in addresses])
         return [fifo_registers(reply) for reply in replies]
 
     async def identify(self) -> Identification:
@@ -213,7 +213,7 @@ class ModbusClient:
         objects: dict[int, bytes] = {}
         following: int | None = 0
         for _ in range(_MAX_IDENTIFICATION_REPLIES):
-            [reply] = await self._ask([identification_request(following or 0)])
+            [reply] = await self._replies([identification_request(following or 0)])
             found, following = identification_objects(reply)
             objects |= found
             if following is None:
@@ -228,18 +228,18 @@ class ModbusClient:
             return identity.misfit(found)
         return identity.misfit(await self.identify())
 
-    async def _ask(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
+    async def _replies(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
         """Replies to requests, from their function codes on."""
         replies: list[memoryview] = []
         while len(replies) < len(requests):
             burst = requests[len(replies) : len(replies) + self.requests_in_flight]
             for request, reply in zip(burst, await self._exchange(burst), strict=True):
                 is_refusal = reply[0] & EXCEPTION_BIT
-                replies.append(await self._ask_again(request, reply) if is_refusal else reply)
+                replies.append(await self._retry_busy(request, reply) if is_refusal else reply)
         return replies
 
-    async def _ask_again(self, request: ReadRequest, reply: memoryview) -> memoryview:
-        """Ask a device that is busy again, for as long as a reply may take."""
+    async def _retry_busy(self, request: ReadRequest, reply: memoryview) -> memoryview:
+        """Repeat a request to a busy device, for as long as a reply may take."""
         for _ in range(int(self._settings.timeout_s / _BUSY_WAIT_S)):
             if reply[1] != BUSY:
                 break
@@ -257,8 +257,8 @@ class ModbusClient:
                 await self._connect()
             if isinstance(transport, SerialTransport):
                 await asyncio.sleep(transport.frame_gap_s)
-            asked = [Asked(request, unit, next(self._transactions)) for request in burst]
-            replies = await self._protocol.ask(asked, self._settings.timeout_s)
+            pending = [PendingRequest(request, unit, next(self._transactions)) for request in burst]
+            replies = await self._protocol.exchange(pending, self._settings.timeout_s)
         except (AcquisitionError, asyncio.CancelledError) as error:
             self.close()
             if len(burst) > 1 and self._shows_too_many(error):
@@ -292,7 +292,7 @@ class ModbusClient:
         """Connect to the first address of the device that answers."""
         try:
             transport.host.encode("idna")
-        except ValueError as error:  # a host name that no resolver can even be asked for
+        except ValueError as error:  # no resolver takes such a host name
             raise ConfigError(f"{self.where}: {error}") from error
         if self._addresses is None:
             self._addresses = KnownAddresses(transport.host, transport.port)
@@ -326,15 +326,15 @@ class ModbusClient:
         protocol, timeout_s = self._protocol, self._settings.timeout_s
         try:
             for _ in range(_MAX_SILENCE_TRIES):
-                protocol.unasked = ""
+                protocol.unsolicited = ""
                 await asyncio.sleep(timeout_s)
                 if not protocol.is_open:
                     raise LinkError(f"{self.where}: {CLOSED}")
-                if not protocol.unasked:
+                if not protocol.unsolicited:
                     return
             raise LinkError(
                 f"{self.where}: the line was not silent for {timeout_s} s"
-                f" within {_MAX_SILENCE_TRIES * timeout_s:g} s: {protocol.unasked}"
+                f" within {_MAX_SILENCE_TRIES * timeout_s:g} s: {protocol.unsolicited}"
             )
         except (LinkError, asyncio.CancelledError):
             self.close()

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import serial
 
 from acquisition.errors import ConfigError, FrameError, LinkError
-from acquisition.modbus.framing import Asked, Framing, RtuFraming, TcpFraming
+from acquisition.modbus.framing import Framing, PendingRequest, RtuFraming, TcpFraming
 from acquisition.modbus.transport import SerialTransport, Transport
 
 CLOSED = "the device closed the connection"
@@ -35,7 +35,7 @@ class ReplyProtocol(asyncio.Protocol):
 
     Attributes
     ----------
-    unasked
+    unsolicited
         Description of bytes that came while nothing was in flight; empty if none did.
     """
 
@@ -44,12 +44,12 @@ class ReplyProtocol(asyncio.Protocol):
         self._framing: Framing = RtuFraming() if is_line else TcpFraming()
         self._where = str(transport)
         self._transport: asyncio.Transport | None = None
-        self._in_flight: deque[Asked] = deque()
+        self._in_flight: deque[PendingRequest] = deque()
         self._received = b""
         self._replies: list[memoryview] = []
         self._done: asyncio.Future[list[memoryview]] | None = None
         self._watch: asyncio.TimerHandle
-        self.unasked = ""
+        self.unsolicited = ""
 
     @property
     def is_open(self) -> bool:
@@ -61,7 +61,7 @@ class ReplyProtocol(asyncio.Protocol):
         if self._transport is not None:
             self._transport.close()
 
-    async def ask(self, burst: Sequence[Asked], timeout_s: float) -> list[memoryview]:
+    async def exchange(self, burst: Sequence[PendingRequest], timeout_s: float) -> list[memoryview]:
         """Send requests by one write; return the replies from their function codes on.
 
         Raises
@@ -70,18 +70,18 @@ class ReplyProtocol(asyncio.Protocol):
             If the connection is closed, or the device does not answer each request in time,
             counted from the reply before.
         FrameError
-            If what comes is not the next reply, or came before anything was asked.
+            If what comes is not the next reply, or came before any request.
         """
         transport = self._transport
         if transport is None or transport.is_closing():
             raise LinkError(f"{self._where}: {CLOSED}")
-        if self.unasked:
-            raise FrameError(f"{self._where}: {self.unasked}")
+        if self.unsolicited:
+            raise FrameError(f"{self._where}: {self.unsolicited}")
         loop = asyncio.get_running_loop()
         self._done, self._replies, self._received = loop.create_future(), [], b""
         self._in_flight.extend(burst)
         self._watch_for(timeout_s)
-        transport.write(b"".join([self._framing.frame(asked) for asked in burst]))
+        transport.write(b"".join([self._framing.frame(pending) for pending in burst]))
         try:
             return await self._done
         finally:
@@ -101,7 +101,7 @@ class ReplyProtocol(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Judge what came as replies to what is in flight."""
         if not self._in_flight:
-            self.unasked = f"{len(data)} bytes came unasked: {data[:_SHOWN_BYTES].hex()}"
+            self.unsolicited = f"{len(data)} bytes came unsolicited: {data[:_SHOWN_BYTES].hex()}"
             return
         received = memoryview(self._received + data if self._received else data)
         try:

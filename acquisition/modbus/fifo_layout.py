@@ -50,11 +50,16 @@ class FifoLayout:
     Parameters
     ----------
     addresses
-        Of the queue, or of one queue for each channel; as on the wire, from 0.
+        Of the queue, or of one queue for each channel; counted from 0 as on the wire.
     has_counter
         Unsigned 16 bit, one more with every sample, wrapping to 0.
     removes
-        Whether reading takes the samples out of the queue; makers differ.
+        Whether reading removes the samples from the queue; devices differ.
+
+    Raises
+    ------
+    MapError
+        If no device can have such queues, or their samples could not be put in order.
     """
 
     addresses: tuple[int, ...]

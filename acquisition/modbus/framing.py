@@ -14,8 +14,8 @@ _MBAP = struct.Struct(">HHHB")
 _POLYNOMIAL, _CRC_START = 0xA001, 0xFFFF
 
 
-class Asked(NamedTuple):
-    """A request that is in flight to a unit; RTU has no transaction."""
+class PendingRequest(NamedTuple):
+    """A request in flight to a unit; RTU has no transaction."""
 
     request: ReadRequest
     unit: int
@@ -25,11 +25,11 @@ class Asked(NamedTuple):
 class Framing(Protocol):
     """Form of requests and replies on a wire."""
 
-    def frame(self, asked: Asked) -> bytes:
+    def frame(self, pending: PendingRequest) -> bytes:
         """Bytes of a request."""
         ...
 
-    def take(self, data: memoryview, asked: Asked) -> tuple[int, memoryview] | None:
+    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
         """Judge received bytes as the reply to a request.
 
         Returns
@@ -48,43 +48,43 @@ class Framing(Protocol):
 class TcpFraming:
     """Modbus TCP: transaction, protocol, length and unit before the reply."""
 
-    def frame(self, asked: Asked) -> bytes:
+    def frame(self, pending: PendingRequest) -> bytes:
         """Bytes of a request."""
-        pdu = asked.request.pdu
-        return _MBAP.pack(asked.transaction, 0, len(pdu) + 1, asked.unit) + pdu
+        pdu = pending.request.pdu
+        return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
 
-    def take(self, data: memoryview, asked: Asked) -> tuple[int, memoryview] | None:
+    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
         """Judge received bytes; see `Framing`."""
         if len(data) <= _MBAP.size:
             return None
         transaction, protocol, length, unit = _MBAP.unpack_from(data)
-        found, expected = (transaction, protocol, unit), (asked.transaction, 0, asked.unit)
+        found, expected = (transaction, protocol, unit), (pending.transaction, 0, pending.unit)
         if found != expected:
             raise FrameError(f"transaction, protocol and unit id are {found}, expected {expected}")
         n_stated = length - 1
         pdu = data[_MBAP.size : _MBAP.size + max(n_stated, 1)]
-        n_arrived, n_least = len(pdu), asked.request.least_bytes(pdu)
+        n_arrived, n_min = len(pdu), pending.request.min_bytes(pdu)
         # a reply whose length is not known from the request has to agree with itself
-        if n_stated < n_least or n_stated > MAX_PDU_BYTES or (n_arrived >= n_least < n_stated):
-            raise FrameError(f"length is {length}, expected {n_least + 1}")
+        if n_stated < n_min or n_stated > MAX_PDU_BYTES or (n_arrived >= n_min < n_stated):
+            raise FrameError(f"length is {length}, expected {n_min + 1}")
         return (_MBAP.size + n_stated, pdu) if n_arrived == n_stated else None
 
 
 class RtuFraming:
     """Modbus RTU: unit before the reply, CRC-16 behind it."""
 
-    def frame(self, asked: Asked) -> bytes:
+    def frame(self, pending: PendingRequest) -> bytes:
         """Bytes of a request."""
-        body = bytes((asked.unit,)) + asked.request.pdu
+        body = bytes((pending.unit,)) + pending.request.pdu
         return body + crc16(body).to_bytes(2, "little")
 
-    def take(self, data: memoryview, asked: Asked) -> tuple[int, memoryview] | None:
+    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
         """Judge received bytes; see `Framing`."""
         if len(data) < 2:
             return None
-        if data[0] != asked.unit:
-            raise FrameError(f"unit id is {data[0]}, expected {asked.unit}")
-        end = 1 + asked.request.least_bytes(data[1:])
+        if data[0] != pending.unit:
+            raise FrameError(f"unit id is {data[0]}, expected {pending.unit}")
+        end = 1 + pending.request.min_bytes(data[1:])
         if len(data) < end + 2:
             return None
         found, expected = int.from_bytes(data[end : end + 2], "little"), crc16(data[:end])

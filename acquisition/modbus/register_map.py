@@ -1,4 +1,4 @@
-"""`RegisterMap`: everything that is read from one device, as its manual describes it."""
+"""`RegisterMap`: the values of one device, as its manual describes them."""
 
 import math
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ MAX_MASK = 0xFFFF
 
 
 class Meaning(StrEnum):
-    """What it means that bits of a status register are set."""
+    """Meaning of a set bit of a status register."""
 
     BAD = "bad"
     OK = "ok"
@@ -33,19 +33,19 @@ class Meaning(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class FlagCheck:
-    """What a status register says of a value; either by bits or by numbers.
+    """State of a value by a status register: by its bits, or by its numbers.
 
     Parameters
     ----------
     mask
-        Bits that count. Numbers are compared after they were shifted to its lowest bit. Of a cell
-        that is a single bit, that one.
+        Bits that count; numbers are shifted to its lowest bit before they are compared. Always 1
+        for a cell that is a single bit.
     set_means
         "bad": the value is bad if any of these bits is set. "ok": it is bad unless all are.
     ok_values
-        Numbers that mean a good value, instead of `set_means`; all others are bad.
+        Numbers of a good value, instead of `set_means`; all others are bad.
     clipped_values
-        Numbers that mean a clipped value.
+        Numbers of a clipped value.
     """
 
     cell: Cell
@@ -84,7 +84,7 @@ class FlagCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class ScaleRegister:
-    """A register that says what a full mantissa stands for: value = raw / divisor * register."""
+    """Register with the value of a full mantissa: value = raw / divisor * register."""
 
     cell: Cell
     divisor: float = 32767.0
@@ -101,7 +101,7 @@ class FullScale:
     Parameters
     ----------
     minimum, maximum
-        What the ends stand for: numbers, or where the device says so.
+        Values at the ends: numbers, or the cells of the device that hold them.
     """
 
     minimum: float | Cell
@@ -118,15 +118,15 @@ class FullScale:
 
 @dataclass(frozen=True, kw_only=True)
 class MapValue:
-    """One value of a device: value = raw * scale + offset, or as scale register or range say.
+    """One value of a device: raw * scale + offset, with a scale register or a range before that.
 
     Parameters
     ----------
     invalid_values
-        Raw numbers that stand for no value; of integers their bits count, so that 0x8000 is -32768.
-        Not-a-number always does.
+        Raw numbers of no value; integers are compared by their bits, so that 0x8000 is -32768.
+        Not-a-number is always one.
     invalid_below, invalid_above
-        Raw numbers beyond these stand for an error.
+        Raw numbers beyond these are errors.
     """
 
     id: str
@@ -157,7 +157,7 @@ class MapValue:
                     )
 
     def cells(self) -> Iterator[Cell]:
-        """All that has to be read for it, its own number first."""
+        """Cells that are read for it, its own number first."""
         yield self.cell
         if self.scale_register is not None:
             yield self.scale_register.cell
@@ -188,7 +188,7 @@ class Together:
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """A register that tells this device from others: read once on connecting."""
+    """Number by which the device is identified; read on connecting."""
 
     cell: Cell
     expected: float
@@ -196,7 +196,7 @@ class Signature:
 
 @dataclass(frozen=True, kw_only=True)
 class RegisterMap:
-    """What is read from a device.
+    """Values of a device, and how they must be read.
 
     Parameters
     ----------
@@ -205,18 +205,18 @@ class RegisterMap:
     together
         Blocks that must not be split.
     heartbeat
-        A counter that changes whenever the device has measured anew.
+        A counter that changes with each measurement of the device.
     time
-        When the device measured, by its own clock.
+        Time of the measurement by the device's own clock.
     signature
-        What must be found before anything is believed.
+        Numbers that the device must hold before any value is used.
     max_registers
         Most registers in one read, 1 to 125.
     max_gap
-        Registers that are not configured and may be read along to save a request. One that the
-        device does not have fails the whole read.
+        Unconfigured registers that may be read between two cells to save a request. If the device
+        does not have one of them, the whole read fails.
     min_poll_period_s, min_timeout_s
-        What the manual asks for.
+        Limits of the manual.
     """
 
     values: tuple[MapValue, ...]
@@ -244,7 +244,7 @@ class RegisterMap:
         self._require_apart()
 
     def cells(self) -> Iterator[tuple[Cell, tuple[int | str, ...]]]:
-        """Everything that is read in every poll, and where it stands in the map."""
+        """Cells that are read in every poll, each with its place in the map."""
         for n, value in enumerate(self.values):
             yield from ((cell, ("value", n)) for cell in value.cells())
         if self.heartbeat is not None:

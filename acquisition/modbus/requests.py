@@ -118,7 +118,7 @@ class ReadRequest:
             )
 
     def __str__(self) -> str:
-        """What is asked for; example: "a read of 2 at 100, function 3"."""
+        """Description of the request; example: "a read of 2 at 100, function 3"."""
         match self.pdu[0]:
             case 0x18:
                 return f"a read of the queue at {int.from_bytes(self.pdu[1:3], 'big')}"
@@ -127,7 +127,7 @@ class ReadRequest:
         function, address, count = _SPAN_REQUEST.unpack(self.pdu)
         return f"a read of {count} at {address}, function {function}"
 
-    def least_bytes(self, reply: memoryview) -> int:
+    def min_bytes(self, reply: memoryview) -> int:
         """Bytes that the reply has, or has at least, by what has arrived of it.
 
         Parameters

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 
+from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.epochs import Epochs
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, FrameError
@@ -98,17 +99,17 @@ class RingFollower:
 
     Parameters
     ----------
-    n_channels, rate_hz, n_slow
-        What the device must offer.
+    calibration
+        Its channels, rate and slow channels are those that the device must have.
     begun_ns
         When this life of the adapter began, UTC.
     """
 
-    def __init__(self, n_channels: int, rate_hz: float, n_slow: int, begun_ns: int) -> None:
+    def __init__(self, calibration: UnitCalibration, begun_ns: int) -> None:
         self._expected = {
-            "n_channels": n_channels,
-            "rate in mHz": round(rate_hz * 1000.0),
-            "n_slow": n_slow,
+            "n_channels": len(calibration.channels),
+            "rate in mHz": round(calibration.rate_hz * 1000.0),
+            "n_slow": len(calibration.slow),
         }
         self._header: RingHeader | None = None
         self._timeline: Timeline

@@ -61,12 +61,7 @@ class ModbusRingSource:
         self._reader = RingReader(self._client, settings.base_address, settings.function)
         self._delivery = Delivery(calibration)
         self._clock = clock
-        self._follower = RingFollower(
-            len(calibration.channels),
-            calibration.rate_hz,
-            len(calibration.slow),
-            begun_ns=clock.now_ns(),
-        )
+        self._follower = RingFollower(calibration, begun_ns=clock.now_ns())
         self._fresh_at_s = 0.0
         self._stale_after_s = settings.stale_after_s
         self._slot_s = 0.0

@@ -34,11 +34,6 @@ class PolledSlowValues:
     channels
         The slow channels that it measures.
 
-    Attributes
-    ----------
-    trouble
-        Why it has no values, in words; None while it has.
-
     Raises
     ------
     ConfigError
@@ -59,15 +54,15 @@ class PolledSlowValues:
         self._freshness = Freshness("nothing that is read", settings.stale_after_s)
         self._newest: tuple[float, Mapping[str, Reading]] | None = None
         self._task: asyncio.Task[None] | None = None
-        self._asked = asyncio.Event()
-        self.trouble: str | None = "not asked yet"
+        self._tried = asyncio.Event()
+        self._is_lost = True
 
     @asynccontextmanager
     async def watch(self) -> AsyncIterator[None]:
         """Poll in the background until the context is left; entering waits for the first poll."""
         self._task = task = asyncio.create_task(self._run(), name="poll slow values")
         try:
-            await self._asked.wait()
+            await self._tried.wait()
             self._raise_bug()
             yield
         finally:
@@ -83,7 +78,7 @@ class PolledSlowValues:
         polled_s, readings = self._newest
         if self._clock.monotonic_s() - polled_s <= self._settings.stale_after_s:
             return readings
-        return self._missing(Reason.STALE if self.trouble is None else Reason.NOT_CONNECTED)
+        return self._missing(Reason.NOT_CONNECTED if self._is_lost else Reason.STALE)
 
     def _raise_bug(self) -> None:
         """Raise what has ended the polling task: any error but that of a link."""
@@ -98,7 +93,7 @@ class PolledSlowValues:
             try:
                 await self._poll()
             except AcquisitionError as error:
-                self.trouble = str(error)
+                self._is_lost = True
                 await self._clock.sleep(self._retry_s(error))
 
     def _retry_s(self, error: AcquisitionError) -> float:
@@ -116,11 +111,11 @@ class PolledSlowValues:
                     now_s = self._clock.monotonic_s()
                     self._freshness.note(reading.alive, now_s)
                     self._newest = (now_s, self._readings(reading))
-                    self.trouble = None
-                    self._asked.set()
+                    self._is_lost = False
+                    self._tried.set()
                     await self._clock.sleep(self._settings.poll_period_s)
         finally:
-            self._asked.set()
+            self._tried.set()
 
     def _readings(self, reading: MapReading) -> Mapping[str, Reading]:
         return {

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU
 
 from acquisition.errors import ConfigError, FrameError
-from acquisition.modbus.framing import Asked, RtuFraming, TcpFraming
+from acquisition.modbus.framing import PendingRequest, RtuFraming, TcpFraming
 from acquisition.modbus.requests import (
     READ_FUNCTIONS,
     ReadRequest,
@@ -37,8 +37,8 @@ WIRES = {"tcp": (TcpFraming(), tcp_frame), "rtu": (RtuFraming(), rtu_frame)}
 on_both_wires = pytest.mark.parametrize(("framing", "frame"), WIRES.values(), ids=WIRES.keys())
 
 
-def asked(request: ReadRequest | None = None) -> Asked:
-    return Asked(request or registers(100, 5), unit=1, transaction=7)
+def asked(request: ReadRequest | None = None) -> PendingRequest:
+    return PendingRequest(request or registers(100, 5), unit=1, transaction=7)
 
 
 def reply(framing, data: bytes, request: ReadRequest | None = None) -> bytes | None:
