@@ -1,4 +1,4 @@
-"""`ModbusRingSource`: a DAQ with a block ring as a sample source."""
+"""`RingSource`: a DAQ with a block ring as a sample source."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
@@ -23,7 +23,7 @@ _MIN_STALE_SLOTS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModbusRingSettings(LinkSettings):
+class RingSettings(LinkSettings):
     """A block ring behind a Modbus device.
 
     Parameters
@@ -50,12 +50,10 @@ class ModbusRingSettings(LinkSettings):
         require_above_zero(self, "poll_period_s", "stale_after_s")
 
 
-class ModbusRingSource:
+class RingSource:
     """Samples of one unit from a block ring; a new connection continues after the last slot."""
 
-    def __init__(
-        self, settings: ModbusRingSettings, calibration: UnitCalibration, clock: Clock
-    ) -> None:
+    def __init__(self, settings: RingSettings, calibration: UnitCalibration, clock: Clock) -> None:
         self._settings = settings
         self._client = ModbusClient(settings)
         self._reader = RingReader(self._client, settings.base_address, settings.function)

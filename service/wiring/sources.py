@@ -6,7 +6,7 @@ from functools import partial
 from acquisition.can.source import CanSource
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.source import SampleSource
 from core.monitor.monitor import UnitMonitor
@@ -95,7 +95,7 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
     source = unit.source
     match source:
         case sources.ModbusRingSettings():
-            return ModbusRingSource(_ring_settings(source), calibration, clock)
+            return RingSource(_ring_settings(source), calibration, clock)
         case modbus_sources.ModbusFifoSettings():
             return fifo_source(source, calibration, clock)
         case modbus_sources.ModbusPolledSettings():
@@ -108,8 +108,8 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
 
 
-def _ring_settings(source: sources.ModbusRingSettings) -> ModbusRingSettings:
-    return ModbusRingSettings(
+def _ring_settings(source: sources.ModbusRingSettings) -> RingSettings:
+    return RingSettings(
         **link_fields(source),
         function=source.function,
         base_address=source.base_address,

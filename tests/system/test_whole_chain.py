@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
@@ -92,8 +92,8 @@ async def read_over_modbus(
     monitor = UnitMonitor(machine, AnalysisSettings(n_segments=n_hops))
     newest: dict[str, Assessment] = {}
     async with ModbusTcpServer(device) as server:
-        settings = ModbusRingSettings(transport=TcpTransport(host="127.0.0.1", port=server.port))
-        source = ModbusRingSource(settings, calibration, UnpacedClock(device))
+        settings = RingSettings(transport=TcpTransport(host="127.0.0.1", port=server.port))
+        source = RingSource(settings, calibration, UnpacedClock(device))
         async with source.connect() as blocks:
             async for block in blocks:
                 newest |= {a.bearing: a for a in monitor.ingest(block)}

@@ -12,7 +12,7 @@ from acquisition.clock import SystemClock
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import RegisterMap
-from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.register_memory import RegisterMemory
@@ -82,13 +82,13 @@ def link_to() -> Callable[..., ModbusClient]:
 
 
 @pytest.fixture
-def source_at(counts_calibration) -> Callable[..., ModbusRingSource]:
+def source_at(counts_calibration) -> Callable[..., RingSource]:
     """Builds sources for a port; other settings as keywords."""
 
-    def build(port: int, clock=None, calibration=None, **settings) -> ModbusRingSource:
+    def build(port: int, clock=None, calibration=None, **settings) -> RingSource:
         settings = {"poll_period_s": 0.001, "timeout_s": 5.0} | settings
-        return ModbusRingSource(
-            ModbusRingSettings(transport=TcpTransport(host="127.0.0.1", port=port), **settings),
+        return RingSource(
+            RingSettings(transport=TcpTransport(host="127.0.0.1", port=port), **settings),
             calibration or counts_calibration(n_channels=3),
             clock or SystemClock(),
         )

@@ -12,7 +12,7 @@ from acquisition.modbus.identity import (
     ExpectedRegisters,
     Identification,
 )
-from acquisition.modbus.ring_source import ModbusRingSettings
+from acquisition.modbus.ring_source import RingSettings
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 
@@ -113,7 +113,7 @@ TCP = TcpTransport(host="127.0.0.1")
 LINE = SerialTransport(device="/dev/ttyUSB0")
 tcp, line = partial(TcpTransport, host="daq"), partial(SerialTransport, device="/dev/tty")
 on_tcp, on_line = partial(LinkSettings, transport=TCP), partial(LinkSettings, transport=LINE)
-ring = partial(ModbusRingSettings, transport=TCP)
+ring = partial(RingSettings, transport=TCP)
 
 
 @pytest.mark.parametrize(

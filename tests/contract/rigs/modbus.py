@@ -6,7 +6,7 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
 from acquisition.simulated.devices.ring_device import RingDevice
@@ -88,13 +88,13 @@ class RingRig(Rig):
         self.step_samples = self.shape.samples_per_slot
         self._server = self._serve(self.device)
         await self.plug_in()
-        settings = ModbusRingSettings(
+        settings = RingSettings(
             transport=self._transport(),
             poll_period_s=0.001,
             timeout_s=self.timeout_s,
             requests_in_flight=self.requests_in_flight,
         )
-        self.source = ModbusRingSource(settings, self._calibration, SystemClock())
+        self.source = RingSource(settings, self._calibration, SystemClock())
         self.client = self.source._client
         return self
 

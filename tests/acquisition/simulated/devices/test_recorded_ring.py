@@ -11,7 +11,7 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import FeedEndedError, RawBlock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
-from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.devices.reading_watch import ReadingWatch
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
@@ -48,10 +48,10 @@ class PiecewiseFeed:
         )
 
 
-def source_of(server, calibration: UnitCalibration, **settings: float) -> ModbusRingSource:
+def source_of(server, calibration: UnitCalibration, **settings: float) -> RingSource:
     given = {"poll_period_s": 0.0001, "timeout_s": 3.0} | settings
-    settings = ModbusRingSettings(transport=transport_of(server), **given)
-    return ModbusRingSource(settings, calibration, SystemClock())
+    settings = RingSettings(transport=transport_of(server), **given)
+    return RingSource(settings, calibration, SystemClock())
 
 
 async def replayed(server, calibration: UnitCalibration) -> list[SampleBlock]:

@@ -10,7 +10,7 @@ from rigs.modbus import transport_of
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import decode_header, decode_slots
-from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.register_memory import RegisterMemory
 from acquisition.simulated.devices.ring_device import RingDevice
@@ -200,11 +200,11 @@ async def server(request, device, tmp_path):
 
 
 @pytest.fixture
-def source(server, counts_calibration) -> ModbusRingSource:
-    settings = ModbusRingSettings(
+def source(server, counts_calibration) -> RingSource:
+    settings = RingSettings(
         transport=transport_of(server), poll_period_s=0.001, timeout_s=1.0, stale_after_s=0.3
     )
-    return ModbusRingSource(settings, counts_calibration(), SystemClock())
+    return RingSource(settings, counts_calibration(), SystemClock())
 
 
 def test_an_unknown_fault_is_refused_with_those_that_are_known(server):
