@@ -184,7 +184,7 @@ class PolledSource:
         ]
         self._reader = MapReader(settings, MapDecoder(registers))
         self._ticks = Ticks(clock, settings.poll_period_s)
-        self._freshness = Freshness("nothing that is read", settings.stale_after_s)
+        self._freshness = Freshness("the content of its registers", settings.stale_after_s)
         self._stamps = HostStamps(self._rate_hz)
         time = registers.time
         self._stamped = (

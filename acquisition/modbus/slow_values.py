@@ -34,6 +34,11 @@ class PolledSlowValues:
     channels
         The slow channels that it measures.
 
+    Attributes
+    ----------
+    trouble
+        Why there are no values, in words; None while there are.
+
     Raises
     ------
     ConfigError
@@ -51,11 +56,11 @@ class PolledSlowValues:
         self._settings, self._clock = settings, clock
         self._reader = MapReader(settings, MapDecoder(registers))
         self._channels = {position_of(channel.id, registers): channel for channel in channels}
-        self._freshness = Freshness("nothing that is read", settings.stale_after_s)
+        self._freshness = Freshness("the content of its registers", settings.stale_after_s)
         self._newest: tuple[float, Mapping[str, Reading]] | None = None
         self._task: asyncio.Task[None] | None = None
         self._tried = asyncio.Event()
-        self._is_lost = True
+        self.trouble: str | None = "not polled yet"
 
     @asynccontextmanager
     async def watch(self) -> AsyncIterator[None]:
@@ -78,7 +83,7 @@ class PolledSlowValues:
         polled_s, readings = self._newest
         if self._clock.monotonic_s() - polled_s <= self._settings.stale_after_s:
             return readings
-        return self._missing(Reason.NOT_CONNECTED if self._is_lost else Reason.STALE)
+        return self._missing(Reason.STALE if self.trouble is None else Reason.NOT_CONNECTED)
 
     def _raise_bug(self) -> None:
         """Raise what has ended the polling task: any error but that of a link."""
@@ -93,7 +98,7 @@ class PolledSlowValues:
             try:
                 await self._poll()
             except AcquisitionError as error:
-                self._is_lost = True
+                self.trouble = str(error)
                 await self._clock.sleep(self._retry_s(error))
 
     def _retry_s(self, error: AcquisitionError) -> float:
@@ -111,7 +116,7 @@ class PolledSlowValues:
                     now_s = self._clock.monotonic_s()
                     self._freshness.note(reading.alive, now_s)
                     self._newest = (now_s, self._readings(reading))
-                    self._is_lost = False
+                    self.trouble = None
                     self._tried.set()
                     await self._clock.sleep(self._settings.poll_period_s)
         finally:

@@ -129,9 +129,12 @@ async def test_a_device_that_hangs_up_twice_running_is_asked_one_at_a_time():
     server = await asyncio.start_server(serve, "127.0.0.1", 0)
     async with server:
         link = client(server.sockets[0].getsockname()[1])
-        for _ in range(2):
+        for complaint in (
+            "closed the connection$",
+            "closed the connection, 6 requests .* one at a",
+        ):
             await link.open()
-            with pytest.raises(LinkError, match="closed the connection"):
+            with pytest.raises(LinkError, match=complaint):
                 await link.read(0, N_REGISTERS)
         await link.open()
         assert await link.read(0, N_REGISTERS) == RIGHT
