@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.modbus.requests import ADDRESS_SPACE, REGISTER_FUNCTIONS, SPAN_FUNCTIONS
+from acquisition.modbus.requests import REGISTER_FUNCTIONS, SPAN_FUNCTIONS
 
 BASES = (0, 1, 10001, 30001, 40001, 100001, 300001, 400001)
 """Numbers that manuals give to the first register of a table."""
@@ -110,6 +110,11 @@ class Cell:
         1 (coils) or 2 (discrete inputs) for single bits, 3 (holding) or 4 (input registers).
     bit
         Of a register, 0 the least significant; for type "bit" read by function 3 or 4.
+
+    Raises
+    ------
+    MapError
+        If function, type and bit do not go together.
     """
 
     address: int
@@ -145,17 +150,3 @@ class Cell:
     def stop(self, base: int) -> int:
         """First address on the wire after it."""
         return self.start(base) + self.n_places
-
-    def require_in_space(self, base: int, *at: int | str) -> None:
-        """Refuse a cell that no device can have.
-
-        Raises
-        ------
-        MapError
-            With what is allowed.
-        """
-        last = base + ADDRESS_SPACE - self.n_places
-        if not base <= self.address <= last:
-            raise MapError(
-                f"must be {base} to {last}, since the map counts from {base}", *at, "address"
-            )

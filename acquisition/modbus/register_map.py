@@ -67,19 +67,17 @@ class FlagCheck:
             raise MapError("must be given unless ok_values are, and not with them", "set_means")
         if self.clipped_values and not self.ok_values:
             raise MapError("can only be given with ok_values", "clipped_values")
-        self._require_possible("ok_values")
-        self._require_possible("clipped_values")
+        highest = self.mask // self.lowest_bit
+        for name in ("ok_values", "clipped_values"):
+            for number in getattr(self, name):
+                if not 0 <= number <= highest:
+                    words = f"must be numbers of the mask, 0 to {highest}, got {number}"
+                    raise MapError(words, name)
 
     @property
     def lowest_bit(self) -> int:
         """The lowest bit that counts, alone."""
         return self.mask & -self.mask
-
-    def _require_possible(self, name: str) -> None:
-        highest = self.mask // self.lowest_bit
-        for number in getattr(self, name):
-            if not 0 <= number <= highest:
-                raise MapError(f"must be numbers of the mask, 0 to {highest}, got {number}", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,17 +251,20 @@ class RegisterMap:
             yield from ((cell, ("time",)) for cell in self.time.cells())
 
     def _require_in_space(self) -> None:
-        for cell, at in self.cells():
-            cell.require_in_space(self.base, *at)
-        for n, signature in enumerate(self.signature):
-            signature.cell.require_in_space(self.base, "signature", n)
+        """Refuse what no device can have, by its address."""
+        places = [(cell.address, cell.n_places, at) for cell, at in self.cells()]
+        for n, part in enumerate(self.signature):
+            places.append((part.cell.address, part.cell.n_places, ("signature", n)))
         for n, block in enumerate(self.together):
-            last = self.base + ADDRESS_SPACE - block.count
-            if not self.base <= block.address <= last:
-                raise MapError(f"must be {self.base} to {last}", "together", n, "address")
+            places.append((block.address, block.count, ("together", n)))
             if block.count > self.max_registers:
                 limit = f"must not be above max_registers, {self.max_registers}"
                 raise MapError(limit, "together", n, "count")
+        for address, count, at in places:
+            last = self.base + ADDRESS_SPACE - count
+            if not self.base <= address <= last:
+                words = f"must be {self.base} to {last}, since the map counts from {self.base}"
+                raise MapError(words, *at, "address")
 
     def _require_apart(self) -> None:
         """Refuse two values on the same register, unless they are different bits of it."""
