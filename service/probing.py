@@ -200,9 +200,9 @@ def _is_plausible(number: float | None) -> bool:
 
 
 def _words(decoder: MapDecoder, content: bytes, cell: Cell) -> tuple[int, ...]:
-    start = decoder.plan.byte_of(cell)
+    start, bit = decoder.plan.place_of(cell)
     if cell.function in (1, 2):
-        return (content[start] >> decoder.plan.bit_of(cell) & 1,)
+        return (content[start] >> bit & 1,)
     return struct.unpack_from(f">{cell.n_places}H", content, start)
 
 

@@ -52,9 +52,9 @@ class CellDecoder:
         self._n_bytes = plan.n_bytes
         self._places: dict[Cell, tuple[tuple[int, ...], np.dtype[np.generic], int | None]] = {}
         for cell in cells:
-            start = plan.byte_of(cell)
+            start, coil_bit = plan.place_of(cell)
             if cell.function in BIT_FUNCTIONS:
-                self._places[cell] = (start,), np.dtype(np.uint8), plan.bit_of(cell)
+                self._places[cell] = (start,), np.dtype(np.uint8), coil_bit
                 continue
             positions = (start + n for n in byte_permutation(cell.type, cell.byte_order))
             self._places[cell] = tuple(positions), np.dtype(DTYPES[cell.type]), cell.bit

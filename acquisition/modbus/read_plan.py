@@ -33,16 +33,14 @@ class ReadPlan:
             if span.function == cell.function and span.address <= start and stop <= span.stop
         )
 
-    def byte_of(self, cell: Cell) -> int:
-        """Where a cell begins in the bytes of all contents."""
+    def place_of(self, cell: Cell) -> tuple[int, int]:
+        """Byte of all contents where a cell begins, and bit of it for functions 1 and 2."""
         span = self.span_of(cell)
+        n_before = sum(s.n_bytes for s in self.spans[: self.spans.index(span)])
         places = cell.start(self.base) - span.address
-        offset = places // 8 if cell.function in BIT_FUNCTIONS else 2 * places
-        return sum(s.n_bytes for s in self.spans[: self.spans.index(span)]) + offset
-
-    def bit_of(self, cell: Cell) -> int:
-        """Which bit of its byte a cell of functions 1 and 2 is."""
-        return (cell.start(self.base) - self.span_of(cell).address) % 8
+        if cell.function in BIT_FUNCTIONS:
+            return n_before + places // 8, places % 8
+        return n_before + 2 * places, 0
 
 
 Stretch = tuple[int, int]

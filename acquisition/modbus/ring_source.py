@@ -108,14 +108,9 @@ class RingSource:
                     continue
             else:
                 self._require_fresh()
-            due_s = await self._wait(due_s + period_s)
-
-    async def _wait(self, due_s: float) -> float:
-        """Wait for the next poll; polls that are overdue are left out, never piled up."""
-        now_s = self._clock.monotonic_s()
-        due_s = max(due_s, now_s)
-        await self._clock.sleep(due_s - now_s)
-        return due_s
+            now_s = self._clock.monotonic_s()
+            due_s = max(due_s + period_s, now_s)  # overdue polls are left out, never piled up
+            await self._clock.sleep(due_s - now_s)
 
     def _require_fresh(self) -> None:
         standing_s = self._clock.monotonic_s() - self._fresh_at_s
