@@ -7,11 +7,7 @@ import pytest
 
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.identity import (
-    ExpectedIdentification,
-    ExpectedRegisters,
-    Identification,
-)
+from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identification
 from acquisition.modbus.ring_source import RingSettings
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer

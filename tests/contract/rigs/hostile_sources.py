@@ -17,7 +17,7 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from rigs.hostile_modbus import HostileLine, HostileServer, rtu_frame
 from rigs.modbus import InFlightRig, ModbusRig, ModbusRtuRig
-from rigs.registers import REGISTER_RIGS, ChannelFifoInFlightRig, VectorInFlightRig
+from rigs.registers import REGISTER_RIGS, ChannelFifoTcpRig, VectorTcpRig
 
 TIMEOUT_S = 0.25
 """A right reply takes milliseconds; a busy machine may take a hundred."""
@@ -253,8 +253,8 @@ KINDS = {
     for source, kind in [
         *(("ring", _ring(rig)) for rig in (ModbusRig, ModbusRtuRig)),
         ("ring in flight", _ring(InFlightRig)),
-        ("vector in flight", _kind(VectorInFlightRig)),
-        ("queues in flight", _kind(ChannelFifoInFlightRig)),
+        ("vector in flight", _kind(VectorTcpRig, requests_in_flight=6)),
+        ("queues in flight", _kind(ChannelFifoTcpRig, requests_in_flight=6)),
         *zip(_REGISTERS, map(_kind, REGISTER_RIGS), strict=True),
     ]
 }

@@ -3,6 +3,7 @@
 import tempfile
 from contextlib import AsyncExitStack
 from pathlib import Path
+from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.modbus.client import ModbusClient
@@ -60,6 +61,10 @@ class Rig:
     def _transport(self) -> Transport:
         return transport_of(self._server)
 
+    def _link(self) -> dict[str, Any]:
+        names = ("timeout_s", "requests_in_flight")
+        return {"transport": self._transport()} | {name: getattr(self, name) for name in names}
+
 
 class OnTcp(Rig):
     absence = r"127\.0\.0\.1:\d+: Connection refused"
@@ -88,12 +93,7 @@ class RingRig(Rig):
         self.step_samples = self.shape.samples_per_slot
         self._server = self._serve(self.device)
         await self.plug_in()
-        settings = RingSettings(
-            transport=self._transport(),
-            poll_period_s=0.001,
-            timeout_s=self.timeout_s,
-            requests_in_flight=self.requests_in_flight,
-        )
+        settings = RingSettings(**self._link(), poll_period_s=0.001)
         self.source = RingSource(settings, self._calibration, SystemClock())
         self.client = self.source._client
         return self

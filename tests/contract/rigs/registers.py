@@ -67,12 +67,8 @@ class _PolledRig(Rig):
         device.clock = self._clock
         self._server = self._serve(device)
         await self.plug_in()
-        settings = PolledSettings(
-            transport=self._transport(),
-            poll_period_s=1.0 / self._calibration.rate_hz,
-            timeout_s=self.timeout_s,
-            requests_in_flight=self.requests_in_flight,
-        )
+        period_s = 1.0 / self._calibration.rate_hz
+        settings = PolledSettings(**self._link(), poll_period_s=period_s)
         self._source = PolledSource(
             settings, registers(self.rows), self.rows, self._source_calibration(), self._clock
         )
@@ -145,22 +141,13 @@ class _FifoRig(Rig):
         await self.plug_in()
         self._beside = ModbusTcpServer(beside)
         await self._beside.__aenter__()
-        settings = FifoSettings(
-            transport=self._transport(),
-            poll_period_s=0.001,
-            timeout_s=self.timeout_s,
-            requests_in_flight=self.requests_in_flight,
-        )
+        settings = FifoSettings(**self._link(), poll_period_s=0.001)
         # patient, for a busy machine: no trouble of this device is part of any test here
         polled = PolledSettings(transport=TcpTransport(**self._beside.endpoint), timeout_s=60.0)
-        source = FifoSource(
-            settings, self.layout, without_slow(self._calibration, ids), self._clock
-        )
-        self.client = source._client
-        self.source = JoinedSource(
-            source,
-            PolledSlowValues(polled, registers(()), self._calibration.slow, SystemClock()),
-        )
+        calibration = without_slow(self._calibration, ids)
+        source = FifoSource(settings, self.layout, calibration, self._clock)
+        slow = PolledSlowValues(polled, registers(()), self._calibration.slow, SystemClock())
+        self.client, self.source = source._client, JoinedSource(source, slow)
         return self
 
     async def __aexit__(self, *error: object) -> None:
@@ -196,18 +183,6 @@ class ChannelFifoTcpRig(OnTcp, _FifoRig):
     """A queue for each channel, over Modbus TCP."""
 
     layout = FifoLayout(addresses=(1000, 1100), n_channels=2, kind=FifoKind.PER_CHANNEL)
-
-
-class VectorInFlightRig(VectorTcpRig):
-    """A vector rack, asked for all its registers at once."""
-
-    requests_in_flight = 6
-
-
-class ChannelFifoInFlightRig(ChannelFifoTcpRig):
-    """A queue for each channel, all asked at once."""
-
-    requests_in_flight = 6
 
 
 REGISTER_RIGS = [
