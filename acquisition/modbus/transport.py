@@ -132,10 +132,8 @@ class LinkSettings:
     requests_in_flight: int = 1
 
     def __post_init__(self) -> None:
-        is_serial, is_kept = (
-            isinstance(self.transport, SerialTransport),
-            self.connection is ConnectionUse.KEPT,
-        )
+        is_serial = isinstance(self.transport, SerialTransport)
+        is_kept = self.connection is ConnectionUse.KEPT
         if is_serial and not is_kept:
             raise ConfigError("modbus: a serial line is kept, there are no connections on it")
         require_between(
