@@ -8,10 +8,9 @@ from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, C
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE
 from acquisition.delivery.raw import RawFeed
-from acquisition.simulated.devices.can_bus import CanBusServer
-from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.devices.can_server import CanBusServer
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.port import DaqServer
 from core.machine.unit import Measurand

@@ -3,8 +3,7 @@
 from acquisition.clock import Clock
 from acquisition.delivery.raw import RawFeed
 from acquisition.simulated.devices.port import DaqServer
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from service.conversion import calibration_of, machine_of
 from service.settings import modbus_sources, sources
 from service.settings.can import CanSettings

@@ -15,8 +15,7 @@ from pathlib import Path
 from acquisition.clock import Clock
 from acquisition.errors import LinkError
 from acquisition.simulated.devices import line_link
-from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_faults import Item
+from acquisition.simulated.devices.can_device import CanDevice, Item
 from acquisition.simulated.devices.can_frames import FD_LENGTHS, FrameKind, WireFrame
 from acquisition.simulated.devices.can_server import CanDaqServer
 

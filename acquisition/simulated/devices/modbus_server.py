@@ -8,8 +8,12 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from acquisition.clock import Clock
-from acquisition.simulated.devices.answers import ReadableDevice, answer
-from acquisition.simulated.devices.reply_faults import REPLY_FAULTS, ReplyFault
+from acquisition.simulated.devices.modbus_answers import (
+    REPLY_FAULTS,
+    ReadableDevice,
+    ReplyFault,
+    answer,
+)
 
 _ROUNDING = 1e-6
 """Of a step: a clock that wakes a rounding error too early must not be asked to sleep for it."""

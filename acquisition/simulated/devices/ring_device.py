@@ -1,26 +1,82 @@
-"""A simulated device with a block ring: samples in, registers out; no network, no time."""
+"""`RingDeviceSettings`: the shape of a simulated ring, and the layout that follows from it."""
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition.delivery.raw import RawBlock, RawFeed
 from acquisition.errors import ConfigError
 from acquisition.modbus.ring_profile import (
+    HEADER_REGISTERS,
     U32,
     RingHeader,
+    RingLayout,
     Slot,
     encode_header,
     encode_slot,
     encode_slow,
 )
-from acquisition.simulated.devices import faults
-from acquisition.simulated.devices.faults import Repetition, SlotFault
-from acquisition.simulated.devices.reading_watch import ReadingWatch
-from acquisition.simulated.devices.register_memory import RegisterMemory
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings, layout_of
+from acquisition.simulated.devices import ring_faults as faults
+from acquisition.simulated.devices.modbus_answers import RegisterMemory
+from acquisition.simulated.devices.ring_faults import ReadingWatch, Repetition, SlotFault
 from acquisition.simulated.feed import Ledger, SlotFeed
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingDeviceSettings:
+    """Shape of the ring.
+
+    Parameters
+    ----------
+    base_address
+        Register address of the header.
+    samples_per_slot, n_slots
+        Ring and header must fit into 65536 registers: 12 channels, 50 samples, 10 slow values and
+        64 slots take 40,612.
+    first_sequence
+        Counter at power-up, 0 to 2**32 - 1; near the end it wraps soon.
+    first_index
+        Number of the first sample at power-up, 0 to 2**32 - 1; None for the feed's own.
+    slot_padding
+        Unused registers between slots.
+    """
+
+    base_address: int = 0
+    samples_per_slot: int = 50
+    n_slots: int = 64
+    first_sequence: int = 0
+    first_index: int | None = None
+    slot_padding: int = 0
+
+
+def layout_of(first: RawBlock, settings: RingDeviceSettings) -> RingLayout:
+    """Lay out a ring for slots like this one.
+
+    Raises
+    ------
+    ConfigError
+        If it does not fit, or the slot is not one of counts.
+    """
+    if first.counts.dtype != np.int16:
+        raise ConfigError(
+            f"a block ring carries 16-bit counts, and the feed gives {first.counts.dtype}"
+        )
+    n_slow = len(first.slow)
+    layout = RingLayout(
+        n_channels=len(first.counts),
+        samples_per_slot=settings.samples_per_slot,
+        n_slots=settings.n_slots,
+        rate_mhz=round(first.rate_hz * 1000),
+        n_slow=n_slow,
+        ring_address=settings.base_address + HEADER_REGISTERS + 2 * n_slow,
+        slot_stride=0,
+    )
+    layout = replace(layout, slot_stride=layout.slot_registers + settings.slot_padding)
+    layout.require_possible()
+    return layout
+
 
 _LAST_LOOKS = 2
 """A reader that looks a second time has got the answer to the first, and all that it asked for."""

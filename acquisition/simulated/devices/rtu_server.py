@@ -12,8 +12,8 @@ from pymodbus.framer import FramerRTU
 from acquisition.clock import Clock
 from acquisition.errors import LinkError
 from acquisition.simulated.devices import line_link
+from acquisition.simulated.devices.modbus_answers import HangUpError
 from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
-from acquisition.simulated.devices.reply_faults import HangUpError
 
 _READ_BYTES = 4096
 _FRAME_GAP_S = 0.05

@@ -7,8 +7,8 @@ from typing import cast
 
 from acquisition.clock import Clock
 from acquisition.errors import LinkError
+from acquisition.simulated.devices.modbus_answers import HangUpError
 from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
-from acquisition.simulated.devices.reply_faults import HangUpError
 
 _MBAP = struct.Struct(">HHHB")
 _MIN_LENGTH, _MAX_LENGTH = 2, 254

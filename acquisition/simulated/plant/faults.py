@@ -7,8 +7,8 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE
-from core.arrays import CountArray
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE, UnitCalibration
+from core.arrays import CountArray, FloatArray
 
 RAIL_HIT_SPACING = 997
 """Samples from one hit to the next; a prime, so that they fall everywhere in blocks."""
@@ -101,3 +101,16 @@ def _broken(
             hit, turn = since % RAIL_HIT_SPACING == 0, since // RAIL_HIT_SPACING % 2
             wide[hit] = np.array(RAILS)[turn[hit]]
     return wide.clip(lower, upper).astype(np.int16)
+
+
+def to_counts(readings: FloatArray, calibration: UnitCalibration) -> CountArray:
+    """Round to whole counts and clip at the rails, as a converter does.
+
+    Parameters
+    ----------
+    readings
+        (n_channels, n_samples) in engineering units.
+    """
+    per_unit = np.array([1.0 / channel.unit_per_count for channel in calibration.channels])
+    counts: FloatArray = np.rint(readings * per_unit[:, np.newaxis])
+    return counts.clip(-COUNTS_FULL_SCALE, COUNTS_FULL_SCALE - 1, out=counts).astype(np.int16)

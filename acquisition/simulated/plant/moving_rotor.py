@@ -7,12 +7,12 @@ from dataclasses import fields, replace
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.simulated.plant.excitation import force_planes
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.forces import force_planes
+from acquisition.simulated.plant.probes import output_map
 from acquisition.simulated.plant.rotor import force_map, rotor_matrices
 from acquisition.simulated.plant.rotor_steps import Hold, LiftedRotor, discretize, lift, simulate
 from acquisition.simulated.plant.scenario import Scenario
-from acquisition.simulated.plant.transducers import output_map
 from core.arrays import FloatArray
 from core.machine.unit import Unit
 

@@ -6,11 +6,9 @@ import numpy as np
 
 from acquisition.simulated.plant.chain import TransducerChain
 from acquisition.simulated.plant.conditions import Conditions, SlowWander
-from acquisition.simulated.plant.course import Course, SteadyCourse
-from acquisition.simulated.plant.forces import Forces
+from acquisition.simulated.plant.excitation import FollowedRotation, Forces, Rotation
 from acquisition.simulated.plant.moving_rotor import LIFTED_STEPS, MovingRotor
-from acquisition.simulated.plant.rotation import FollowedRotation, Rotation
-from acquisition.simulated.plant.scenario import Scenario
+from acquisition.simulated.plant.scenario import Course, Scenario, SteadyCourse
 from core.arrays import FloatArray
 from core.machine.unit import Unit
 from core.units import hz_from_rpm

@@ -1,6 +1,8 @@
-"""`SimulatedUnit`: a generating unit with its converter, read like a device."""
+"""What the slow channels of a simulated unit report."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,15 +10,89 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.conditions import Conditions, between
-from acquisition.simulated.plant.converter import to_counts
-from acquisition.simulated.plant.course import Course
-from acquisition.simulated.plant.faults import FaultInjector
+from acquisition.simulated.plant.faults import FaultInjector, to_counts
+from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
-from acquisition.simulated.plant.scenario import Scenario
-from acquisition.simulated.plant.slow_values import slow_values
-from acquisition.simulated.plant.truth import UnitTruth, unit_truth
+from acquisition.simulated.plant.probes import gap_um, probes
+from acquisition.simulated.plant.scenario import Course, Scenario
 from core.machine.unit import Unit
-from core.units import NS_PER_S
+from core.units import NS_PER_S, rad_s_from_rpm
+
+
+def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, float]:
+    """Every slow channel the simulated unit has, by channel id; gaps in mm."""
+    values: dict[str | None, float] = {
+        machine.speed_channel: speed_rpm,
+        machine.power_channel: now.active_power_mw,
+    }
+    for index, bearing in enumerate(machine.bearings):
+        shown_c = now.oil_temperature_c[index] + now.oil_temperature_error_c[index]
+        values[bearing.oil_temperature] = float(shown_c)
+    rows = {channel.id: row for row, channel in enumerate(machine.channels)}
+    for probe in probes(machine):
+        row = rows[probe.channel]
+        from_reference_um = gap_um(probe, machine.channels[row].direction, now) - probe.reference_um
+        shown_um = probe.reference_um + float(now.gain[row]) * from_reference_um
+        values[probe.slow_channel] = shown_um / 1e3
+    return {name: value for name, value in values.items() if name is not None}
+
+
+@dataclass(frozen=True)
+class BearingTruth:
+    """One bearing.
+
+    Parameters
+    ----------
+    k_eff_xx_n_per_m, k_eff_yy_n_per_m
+        ``|k + iΩc|`` at the running speed, which equation (5) of Brito et al. estimates.
+    eccentricity
+        Distance of the shaft centre from the bearing centre over the clearance.
+    gap_growth_um
+        What all gaps of the bearing have in common.
+    bracket_stiffness_n_per_m
+        Of the bracket as it is, not as the monitor is told.
+    """
+
+    film: Film
+    k_eff_xx_n_per_m: float
+    k_eff_yy_n_per_m: float
+    centre_x_um: float
+    centre_y_um: float
+    eccentricity: float
+    oil_temperature_c: float
+    gap_growth_um: float
+    bracket_stiffness_n_per_m: float
+
+
+@dataclass(frozen=True)
+class UnitTruth:
+    """A unit at one instant."""
+
+    speed_rpm: float
+    active_power_mw: float
+    bearings: Mapping[str, BearingTruth]
+
+
+def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
+    """Gather what is so at one instant."""
+    brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
+    bearings = {}
+    for index, bearing in enumerate(machine.bearings):
+        film = scenario.bearings[bearing.id].film
+        k_eff = film.effective_stiffness_n_per_m(rad_s_from_rpm(speed_rpm))
+        centre_x_um, centre_y_um = (float(c) for c in now.centre_um[index])
+        bearings[bearing.id] = BearingTruth(
+            film=film,
+            k_eff_xx_n_per_m=k_eff[0],
+            k_eff_yy_n_per_m=k_eff[1],
+            centre_x_um=centre_x_um,
+            centre_y_um=centre_y_um,
+            eccentricity=math.hypot(centre_x_um, centre_y_um) / bearing.clearance_um,
+            oil_temperature_c=float(now.oil_temperature_c[index]),
+            gap_growth_um=float(now.gap_growth_um[index]),
+            bracket_stiffness_n_per_m=brackets[bearing.id],
+        )
+    return UnitTruth(speed_rpm, now.active_power_mw, bearings)
 
 
 class SimulatedUnit:

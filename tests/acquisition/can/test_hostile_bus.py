@@ -15,8 +15,8 @@ from rigs.tiers import covering, fast_and_long
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.raw import FeedEndedError
 from acquisition.errors import LinkError
-from acquisition.simulated.devices.can_bus import CanBusServer
 from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_server import CanBusServer
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 
 N_EACH = 200

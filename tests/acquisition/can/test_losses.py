@@ -16,9 +16,9 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
 from acquisition.delivery.calibration import calibrate
-from acquisition.simulated.devices.can_bus import _message
-from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_frames import FrameEncoder, shortened
+from acquisition.simulated.devices.can_server import _message
+from acquisition.simulated.devices.can_shape import daq_settings
 from core.samples.blocks import Rejection
 from core.samples.ring import Ring
 

@@ -15,9 +15,8 @@ from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 from acquisition.simulated.devices.map_device import MapDevice
-from acquisition.simulated.devices.register_memory import RegisterMemory
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.modbus_answers import RegisterMemory
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from core.samples.blocks import SampleBlock

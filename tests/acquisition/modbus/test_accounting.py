@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.simulated.devices import faults
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices import ring_faults as faults
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from core.samples.blocks import SampleBlock
 

@@ -5,7 +5,7 @@ import threading
 
 import can
 
-from acquisition.simulated.devices.can_bus import _message
+from acquisition.simulated.devices.can_server import _message
 
 VIRTUAL = {"interface": "virtual", "channel": "a test's own bus"}
 

@@ -8,7 +8,7 @@ from typing import Self
 
 from pymodbus.framer import FramerRTU
 
-from acquisition.simulated.devices.answers import ReadableDevice, answer
+from acquisition.simulated.devices.modbus_answers import ReadableDevice, answer
 from acquisition.simulated.devices.modbus_server import ModbusDevice
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 

@@ -8,8 +8,7 @@ from acquisition.clock import SystemClock
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.source import SampleSource

@@ -14,10 +14,9 @@ from rigs.tiers import fast_and_long
 from acquisition.clock import SystemClock
 from acquisition.delivery.raw import FeedEndedError
 from acquisition.errors import ConfigError, LinkError
-from acquisition.simulated.devices.can_bus import CanBusServer
-from acquisition.simulated.devices.can_dbc import daq_dbc
 from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, dbc_name
+from acquisition.simulated.devices.can_server import CanBusServer
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, dbc_name
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer

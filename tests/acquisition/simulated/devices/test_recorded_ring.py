@@ -12,9 +12,8 @@ from acquisition.delivery.raw import FeedEndedError, RawBlock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.simulated.devices.reading_watch import ReadingWatch
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
+from acquisition.simulated.devices.ring_faults import ReadingWatch
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from core.samples.blocks import SampleBlock

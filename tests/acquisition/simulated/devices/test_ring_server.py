@@ -11,10 +11,9 @@ from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import decode_header, decode_slot, decode_slow
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
-from acquisition.simulated.devices import faults
-from acquisition.simulated.devices.register_memory import RegisterMemory
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices import ring_faults as faults
+from acquisition.simulated.devices.modbus_answers import RegisterMemory
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.feed import Ledger

@@ -11,8 +11,8 @@ from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.modbus.vector_calibration import vector_calibration
+from acquisition.simulated.devices.map_device import VectorDevice
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
-from acquisition.simulated.devices.vector_device import VectorDevice
 from core.machine.unit import Bearing, Channel, Measurand, Unit
 from core.monitor.settings import AnalysisSettings
 from core.monitor.vector_monitor import VectorMonitor

@@ -7,15 +7,16 @@ import pytest
 import scipy.signal
 
 from acquisition.errors import ConfigError
-from acquisition.simulated.plant.accelerometer_noise import AccelerometerNoise
+from acquisition.simulated.plant.chain import AccelerometerNoise
 from acquisition.simulated.plant.excitation import (
     Excitation,
+    FollowedRotation,
     HydraulicForce,
     RopeForce,
+    Rotation,
     UnbalanceForce,
 )
 from acquisition.simulated.plant.response_filter import ResponseFilter
-from acquisition.simulated.plant.rotation import FollowedRotation, Rotation
 from core.arrays import FloatArray
 from core.machine.response import HighPass, Resonance, Response, ResponseChain, ResponseTable
 
