@@ -1,4 +1,9 @@
-"""The pulses of a key-phase pick-up, one a turn, as a converter samples them."""
+"""Transducer chain of one unit: gap, runout, key phase, response, gain and noise of its channels.
+
+Noise of accelerometers is white, rises as 1/f below a corner, and is integrated on velocity
+channels. It extends down to `FLOOR_HZ`, where a double high-pass cuts it off: 1/f noise integrated
+to velocity has infinite power towards 0 Hz, and charge amplifiers do not pass it either.
+"""
 
 import math
 from collections.abc import Iterator
@@ -8,7 +13,7 @@ import numpy as np
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.conditions import Conditions
 from acquisition.simulated.plant.excitation import straight
-from acquisition.simulated.plant.probes import ShaftRunout, reference_gap_um, standing_gap_um
+from acquisition.simulated.plant.probes import ShaftRunout, standing_gap_um
 from acquisition.simulated.plant.response_filter import ResponseFilter
 from acquisition.simulated.plant.scenario import (
     ChannelScenario,
@@ -22,10 +27,10 @@ from core.units import STANDARD_GRAVITY_M_S2
 
 
 class KeyPhasePulses:
-    """Pulses that begin whenever the shaft has completed a turn, on every key-phase channel.
+    """Pulses at the beginning of each turn, on every key-phase channel.
 
-    The converter averages over its sampling interval, so that a sample on an edge tells how much of
-    the interval the pulse filled.
+    The converter averages over its sampling interval: a sample on an edge is the share of the
+    interval that the pulse filled.
     """
 
     def __init__(self, machine: Unit, pulse: KeyPhasePulse) -> None:
@@ -44,7 +49,7 @@ class KeyPhasePulses:
         readings
             (n_channels, n_samples)
         turns
-            (n_samples,) angle of the shaft; its speed hardly changes within them.
+            (n_samples,) angle of the shaft, at nearly constant speed.
         """
         if not self._directions:
             return
@@ -58,7 +63,7 @@ class KeyPhasePulses:
             readings[row] += self._pulse.rest_v + direction * self._pulse.height_v * filled
 
     def _so_far(self, turns: FloatArray) -> FloatArray:
-        """How much of the way since turn 0 lay under the pulse."""
+        """Turns under the pulse since turn 0."""
         whole = np.floor(turns)
         covered: FloatArray = whole * self._pulse.width_turns
         covered += np.minimum(turns - whole, self._pulse.width_turns)
@@ -67,12 +72,12 @@ class KeyPhasePulses:
 
 FLOOR_HZ = 0.1
 PINK_BAND_HZ = (0.02, 60.0)
-"""Where 1/f noise is 1/f: to 2 % in power, and to 0.3 % between 0.1 and 25 Hz."""
+"""Band of accurate 1/f noise: to 2 % in power, and to 0.3 % between 0.1 and 25 Hz."""
 POLES_PER_DECADE = 3
 
 
 class AccelerometerNoise:
-    """Endless noise of some channels.
+    """Noise of some channels, as endless streams.
 
     Parameters
     ----------
@@ -100,7 +105,7 @@ class AccelerometerNoise:
         self._floor_states = [np.zeros((len(floor), 2)) for floor in self._floors]
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next noise, (n_channels, n_samples)."""
+        """Return the next noise, (n_channels, n_samples)."""
         import scipy.signal  # slow to load, and not needed to begin
 
         white, pink = self._white * self._random.standard_normal((2, self._n_channels, n_samples))
@@ -128,7 +133,7 @@ def _floor(integrates: bool, rate_hz: float) -> FloatArray:
 
 
 def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
-    """Filter whose power falls as corner / f: poles and zeros take turns (Oustaloup, 1991)."""
+    """Filter whose power falls as corner / f, of alternating poles and zeros (Oustaloup, 1991)."""
     import scipy.signal  # slow to load, and not needed to begin
 
     low_hz, high_hz = PINK_BAND_HZ
@@ -151,13 +156,12 @@ class TransducerChain:
     Parameters
     ----------
     white, own
-        Where white noise and the accelerometers' own noise come from.
+        Generators of the white noise and of the accelerometers' own noise.
 
     Raises
     ------
     ConfigError
-        If the scenario names a channel the machine does not have, or asks for a response that
-        cannot be simulated.
+        If the scenario names an unknown channel or a response that cannot be simulated.
     """
 
     def __init__(
@@ -176,19 +180,19 @@ class TransducerChain:
             for row, channel in enumerate(channels)
             if channel.response is not None
         }
-        self._reference_um = reference_gap_um(machine)
+        self._reference_um = standing_gap_um(machine)
         self._white, self._white_rms = white, noise_rms(machine, scenario.noise)
         self._noisy, self._own = _own_noise(machine, scenario.noise, own)
 
     def read(
         self, motion: FloatArray, turns: FloatArray, start: Conditions, stop: Conditions
     ) -> FloatArray:
-        """Give what the transducers make of a chunk of motion, without white noise.
+        """Readings of the transducers for a chunk of motion, without white noise.
 
         Parameters
         ----------
         motion
-            (n_channels, n_samples) in each channel's engineering unit; used up.
+            (n_channels, n_samples) in each channel's engineering unit; overwritten.
         turns
             (n_samples,) angle of the shaft.
         start, stop
@@ -209,7 +213,7 @@ class TransducerChain:
         return motion
 
     def add_white_noise(self, readings: FloatArray) -> None:
-        """Add the noise of what stands behind the transducers, in place."""
+        """Add the noise of the electronics behind the transducers, in place."""
         noise = self._white.standard_normal(readings.shape, dtype=np.float32)
         readings += noise * self._white_rms[:, np.newaxis]
 
@@ -244,8 +248,8 @@ def _own_noise(
 
 
 def _channels(machine: Unit, scenario: Scenario) -> list[ChannelScenario]:
-    """What every channel of the machine is really like, in wire order."""
-    strange = scenario.channels.keys() - {channel.id for channel in machine.channels}
-    if strange:
-        raise ConfigError(f"unit {machine.id!r} has no channel {', '.join(sorted(strange))}")
-    return [scenario.channels.get(channel.id, ChannelScenario()) for channel in machine.channels]
+    """Scenario of every channel of the machine, in wire order."""
+    unknown = scenario.channels.keys() - {channel.id for channel in machine.channels}
+    if unknown:
+        raise ConfigError(f"unit {machine.id!r} has no channel {', '.join(sorted(unknown))}")
+    return [scenario.channel(channel.id) for channel in machine.channels]

@@ -1,7 +1,7 @@
-"""The angle of the shaft: what unbalance and runout follow and the speed channel reports."""
+"""Rotation of the shaft and forces on the rotor, as streams independent of the requested pieces."""
 
 import math
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,25 +11,16 @@ from core.arrays import FloatArray
 from core.units import hz_from_rpm
 
 PARTS = ((0.5, 1.0), (0.3, 0.57), (0.2, 0.31))
-"""Share of the whole wander and period in wander times, of the swings that make it up."""
+"""Share of the whole wander, and period in wander times, of its swings."""
 
-
-class Turning(Protocol):
-    """How a shaft turns, by number of samples."""
-
-    def relative_speed(self, index: FloatArray) -> FloatArray:
-        """Speed over its mean or rated one at some samples, (n_samples,)."""
-        ...
-
-    def turns(self, index: FloatArray) -> FloatArray:
-        """Whole and broken turns since sample 0, (n_samples,)."""
-        ...
+CUTOFF_FILTER_ORDER = 4
+IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
 
 
 class FollowedRotation:
-    """A shaft that follows any speed, in straight lines from chunk to chunk.
+    """Rotation of a shaft whose speed runs in straight lines from chunk to chunk.
 
-    Only samples of the newest chunk can be asked for.
+    Only samples of the newest chunk are available.
     """
 
     def __init__(self, rated_speed_rpm: float, rate_hz: float) -> None:
@@ -39,7 +30,7 @@ class FollowedRotation:
         self._start, self._stop = 1.0, 1.0
 
     def follow(self, first: int, n_samples: int, start_rpm: float, stop_rpm: float) -> None:
-        """Run from one speed to another within the next samples."""
+        """Change from one speed to another over the next samples."""
         self._turns = float(self.turns(np.array([float(first)]))[0])
         self._first, self._n_samples = first, n_samples
         self._start = start_rpm / self._rated_speed_rpm
@@ -57,15 +48,15 @@ class FollowedRotation:
 
 
 class Rotation:
-    """Turns of a shaft whose speed wanders slowly, as a closed function of the sample number.
+    """Rotation of a shaft whose speed wanders slowly, as a closed function of the sample number.
 
-    The wander is a sum of three slow swings, so that speed and angle belong together exactly and
-    the speed never leaves its limits.
+    The wander is a sum of three slow swings: speed and angle agree exactly, and the speed never
+    leaves its limits.
 
     Parameters
     ----------
     speed_wander
-        Largest departure from the mean speed, as a share of it.
+        Largest relative deviation from the mean speed.
     wander_time_s
         Period of the largest swing.
     """
@@ -103,20 +94,12 @@ class Rotation:
         return np.asarray(self._turns_per_sample * evenly)
 
 
-CUTOFF_FILTER_ORDER = 4
-IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
-
-
-class Excitation(Protocol):
-    """A radial force on the rotor."""
-
-    def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
-        ...
+Turning: TypeAlias = FollowedRotation | Rotation
+"""Rotation of a shaft by number of samples."""
 
 
 class UnbalanceForce:
-    """Force that turns forward with the shaft and grows with the square of its speed.
+    """Force that rotates forward with the shaft and grows with the square of its speed.
 
     Parameters
     ----------
@@ -130,7 +113,7 @@ class UnbalanceForce:
         self._index = 0
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the next forces (x, y) in newtons, (2, n_samples)."""
         index = np.arange(self._index, self._index + n_samples, dtype=np.float64)
         self._index += n_samples
         angle = 2.0 * math.pi * np.fmod(self._rotation.turns(index), 1.0)
@@ -138,7 +121,7 @@ class UnbalanceForce:
 
 
 class RopeForce:
-    """Force that turns forward at a frequency of its own while its phase wanders.
+    """Force that rotates forward at its own frequency, with a wandering phase.
 
     The phase is a random walk, which spreads the line into a Lorentzian of the given width at half
     power (phase noise of a free oscillator: variance 2π · width · time).
@@ -159,7 +142,7 @@ class RopeForce:
         self._angle = float(random.uniform(0.0, 2.0 * math.pi))
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the next forces (x, y) in newtons, (2, n_samples)."""
         steps = self._mean_step + self._step_rms * self._random.standard_normal(n_samples)
         angle = np.cumsum(np.concatenate([[self._angle], steps]))
         self._angle = float(angle[-1]) % (2.0 * math.pi)
@@ -178,7 +161,7 @@ class HydraulicForce:
         self._filter_state = np.zeros((CUTOFF_FILTER_ORDER // 2, 2, 2))
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the next forces (x, y) in newtons, (2, n_samples)."""
         import scipy.signal  # slow to load, and not needed to begin
 
         force_n = self._rms_n * self._random.standard_normal((n_samples, 2)).T
@@ -189,12 +172,16 @@ class HydraulicForce:
         return force_n
 
 
+Excitation: TypeAlias = UnbalanceForce | RopeForce | HydraulicForce
+"""Radial force on the rotor."""
+
+
 def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
     return force_n * np.stack([np.cos(angle_rad), np.sin(angle_rad)])
 
 
 def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
-    """Second-order sections that keep the rms value of white noise."""
+    """Second-order sections that preserve the rms value of white noise."""
     import scipy.signal  # slow to load, and not needed to begin
 
     sections: FloatArray = scipy.signal.butter(
@@ -208,7 +195,7 @@ def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
 
 
 def force_planes(scenario: Scenario) -> list[ForcePlane]:
-    """Planes on which forces act, in order; every one costs time."""
+    """Planes on which forces act, in order; each costs computing time."""
     used = {ForcePlane.MASS_CENTRE, ForcePlane.RUNNER, scenario.hydraulic.plane}
     return [plane for plane in ForcePlane if plane in used]
 
@@ -219,10 +206,10 @@ class Forces:
     Parameters
     ----------
     first
-        Scenario of the first chunk. Planes, the band of the hydraulic force, order and width of the
-        rope stay as they are there; how large the forces are may change.
+        Scenario of the first chunk, which sets the planes, the band of the hydraulic force, order
+        and width of the rope; only the size of the forces may change later.
     rated_speed_rpm
-        The speed that `rotation` counts from.
+        Reference speed of `rotation`.
     """
 
     def __init__(
@@ -247,7 +234,7 @@ class Forces:
         self._n_planes = len(planes)
 
     def advance(self, n_samples: int, start: Scenario, stop: Scenario) -> FloatArray:
-        """Give the next forces, while one scenario goes over into another.
+        """Return the next forces, during the transition from one scenario to another.
 
         Returns
         -------
@@ -271,7 +258,7 @@ class Forces:
 
 
 def straight(start: float, stop: float, n_samples: int) -> FloatArray | float:
-    """Straight line over a chunk, not reaching its end; one number if it is level."""
+    """Straight line over a chunk, without its end point; one number if it is constant."""
     if start == stop:
         return start
     return np.linspace(start, stop, n_samples, endpoint=False)
