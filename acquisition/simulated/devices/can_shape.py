@@ -1,7 +1,7 @@
-"""`CanShape`: the messages of the simulated CAN DAQ, from which both its DBC and its frames follow.
+"""`CanShape`: messages of the simulated CAN DAQ; its DBC, and the settings that read it.
 
-A block of samples begins with messages that say what holds for it: index, epoch, health, time and
-slow values, each with a counter that ties it to the block's first sample. Then come the samples.
+A block of samples begins with messages of its index, epoch, health, time and slow values, each with
+a counter that assigns it to the first sample of the block. The samples follow.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,9 @@ import numpy.typing as npt
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.errors import ConfigError
 
-_FD_LENGTHS = (8, 12, 16, 20, 24, 32, 48, 64)
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+"""Lengths of a frame in bytes; classic frames have up to eight."""
+
 _FD_SAMPLES = 5
 _FD_WAVE_HEAD, _FD_HEAD, _CLASSIC_HEAD = 4, 24, 2
 _MAX_CHANNELS = 32
@@ -23,7 +25,7 @@ _MAX_SLOW = 50
 
 
 class Kind(Enum):
-    """Types of signals: letter and size of numpy."""
+    """Type of a signal, by its numpy code."""
 
     U8 = "u1"
     U16 = "u2"
@@ -55,7 +57,7 @@ class MessageShape:
     Parameters
     ----------
     first_channel
-        Of those it carries samples of; None if it carries none.
+        First channel whose samples it carries; None if it carries none.
     """
 
     name: str
@@ -68,7 +70,7 @@ class MessageShape:
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """The message as a numpy record; classic ones are Intel, FD ones Motorola."""
+        """Numpy record of the message: little-endian if classic, big-endian if FD."""
         order = ">" if self.fd else "<"
         return np.dtype(
             {
@@ -80,18 +82,18 @@ class MessageShape:
         )
 
     def records(self, n_frames: int) -> npt.NDArray[np.void]:
-        """Empty frames to be filled in."""
+        """Frames of zeros."""
         return np.zeros(n_frames, dtype=self.dtype)
 
 
 @dataclass(frozen=True)
 class DaqSignal:
-    """A channel as the DBC describes it.
+    """A channel in the DBC.
 
     Parameters
     ----------
     unit, factor
-        Of its counts; a DAQ that sends float32 gives engineering units, factor 1.
+        Unit of its values, and value of one count; float32 samples have factor 1.
     """
 
     id: str
@@ -101,14 +103,14 @@ class DaqSignal:
 
 @dataclass(frozen=True, kw_only=True)
 class CanShape:
-    """What the simulated DAQ sends.
+    """Messages of the simulated DAQ.
 
     Parameters
     ----------
     floats
         Whether samples are float32 engineering units rather than int16 counts.
     base_id
-        Id of the first message; the others follow.
+        Id of the first message; the others have the following ids.
 
     Raises
     ------
@@ -138,12 +140,12 @@ class CanShape:
 
     @property
     def samples_per_frame(self) -> int:
-        """Of each channel."""
+        """Samples of each channel in a waveform frame."""
         return _FD_SAMPLES if self.fd else 1
 
     @property
     def messages(self) -> tuple[MessageShape, ...]:
-        """All messages in the order in which a block is sent."""
+        """All messages in the order in which a block sends them."""
         shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
         return tuple(
             MessageShape(
@@ -160,7 +162,7 @@ class CanShape:
 
     @property
     def waves(self) -> tuple[MessageShape, ...]:
-        """Those messages that carry samples."""
+        """Messages that carry samples."""
         return tuple(m for m in self.messages if m.first_channel is not None)
 
     def _classic_heads(self) -> "list[_Shape]":
@@ -217,7 +219,7 @@ _COUNTER = Field("counter", 0, Kind.U16)
 
 
 def dbc_name(channel_id: str) -> str:
-    """A channel's id as DBC allows names: letters, digits and underscores, no digit first."""
+    """Id of a channel as a DBC name: letters, digits and underscores, no digit first."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in channel_id)
     return f"_{name}" if name[0].isdigit() else name
 
@@ -228,7 +230,7 @@ def _floats(slow: tuple[DaqSignal, ...], offset: int) -> list[Field]:
 
 def _wire_length(fields: list[Field], fd: bool) -> int:
     end = max(field.offset + field.kind.n_bytes for field in fields)
-    return next(n for n in _FD_LENGTHS if n >= end) if fd else end
+    return next(n for n in FD_LENGTHS if n >= max(end, 8)) if fd else end
 
 
 _NODE = "DAQ"
@@ -268,7 +270,7 @@ def daq_dbc(shape: CanShape) -> str:
 def daq_settings(
     shape: CanShape, link: CanLinkSettings, units: tuple[str, ...], **others: Any
 ) -> CanSettings:
-    """Settings of a source that reads the simulated DAQ; its DBC need not lie in a file.
+    """Settings of a source that reads the simulated DAQ, with its DBC as text.
 
     Parameters
     ----------
@@ -296,7 +298,7 @@ def daq_settings(
 
 
 def _beside(shape: CanShape) -> dict[str, Any]:
-    """Counters and all that is not a channel."""
+    """Settings of counters and of all signals that are not channels."""
     where = {field.name: m.name for m in shape.messages for field in m.fields}
     counters = [
         f"{message.name}.{field.name}"

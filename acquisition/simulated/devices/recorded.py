@@ -3,13 +3,14 @@
 from collections import deque
 
 from acquisition.delivery.block_grid import BlockGrid
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.selection import Selection, all_of
+from acquisition.simulated.feed import FeedEndedError
 
 
 class RecordedFeed:
-    """The recorded samples in pieces as long as a DAQ wants them: a `RawFeed`.
+    """The recorded samples in pieces as long as a DAQ wants them: a `SampleFeed`.
 
     Pieces begin at multiples of their length and keep epoch, index and stamps of the recording. One
     is shorter where samples are missing in the recording, or where the device began anew. A piece

@@ -6,7 +6,7 @@ from contextlib import aclosing, asynccontextmanager
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawFeed
+from acquisition.simulated.feed import SampleFeed
 from core.samples.blocks import SampleBlock
 
 SKIP_SAMPLES = 65536
@@ -23,7 +23,7 @@ class SimulatedSource:
 
     def __init__(
         self,
-        feed: RawFeed,
+        feed: SampleFeed,
         calibration: UnitCalibration,
         clock: Clock,
         paced: bool = True,

@@ -12,14 +12,14 @@ from rigs.can import shape_of
 from rigs.tiers import fast_and_long
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.raw import FeedEndedError
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_server import CanBusServer
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, dbc_name
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer
 from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+from acquisition.simulated.feed import FeedEndedError
 
 SHAPE = CanShape(
     channels=(DaqSignal("a", "V"), DaqSignal("b", "V")),
@@ -84,7 +84,7 @@ async def test_a_second_reader_takes_the_place_of_the_first(device):
 @pytest.mark.parametrize("server_kind", [SlcanTcpServer, SlcanPtyServer, CanBusServer])
 async def test_an_unknown_fault_is_refused_with_those_there_are(server_kind, device):
     async with server_kind(device) as server:
-        with pytest.raises(LookupError, match=r"no fault 'melt'; there are .*drop.*freeze"):
+        with pytest.raises(LookupError, match=r"no fault is called melt; known are .*drop.*freeze"):
             server.inject("melt")
 
 
@@ -92,7 +92,7 @@ async def test_a_bus_without_text_has_no_faults_of_text_and_cannot_be_cut(device
     async with CanBusServer(device) as server:
         with pytest.raises(LookupError, match="long_line"):
             server.inject("long_line")
-        with pytest.raises(LookupError, match=r"no fault 'cut'; there are bus_off, drop"):
+        with pytest.raises(LookupError, match=r"no fault is called cut; known are bus_off, drop"):
             server.inject("cut")
 
 

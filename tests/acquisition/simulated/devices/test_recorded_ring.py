@@ -8,14 +8,14 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.devices.ring_faults import ReadingWatch
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.feed import FeedEndedError
 from core.samples.blocks import SampleBlock
 
 START_NS = 1_767_225_600 * 10**9
@@ -259,7 +259,7 @@ def test_a_slot_is_read_when_a_reader_that_was_told_of_it_cannot_come_back_for_i
     watch = ReadingWatch(LAYOUT)
     for done in written_read_or_looked:
         if done is None:
-            watch.begin_anew()
+            watch.clear()
         elif done == LOOK:
             watch.note_look()
         for number in done or ():

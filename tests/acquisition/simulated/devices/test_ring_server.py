@@ -12,10 +12,9 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import decode_header, decode_slot, decode_slow
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
 from acquisition.simulated.devices import ring_faults as faults
-from acquisition.simulated.devices.modbus_answers import RegisterMemory
+from acquisition.simulated.devices.modbus_device import RegisterMemory
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.feed import Ledger
 from core.samples.blocks import Rejection
 from core.samples.device_clock import StampFault

@@ -12,7 +12,7 @@ from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.simulated.devices.map_device import VectorDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from core.machine.unit import Bearing, Channel, Measurand, Unit
 from core.monitor.settings import AnalysisSettings
 from core.monitor.vector_monitor import VectorMonitor

@@ -1,10 +1,14 @@
-"""What a Modbus device answers: from a request's function code and data to those of the reply."""
+"""`ModbusDevice`: a sample feed behind registers; its replies to requests, right and faulty."""
 
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
+
+from acquisition.delivery.raw import RawBlock
+from acquisition.simulated.feed import Ledger, SampleFeed, SlotFeed
 
 _ADDRESS_AND_COUNT = struct.Struct(">HH")
 _ADDRESS = struct.Struct(">H")
@@ -13,30 +17,119 @@ _MAX_REGISTERS, _MAX_BITS = 125, 2000
 _MEI_READ_IDENTIFICATION = 14
 _BASIC_CONFORMITY = 0x81
 
+_LAST_LOOKS = 2
+"""A reader that looks a second time has received the answer to the first, and all data before."""
 
-class ReadableDevice(Protocol):
-    """What can be read from a device; nothing can be written."""
+
+class ModbusDevice(ABC):
+    """Simulated device whose registers, bits and queues can only be read.
+
+    The feed is cut into steps that begin at multiples of their length. In a gap of the feed time
+    passes without data; at its end the device stands still.
+
+    Parameters
+    ----------
+    feed
+        Source of the samples.
+    step_samples
+        Samples that are produced together.
+    unit
+        Name of the unit in the ledger.
+
+    Attributes
+    ----------
+    identification
+        Objects of function 43/14 by number; without any the function is unknown.
+    frozen
+        While set, no data are produced; the device still answers.
+    on_demand
+        Whether the device produces when its reader has read all data and looks for more.
+    ended
+        Whether the feed has ended.
+    """
+
+    def __init__(
+        self, feed: SampleFeed, step_samples: int, unit: str, ledger: Ledger | None
+    ) -> None:
+        self._feed = SlotFeed(feed, step_samples)
+        self._unit = unit
+        self.ledger = ledger or Ledger()
+        self.identification: Mapping[int, bytes] = {}
+        self.frozen = self.on_demand = self.ended = False
+        self._n_frozen = self._n_looks = self._position = self._feed_epoch = 0
 
     @property
-    def identification(self) -> Mapping[int, bytes]:
-        """Objects of function 43/14 by their number; none if the device has no such function."""
-        ...
+    @abstractmethod
+    def step_s(self) -> float:
+        """Duration of one step."""
 
+    @property
+    def drained(self) -> bool:
+        """Whether the feed has ended and a reader has read everything and looked again."""
+        return self.ended and self._n_looks >= _LAST_LOOKS
+
+    @property
+    def faults(self) -> Mapping[str, Callable[[int], None]]:
+        """Faults of the data; each takes a count of steps."""
+        return {"freeze": self._freeze}
+
+    def spoil(self, fault: str, count: int) -> None:
+        """Cause a fault of the data, `count` times."""
+        self.faults[fault](count)
+
+    def produce(self, n_steps: int = 1) -> None:
+        """Let time pass, in steps."""
+        for _ in range(0 if self.frozen else n_steps):
+            if self._n_frozen:
+                self._n_frozen -= 1
+                continue
+            ahead = self._feed.peek()
+            if ahead is None:
+                self.ended = True
+                return
+            if self._must_wait(ahead):
+                return
+            self._position += 1
+            if ahead.epoch != self._feed_epoch or self._feed.number(ahead) <= self._position:
+                self._take()
+            self._pass_step()
+
+    @abstractmethod
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
-        """Big-endian words by function 3 or 4, or None if some of them do not exist."""
-        ...
+        """Big-endian words by function 3 or 4, or None if some do not exist."""
 
-    def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Eight bits a byte by function 1 or 2, or None if some of them do not exist."""
-        ...
+    def read_bits(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
+        """Eight bits a byte by function 1 or 2, or None if some do not exist."""
+        return None
 
-    def read_fifo(self, address: int) -> bytes | None:
+    def read_fifo(self, address: int) -> bytes | None:  # noqa: ARG002
         """Registers of a queue, or None if there is no queue."""
-        ...
+        return None
+
+    @abstractmethod
+    def _show(self, raw: RawBlock) -> None:
+        """Make a step readable."""
+
+    def _take(self) -> None:
+        """Take the next step from the feed and show it."""
+        raw = self._feed.take()
+        if raw is not None:
+            self._show(raw)
+            self._position, self._feed_epoch = self._feed.number(raw), raw.epoch
+
+    def _must_wait(self, ahead: RawBlock) -> bool:  # noqa: ARG002
+        """Whether the next step must not come yet."""
+        return False
+
+    def _pass_step(self) -> None:  # noqa: B027  optional
+        """Called at the end of each step, with or without data."""
+
+    def _freeze(self, count: int) -> None:
+        self._n_frozen += count
 
 
-def answer(request: bytes, device: ReadableDevice) -> bytes:
-    """Answer a request, with an exception if it asks for anything but what there is to read."""
+def answer(request: bytes, device: ModbusDevice) -> bytes:
+    """Reply to a request, each from function code on; an exception to all but readable data."""
     function, data = request[0], request[1:]
     match function:
         case 1 | 2 | 3 | 4 if len(data) == _ADDRESS_AND_COUNT.size:
@@ -53,7 +146,7 @@ def refusal(function: int, code: int) -> bytes:
     return bytes((function | 0x80, code))
 
 
-def _counted(function: int, data: bytes, device: ReadableDevice) -> bytes:
+def _counted(function: int, data: bytes, device: ModbusDevice) -> bytes:
     address, count = _ADDRESS_AND_COUNT.unpack(data)
     of_bits = function in (1, 2)
     if not 1 <= count <= (_MAX_BITS if of_bits else _MAX_REGISTERS):
@@ -65,7 +158,7 @@ def _counted(function: int, data: bytes, device: ReadableDevice) -> bytes:
     return bytes((function, len(values))) + values
 
 
-def _fifo(data: bytes, device: ReadableDevice) -> bytes:
+def _fifo(data: bytes, device: ModbusDevice) -> bytes:
     values = device.read_fifo(_ADDRESS.unpack(data)[0])
     if values is None:
         return refusal(0x18, _ILLEGAL_ADDRESS)
@@ -87,13 +180,13 @@ class RegisterMemory:
     start
         Address of the first register.
     n_registers
-        How many there are; all others do not exist.
+        Number of registers; all others do not exist.
 
     Attributes
     ----------
     before_read
-        Called with address and count before each read is answered: here a test lets the device
-        do something between two requests.
+        Called with address and count before each read; lets a test change the device between two
+        requests.
     """
 
     def __init__(self, start: int, n_registers: int) -> None:
@@ -107,7 +200,7 @@ class RegisterMemory:
         Raises
         ------
         ValueError
-            If they do not fit; the message gives both ends.
+            If some registers do not exist; the message gives both ranges.
         """
         offset = 2 * (address - self._start)
         if offset < 0 or offset + len(data) > len(self._data):
@@ -133,7 +226,7 @@ class RegisterMemory:
 
 Answerer: TypeAlias = Callable[[bytes], bytes]
 ReplyFault: TypeAlias = Callable[[bytes, Answerer], bytes | None]
-"""Takes a request and who answers it rightly; gives what is answered, None for silence."""
+"""Maps a request and the function that answers it to the reply; None for silence."""
 
 _DEVICE_FAILURE, _BUSY = 4, 6
 _EXCEPTION_CODES = (1, 2, 3, 4, 5, 6, 8, 10, 11)
@@ -142,10 +235,6 @@ _REGISTER_FUNCTIONS = (3, 4)
 
 class HangUpError(Exception):
     """The device closes the connection instead of answering."""
-
-
-def silent(request: bytes, answerer: Answerer) -> None:
-    """Never answer."""
 
 
 def hanging_up(request: bytes, answerer: Answerer) -> bytes:  # noqa: ARG001
@@ -159,7 +248,7 @@ def refusing(code: int) -> ReplyFault:
 
 
 def shifted_map(request: bytes, answerer: Answerer) -> bytes:
-    """Answer with what lies one register further, as after a change of firmware."""
+    """Answer with the data one register further, as after a change of firmware."""
     address = int.from_bytes(request[1:3], "big") + 1
     return answerer(request[:1] + (address & 0xFFFF).to_bytes(2, "big") + request[3:])
 
@@ -180,6 +269,6 @@ REPLY_FAULTS: Mapping[str, ReplyFault] = {
     "exception": refusing(_DEVICE_FAILURE),
     **{f"exception_{code}": refusing(code) for code in _EXCEPTION_CODES},
     "shift_map": shifted_map,
-    "silent": silent,
+    "silent": lambda _request, _answerer: None,
     "word_order": swapped_words,
 }
