@@ -81,13 +81,6 @@ async def test_a_second_reader_takes_the_place_of_the_first(device):
             assert await second.ask(b"L\r") == b"\r"
 
 
-@pytest.mark.parametrize("server_kind", [SlcanTcpServer, SlcanPtyServer, CanBusServer])
-async def test_an_unknown_fault_is_refused_with_those_there_are(server_kind, device):
-    async with server_kind(device) as server:
-        with pytest.raises(LookupError, match=r"no fault is called melt; known are .*drop.*freeze"):
-            server.inject("melt")
-
-
 async def test_a_bus_without_text_has_no_faults_of_text_and_cannot_be_cut(device):
     async with CanBusServer(device) as server:
         with pytest.raises(LookupError, match="long_line"):

@@ -211,14 +211,6 @@ def test_the_shaft_turns_as_fast_as_its_speed_says_which_wanders_by_what_it_is_t
     assert relative.mean() == pytest.approx(1.0, abs=1e-4)
 
 
-def test_without_wander_the_turns_are_even() -> None:
-    even = Rotation(np.random.default_rng(1), TURN_HZ, RATE_HZ)
-    index = np.arange(10_000.0)
-
-    assert np.array_equal(even.turns(index), TURN_HZ / RATE_HZ * index)
-    assert np.array_equal(even.relative_speed(index), np.ones(10_000))
-
-
 def test_a_shaft_that_is_followed_turns_by_its_mean_speed_without_a_jump() -> None:
     rotation, passed = FollowedRotation(60.0, RATE_HZ), []
     for number, (start_rpm, stop_rpm) in enumerate(((60.0, 60.0), (60.0, 30.0), (30.0, 0.0))):
