@@ -1,6 +1,8 @@
 """A ring behind a recording: gaps, restarts and the end arrive as they were recorded."""
 
 import asyncio
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -207,14 +209,8 @@ def test_a_feed_without_a_whole_slot_is_refused():
 
 
 def test_a_feed_in_engineering_units_is_refused(counting_feed):
-    feed = counting_feed()
-    in_counts = feed.advance
-
-    def in_units(n_samples: int) -> RawBlock:
-        raw = in_counts(n_samples)
-        return RawBlock(**vars(raw) | {"counts": raw.counts.astype(np.float32)})
-
-    feed.advance = in_units
+    raw = counting_feed().advance(50)
+    feed = SimpleNamespace(advance=lambda _: replace(raw, counts=raw.counts.astype(np.float32)))
     with pytest.raises(ConfigError, match="carries 16-bit counts, and the feed gives float32"):
         RingDevice(feed)
 

@@ -232,17 +232,12 @@ async def test_a_spoilt_slot_is_refused_and_counted_a_dropped_one_is_a_gap_and_t
     assert block.rejected == ((Rejection(reason, 50),) if reason else ())
 
 
-async def test_a_wrong_stamp_is_flagged(server, device, source):
+async def test_a_wrong_stamp_is_flagged_and_a_reset_begins_a_new_epoch(server, device, source):
     async with source.connect() as stream:
-        await anext(stream)
+        before = await anext(stream)
         server.inject("wrong_time")
         device.produce(1)
         assert (await anext(stream)).stamp_fault is StampFault.JUMPED
-
-
-async def test_a_reset_begins_a_new_epoch(server, source):
-    async with source.connect() as stream:
-        before = await anext(stream)
         server.inject("reset_epoch", 2)
         after = await anext(stream)
     assert (after.epoch, after.first_index) == (before.epoch + 2, 0)

@@ -19,6 +19,9 @@ from core.units import NS_PER_S
 START_NS = 1_735_689_600 * NS_PER_S
 STEP_NS = 600 * NS_PER_S
 SEED, YEARS = 4, 0.3
+NOW_NS = 1_794_657_615 * NS_PER_S
+"""14 November 2026, some time in the morning."""
+PLAN = LifePlan(2, held_load=0.95)
 
 
 @pytest.fixture(scope="module")
@@ -110,11 +113,10 @@ def test_what_cannot_be_is_refused(inputs: LifeInputs) -> None:
     loss = Damage(DamageKind.STIFFNESS_LOSS, "XJB", START_NS, math.nextafter(0.2, 1.0))
     with pytest.raises(ValueError, match="'XJB' is none of"):
         LifeCourse(inputs, (loss,), UNIT, running_ns(inputs))
-
-
-NOW_NS = 1_794_657_615 * NS_PER_S
-"""14 November 2026, some time in the morning."""
-PLAN = LifePlan(2, held_load=0.95)
+    with pytest.raises(ValueError, match="'XJB' is none of"):
+        history_until(LifePlan(2, damage=(loss,)), NOW_NS)
+    with pytest.raises(ValueError, match="years = 2 reach back beyond the life of unit 2"):
+        history_until(PLAN, NOW_NS, years=2.0)
 
 
 def test_readings_reach_until_now_and_a_year_back() -> None:
@@ -132,11 +134,3 @@ def test_a_unit_watched_again_tomorrow_has_the_same_past() -> None:
         assert both.mean() > 0.99
         again = tomorrow.readings[name].eccentricity_ratio[shared]
         assert np.array_equal(again, history.eccentricity_ratio[both])
-
-
-def test_a_past_beyond_the_life_is_refused() -> None:
-    with pytest.raises(ValueError, match="years = 2 reach back beyond the life of unit 2"):
-        history_until(PLAN, NOW_NS, years=2.0)
-    loss = Damage(DamageKind.STIFFNESS_LOSS, "XJB", NOW_NS, 0.2)
-    with pytest.raises(ValueError, match="'XJB' is none of"):
-        history_until(LifePlan(2, damage=(loss,)), NOW_NS)
