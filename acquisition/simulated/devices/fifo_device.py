@@ -10,7 +10,6 @@ import numpy as np
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
-from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_device import ModbusDevice
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import CountArray
@@ -37,8 +36,6 @@ class FifoDevice(ModbusDevice):
         Samples that are produced together.
     first_counter
         Counter of the first sample of all; near 65535 it wraps soon.
-    registers
-        Device whose registers are read at the same address; its own samples pass at the same pace.
 
     Attributes
     ----------
@@ -60,15 +57,14 @@ class FifoDevice(ModbusDevice):
         depth_samples: int = 4096,
         step_samples: int = 2,
         first_counter: int = 0,
-        registers: MapDevice | None = None,
         ledger: Ledger | None = None,
     ) -> None:
         super().__init__(feed, step_samples, unit, ledger)
-        self._layout, self._step_samples, self._registers = layout, step_samples, registers
+        self._layout, self._step_samples = layout, step_samples
         self.n_lost = 0
         n_queues = len(layout.addresses)
         self._queues: list[deque[_Record]] = [deque(maxlen=depth_samples) for _ in range(n_queues)]
-        self._n_dropped = self._n_restarts = 0
+        self._n_dropped = 0
         first = self._feed.peek()
         if first is None or first.counts.dtype != np.int16:
             raise ConfigError("a queue takes counts of a converter; the feed has none")
@@ -94,7 +90,6 @@ class FifoDevice(ModbusDevice):
 
     def restart(self) -> None:
         """Power off and on: queues empty, counter at zero."""
-        self._n_restarts += 1
         for queue in self._queues:
             queue.clear()
         ahead = self._feed.peek()
@@ -112,15 +107,6 @@ class FifoDevice(ModbusDevice):
             self._look()
         return data
 
-    def read_registers(self, function: int, address: int, count: int) -> bytes | None:
-        """Answer functions 3 and 4 of the registers beside the queues."""
-        registers = self._registers
-        return registers.read_registers(function, address, count) if registers else None
-
-    def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Answer functions 1 and 2 of the registers beside the queues."""
-        return self._registers.read_bits(function, address, count) if self._registers else None
-
     def _show(self, raw: RawBlock) -> None:
         if raw.epoch != self._feed_epoch:
             self._offset = -raw.first_index
@@ -132,10 +118,6 @@ class FifoDevice(ModbusDevice):
         first = raw.first_index + self._offset
         for n in range(raw.n_samples):
             self._put((first + n) % _COUNTER_MODULUS, raw.counts[:, n].astype(np.int16))
-
-    def _pass_step(self) -> None:
-        if self._registers is not None:
-            self._registers.produce()
 
     def _drop(self, count: int) -> None:
         self._n_dropped += count

@@ -92,11 +92,10 @@ class ModbusDevice(ABC):
             self._position += 1
             if ahead.epoch != self._feed_epoch or self._feed.number(ahead) <= self._position:
                 self._take()
-            self._pass_step()
 
-    @abstractmethod
-    def read_registers(self, function: int, address: int, count: int) -> bytes | None:
+    def read_registers(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
         """Big-endian words by function 3 or 4, or None if some do not exist."""
+        return None
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
         """Eight bits a byte by function 1 or 2, or None if some do not exist."""
@@ -120,9 +119,6 @@ class ModbusDevice(ABC):
     def _must_wait(self, ahead: RawBlock) -> bool:  # noqa: ARG002
         """Whether the next step must not come yet."""
         return False
-
-    def _pass_step(self) -> None:  # noqa: B027  optional
-        """Called at the end of each step, with or without data."""
 
     def _freeze(self, count: int) -> None:
         self._n_frozen += count
