@@ -19,25 +19,11 @@ from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.modbus_links import ModbusRtuServer
 from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.feed import FeedEndedError
 
 SHAPE = CanShape(
     channels=(DaqSignal("a", "V"), DaqSignal("b", "V")),
     slow=(DaqSignal("s", "MW"), DaqSignal("t", "MW")),
 )
-
-
-class EndingFeed:
-    """A counting feed that ends."""
-
-    def __init__(self, feed, n_blocks: int) -> None:
-        self._feed, self._n_blocks = feed, n_blocks
-
-    def advance(self, n_samples: int):
-        if self._n_blocks == 0:
-            raise FeedEndedError
-        self._n_blocks -= 1
-        return self._feed.advance(n_samples)
 
 
 class Terminal:
@@ -111,7 +97,7 @@ async def test_a_device_that_nobody_reads_stays_bounded(device):
 async def test_a_daq_that_waits_for_its_reader_loses_nothing_and_ends(
     counting_feed, stepped_clock, patient
 ):
-    device = CanDevice(EndingFeed(counting_feed(), 300), SHAPE)
+    device = CanDevice(counting_feed(stop_index=15_000), SHAPE)
     how = {"clock": stepped_clock, "patient": True} if patient else {"on_demand": True}
     async with SlcanTcpServer(device, **how) as server:
         for _ in range(100):
@@ -132,7 +118,7 @@ async def test_a_daq_that_waits_for_its_reader_loses_nothing_and_ends(
 
 
 async def test_an_impatient_daq_goes_on_without_a_reader(counting_feed):
-    device = CanDevice(EndingFeed(counting_feed(), 3), SHAPE)
+    device = CanDevice(counting_feed(stop_index=150), SHAPE)
     async with SlcanTcpServer(device, SystemClock()) as server:
         while not device.ended:
             await asyncio.sleep(0.01)
