@@ -60,7 +60,7 @@ def _bearing(life: LifeBearing, bracket_n_per_m: float, bracket_kg: float) -> Be
     ux, uy, ax, ay, far_x, far_y = (channel.id for channel in _channels(life.id))
     return Bearing(
         *(life.id, bracket_n_per_m, ux, uy, ax, ay),
-        clearance_um=life.told_clearance_um,
+        clearance_um=life.configured_clearance_um,
         gap_reference_um=REFERENCE_UM,
         oil_temperature=f"{life.id}_oil",
         opposite_x=far_x,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack, suppress
 
 from acquisition.errors import AcquisitionError
-from acquisition.simulated.devices.port import DaqServer
+from acquisition.simulated.devices.server import DaqServer
 
 Tell = Callable[[str], None]
 

@@ -26,6 +26,7 @@ from scipy.signal import lfilter
 
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.delivery.raw import RawBlock
+from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
 from core.baseline.stiffness_history import StiffnessHistory
 from core.monitor.assessment import Assessment
@@ -98,8 +99,9 @@ class CountingFeed:
         rate_hz: float = 600.0,
         start_ns: int = START_NS,
         slow: tuple[float, ...] = (45.0, float("nan")),
+        stop_index: int | None = None,
     ) -> None:
-        self._n_channels = n_channels
+        self._n_channels, self._stop_index = n_channels, stop_index
         self._rate_hz = rate_hz
         self._start_ns = start_ns
         self.slow = slow
@@ -108,6 +110,8 @@ class CountingFeed:
 
     def advance(self, n_samples: int) -> RawBlock:
         first = self.n_samples
+        if first == self._stop_index:
+            raise FeedEndedError
         self.n_samples += n_samples
         number = np.arange(first, self.n_samples) + np.arange(self._n_channels)[:, np.newaxis]
         return RawBlock(

@@ -1,7 +1,6 @@
-"""`RawBlock`: samples as a device delivers them, before calibration; and what produces them."""
+"""`RawBlock`: samples as a device delivers them, before calibration."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
@@ -42,24 +41,3 @@ class RawBlock:
     def stop_index(self) -> int:
         """Index of the first sample after the block."""
         return self.first_index + self.n_samples
-
-
-class FeedEndedError(Exception):
-    """A raw feed has nothing more to give, as at the end of a recording."""
-
-
-class RawFeed(Protocol):
-    """A device's converter: the simulated DAQ pulls its samples from one of these."""
-
-    def advance(self, n_samples: int) -> RawBlock:
-        """Produce the next samples.
-
-        A simulated unit gives just as many, following directly on the previous ones. A recording
-        gives fewer before a gap or a restart of the device, and then goes on behind it.
-
-        Raises
-        ------
-        FeedEndedError
-            If there are no more.
-        """
-        ...

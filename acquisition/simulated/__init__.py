@@ -1,1 +1,1 @@
-"""A simulated plant on the 10-DOF model: excitation, transducers, converter."""
+"""Simulated plant for tests and demonstrations: machine, devices and years of readings."""

@@ -1,34 +1,56 @@
-"""Samples without a wire: a feed cut into slots, and the ledger of what a device has offered."""
+"""Samples without a wire: feeds, a feed cut into slots, and the ledger of offered samples."""
 
 from collections import Counter
+from typing import Protocol
 
 from acquisition.delivery.block_grid import BlockGrid
-from acquisition.delivery.raw import FeedEndedError, RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
+
+
+class FeedEndedError(Exception):
+    """A sample feed has ended, as at the end of a recording."""
+
+
+class SampleFeed(Protocol):
+    """Source of samples of a simulated device, as its converter delivers them."""
+
+    def advance(self, n_samples: int) -> RawBlock:
+        """Return the next samples.
+
+        A simulated unit returns as many as requested, directly after the previous ones. A recording
+        returns fewer before a gap or a restart of the device, and continues behind it.
+
+        Raises
+        ------
+        FeedEndedError
+            If the feed has ended.
+        """
+        ...
 
 
 class Ledger:
-    """Samples per channel offered by each unit in each epoch, lost ones included."""
+    """Samples per channel offered by each unit in each epoch, including lost ones."""
 
     def __init__(self) -> None:
         self._offered: Counter[tuple[str, int]] = Counter()
 
     def offer(self, unit: str, epoch: int, n_samples: int) -> None:
-        """Book samples that a device has produced."""
+        """Count samples that a device has produced."""
         self._offered[unit, epoch] += n_samples
 
     def n_samples(self, unit: str, epoch: int | None = None) -> int:
-        """Samples offered by a unit, in one epoch or in all."""
+        """Number of samples offered by a unit, in one epoch or in all."""
         return sum(n for (u, e), n in self._offered.items() if u == unit and epoch in (None, e))
 
 
 class SlotFeed:
-    """Looks one slot ahead, so that a device can tell how long a gap of its feed is.
+    """Feed cut into slots, one slot ahead, so that a device knows the length of a gap.
 
-    A slot begins at a multiple of its length. What a feed gives before a gap, a restart or its end
-    and that fills no slot is left out.
+    A slot begins at a multiple of its length. Samples that fill no slot before a gap, a restart or
+    the end of the feed are left out.
     """
 
-    def __init__(self, feed: RawFeed, samples_per_slot: int) -> None:
+    def __init__(self, feed: SampleFeed, samples_per_slot: int) -> None:
         self._feed = feed
         self._samples_per_slot = samples_per_slot
         self._grid = BlockGrid(samples_per_slot)
@@ -50,11 +72,11 @@ class SlotFeed:
         return slot
 
     def number(self, slot: RawBlock) -> int:
-        """Place of a slot on the grid."""
+        """Number of a slot on the grid."""
         return slot.first_index // self._samples_per_slot
 
     def _next(self) -> RawBlock:
-        """Return the next whole slot; a piece no longer than a slot completes one at most."""
+        """Return the next whole slot; a piece of the feed completes at most one."""
         while True:
             for block in self._grid.put(self._feed.advance(self._samples_per_slot)):
                 if block.n_samples == self._samples_per_slot:

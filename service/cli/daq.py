@@ -8,8 +8,8 @@ import typer
 import uvloop
 
 from acquisition.clock import FastClock, SystemClock
-from acquisition.delivery.raw import RawFeed
 from acquisition.errors import AcquisitionError
+from acquisition.simulated.feed import SampleFeed
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.daq_program import run_daq
 from service.settings.plant import PlantFile
@@ -61,7 +61,7 @@ def daq(
         fail(f"padwatch daq: {error.args[0]}")
 
 
-def _feeds(plant: PlantFile, recordings: list[Path]) -> Mapping[str, RawFeed]:
+def _feeds(plant: PlantFile, recordings: list[Path]) -> Mapping[str, SampleFeed]:
     if recordings:
         played = recordings_by_unit(recordings, plant)
         return {u.id: recorded_feed(played[u.id], u) for u in plant.unit if u.id in played}

@@ -7,13 +7,12 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE
-from acquisition.delivery.raw import RawFeed
-from acquisition.simulated.devices.can_bus import CanBusServer
-from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.devices.can_server import CanBusServer
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
-from acquisition.simulated.devices.port import DaqServer
+from acquisition.simulated.devices.server import DaqServer
+from acquisition.simulated.feed import SampleFeed
 from core.machine.unit import Measurand
 from service.conversion import calibration_of
 from service.settings import can as settings
@@ -105,7 +104,7 @@ def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
 def can_daq_of(
     unit: UnitSettings,
     source: settings.CanSettings,
-    feed: RawFeed,
+    feed: SampleFeed,
     clock: Clock | None,
     *,
     patient: bool,

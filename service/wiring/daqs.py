@@ -1,10 +1,9 @@
 """Simulated DAQs in front of any raw feed, where the unit's source looks for them."""
 
 from acquisition.clock import Clock
-from acquisition.delivery.raw import RawFeed
-from acquisition.simulated.devices.port import DaqServer
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
+from acquisition.simulated.devices.server import DaqServer
+from acquisition.simulated.feed import SampleFeed
 from service.conversion import calibration_of, machine_of
 from service.settings import modbus_sources, sources
 from service.settings.can import CanSettings
@@ -18,7 +17,9 @@ from service.wiring.register_daqs import (
 )
 
 
-def daq_of(unit: UnitSettings, feed: RawFeed, clock: Clock | None, *, recorded: bool) -> DaqServer:
+def daq_of(
+    unit: UnitSettings, feed: SampleFeed, clock: Clock | None, *, recorded: bool
+) -> DaqServer:
     """A DAQ of the kind that a unit's source reads.
 
     Parameters

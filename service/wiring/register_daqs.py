@@ -4,13 +4,12 @@ from pathlib import Path
 
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawFeed
 from acquisition.simulated.devices.fifo_device import FifoDevice
-from acquisition.simulated.devices.map_device import MapDevice
-from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
-from acquisition.simulated.devices.vector_device import VectorDevice
+from acquisition.simulated.devices.map_device import MapDevice, VectorDevice
+from acquisition.simulated.devices.modbus_device import ModbusDevice
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
+from acquisition.simulated.devices.modbus_server import ModbusServer
+from acquisition.simulated.feed import SampleFeed
 from core.machine.unit import Unit
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import (
@@ -27,7 +26,7 @@ def polled_device(
     source: ModbusPolledSettings,
     unit: Unit,
     calibration: UnitCalibration,
-    feed: RawFeed,
+    feed: SampleFeed,
     *,
     on_demand: bool,
 ) -> MapDevice:
@@ -42,7 +41,7 @@ def vector_device(
     source: ModbusVectorSettings,
     unit: Unit,
     calibration: UnitCalibration,
-    feed: RawFeed,
+    feed: SampleFeed,
     *,
     on_demand: bool,
 ) -> VectorDevice:
@@ -73,7 +72,7 @@ def vector_device(
 
 
 def fifo_device(
-    source: ModbusFifoSettings, unit: Unit, feed: RawFeed, *, on_demand: bool
+    source: ModbusFifoSettings, unit: Unit, feed: SampleFeed, *, on_demand: bool
 ) -> FifoDevice:
     """Queues that a feed's samples wait in."""
     device = FifoDevice(feed, source.fifo_layout(len(unit.channels)), unit.id)

@@ -97,7 +97,7 @@ def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
     _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
     if unit.rated_power_mw is not None:
         _compare(unit, "rated_power_mw", unit.rated_power_mw, RATED_POWER_MW)
-    told_um = {life.id: life.told_clearance_um for life in LIFE_BEARINGS}
+    told_um = {life.id: life.configured_clearance_um for life in LIFE_BEARINGS}
     brackets = {b.bearing: b for b in RotorParameters().brackets}
     for bearing in unit.bearing:
         bracket, name = brackets[bearing.id], bearing.id

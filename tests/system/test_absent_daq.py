@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 
 from .conftest import WIRE, Start
 

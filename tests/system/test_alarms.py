@@ -12,10 +12,11 @@ import numpy as np
 from rigs.command_line import padwatch
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.raw import RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import open_recording
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.feed import SampleFeed
 from service.settings.loading import load_plant_file
 from service.wiring.simulations import simulated_feed
 
@@ -43,7 +44,7 @@ PATIENT = f"{WIRE}timeout_s = 5.0\n"
 class BreakableFeed:
     """A simulated machine whose first probe fails when told, and a copy of all it has delivered."""
 
-    def __init__(self, feed: RawFeed) -> None:
+    def __init__(self, feed: SampleFeed) -> None:
         self._feed = feed
         self.is_broken = False
         self.delivered: list[RawBlock] = []
@@ -63,7 +64,7 @@ class BreakableFeed:
 
 
 @asynccontextmanager
-async def plugged_in(feed: RawFeed) -> AsyncIterator[int]:
+async def plugged_in(feed: SampleFeed) -> AsyncIterator[int]:
     """A DAQ with this machine behind it, at its own pace; the port it listens on."""
     async with ModbusTcpServer(RingDevice(feed), SystemClock()) as server:
         running = asyncio.create_task(server.run())

@@ -11,9 +11,8 @@ import pytest
 
 from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.transport import TcpTransport
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.rotor import unbalance_force_n
 from acquisition.simulated.plant.scenario import (

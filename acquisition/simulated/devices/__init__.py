@@ -1,1 +1,1 @@
-"""Simulated measuring devices: any samples, served over the real protocols."""
+"""Simulated measuring devices: sample feeds served over real protocols."""

@@ -1,38 +1,124 @@
-"""`CanDevice`: a simulated unit behind a CAN DAQ; samples in, frames out; no bus, no time."""
+"""`CanDevice`: converter of a unit behind CAN frames; faults of its frames and of the bus."""
 
 from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import TypeAlias
 
-from acquisition.delivery.raw import FeedEndedError, RawBlock, RawFeed
+import numpy as np
+
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.simulated.devices.can_frames import FrameEncoder, WireFrame
+from acquisition.simulated.devices.can_frames import FrameEncoder, FrameKind, WireFrame, shortened
 from acquisition.simulated.devices.can_shape import CanShape
-from acquisition.simulated.feed import Ledger
+from acquisition.simulated.feed import FeedEndedError, Ledger, SampleFeed
 from core.units import NS_PER_S
+
+Item: TypeAlias = WireFrame | bytes
+"""A frame, or a line of a text protocol."""
+
+_LONG_LINE = b"t100" + b"8" * 5000 + b"\r"
+_FOREIGN_ID = 0x7F0
+_FLOOD = 10
+"""Foreign frames before each spoilt one."""
+
+
+class FrameFaults:
+    """Applies faults to waveform frames, one fault to each, in the order of injection.
+
+    Parameters
+    ----------
+    as_line
+        Writes a frame as text; None without a text protocol.
+    """
+
+    def __init__(self, as_line: Callable[[WireFrame], bytes] | None = None) -> None:
+        self._waiting: deque[Callable[[WireFrame], list[Item]]] = deque()
+        self._random = np.random.default_rng(20261121)
+        self._held: WireFrame | None = None
+        self.known: dict[str, Callable[[WireFrame], list[Item]]] = {
+            "drop": lambda _: [],
+            "repeat": lambda frame: [frame, frame],
+            "reorder": self._hold_back,
+            "wrong_dlc": lambda frame: [shortened(frame)],
+            "error_frame": lambda frame: [_bare(FrameKind.ERROR), frame],
+            "bus_off": lambda _: [_bare(FrameKind.BUS_OFF)],
+            "flood": lambda frame: [*(self._foreign() for _ in range(_FLOOD)), frame],
+            "rtr": lambda frame: [replace(frame, kind=FrameKind.REMOTE, data=b"", fd=False), frame],
+            "extended_twin": lambda frame: [self._twin(frame), frame],
+        }
+        if as_line is not None:
+            self.known |= {
+                "non_hex_line": lambda frame: [self._non_hex(as_line(frame))],
+                "long_line": lambda frame: [_LONG_LINE, frame],
+                "truncated_line": lambda frame: [as_line(frame)[:-6] + b"\r"],
+            }
+
+    def inject(self, fault: str, count: int) -> None:
+        """Apply a fault to each of the next `count` waveform frames."""
+        self._waiting.extend([self.known[fault]] * count)
+
+    def applied(self, frames: Iterable[WireFrame]) -> list[Item]:
+        """Return what is sent instead of these frames."""
+        items: list[Item] = []
+        for frame in frames:
+            if not frame.wave or not (self._waiting or self._held):
+                items.append(frame)
+            elif self._held is not None and frame.frame_id == self._held.frame_id:
+                items += [frame, self._held]
+                self._held = None
+            elif self._held is not None or not self._waiting:
+                items.append(frame)
+            else:
+                items += self._waiting.popleft()(frame)
+        return items
+
+    def _hold_back(self, frame: WireFrame) -> list[Item]:
+        """Let the next frame of the same message overtake this one."""
+        self._held = frame
+        return []
+
+    def _foreign(self) -> WireFrame:
+        frame_id = _FOREIGN_ID + int(self._random.integers(0, 15))
+        return WireFrame(frame_id, False, False, self._random.bytes(8))
+
+    def _twin(self, frame: WireFrame) -> WireFrame:
+        data = self._random.bytes(len(frame.data))
+        return replace(frame, extended=not frame.extended, data=data, wave=False)
+
+    def _non_hex(self, line: bytes) -> bytes:
+        place = int(self._random.integers(5, len(line) - 1))
+        wrong = bytes([int(self._random.choice(list(b"gGxX?!zZ -_")))])
+        return line[:place] + wrong + line[place + 1 :]
+
+
+def _bare(kind: FrameKind) -> WireFrame:
+    return WireFrame(0, False, False, b"", kind)
+
 
 _U32 = 1 << 32
 
 
 class CanDevice:
-    """One unit's converter and CAN controller; the first block is there from the start.
+    """Converter and CAN controller of one unit; the first block is there from the start.
 
     Parameters
     ----------
     feed
-        Where the samples come from.
+        Source of the samples.
     unit
-        Name under which the ledger books.
+        Name of the unit in the ledger.
     block_samples
-        Samples in a block, each of which begins with health, time and slow values.
+        Samples of a block, which begins with health, time and slow values.
     buffer_blocks
-        Blocks that wait while nobody listens; then the oldest are lost.
+        Blocks kept while no reader listens; more push out the oldest.
 
     Attributes
     ----------
-    frozen
-        Blocks for which the converter stands still: the last one is sent again.
     ended
-        Whether the feed has nothing more to give.
+        Whether the feed has ended.
+    elapsed_ns
+        Time of the blocks so far, including gaps of the feed.
 
     Raises
     ------
@@ -42,7 +128,7 @@ class CanDevice:
 
     def __init__(
         self,
-        feed: RawFeed,
+        feed: SampleFeed,
         shape: CanShape,
         unit: str = "U1",
         ledger: Ledger | None = None,
@@ -54,7 +140,7 @@ class CanDevice:
         self._encoder = FrameEncoder(shape)
         self.ledger = ledger or Ledger()
         self.block_samples = block_samples
-        self.frozen = 0
+        self._n_frozen = 0
         self.ended = False
         self._waiting: deque[list[WireFrame]] = deque(maxlen=buffer_blocks)
         self._n_restarts = 0
@@ -77,17 +163,17 @@ class CanDevice:
         return len(self._waiting) == self._waiting.maxlen
 
     def next_frames(self) -> list[WireFrame]:
-        """Take the oldest block that waits.
+        """Take the oldest waiting block.
 
         Raises
         ------
         LookupError
-            If none does.
+            If no block waits.
         """
         return self._waiting.popleft()
 
     def produce(self, n_blocks: int = 1) -> None:
-        """Let the converter run; once the feed has ended, nothing happens."""
+        """Let the converter run for some blocks, or to the end of the feed."""
         for _ in range(n_blocks):
             try:
                 self._take(self._feed.advance(self.block_samples))
@@ -95,8 +181,12 @@ class CanDevice:
                 self.ended = True
                 return
 
+    def freeze(self, n_blocks: int) -> None:
+        """Send the last block again instead of the next ones."""
+        self._n_frozen += n_blocks
+
     def restart(self) -> None:
-        """Power off and on: the count begins at zero, in the next epoch."""
+        """Power off and on: the index begins at zero, in the next epoch."""
         self._n_restarts += 1
         self._index_offset = None
 
@@ -110,14 +200,14 @@ class CanDevice:
             first_index=raw.first_index + self._index_offset,
         )
         self.ledger.offer(self._unit, sent.epoch, raw.n_samples)
-        if self.frozen and self._last:
-            self.frozen -= 1
+        if self._n_frozen and self._last:
+            self._n_frozen -= 1
         else:
             self._last = self._encoder.frames(sent)
         self._waiting.append(self._last)
 
     def _pass_time(self, raw: RawBlock) -> None:
-        """Gaps take as long as they took; a restart, of which nobody knows how long, takes none."""
+        """Count the time of a block and of a gap before it; a restart takes no time."""
         epoch, stop = self._stop
         n_passed = raw.stop_index - stop
         if raw.epoch != epoch or n_passed < raw.n_samples:

@@ -1,4 +1,4 @@
-"""A block of samples as the frames that carry it."""
+"""CAN frames of a block of samples."""
 
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -6,18 +6,15 @@ from enum import Enum
 import numpy as np
 
 from acquisition.delivery.raw import RawBlock
-from acquisition.simulated.devices.can_shape import CanShape, MessageShape
+from acquisition.simulated.devices.can_shape import FD_LENGTHS, CanShape, MessageShape
 
 _NS_PER_US = 1000
 _US_PER_S = 1_000_000
-FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
-"""Bytes that a frame can have; classic ones up to eight."""
-
 _U16, _U32 = 1 << 16, 1 << 32
 
 
 class FrameKind(Enum):
-    """What lies on the wire."""
+    """Kind of a frame on the bus."""
 
     DATA = "data"
     REMOTE = "remote"
@@ -27,7 +24,7 @@ class FrameKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class WireFrame:
-    """A frame on its way.
+    """A frame on the bus.
 
     Parameters
     ----------
@@ -105,6 +102,6 @@ class FrameEncoder:
 
 
 def shortened(frame: WireFrame) -> WireFrame:
-    """The frame as its message's next shorter length would have it."""
+    """The frame cut to the next shorter length."""
     length = max(n for n in FD_LENGTHS if n < len(frame.data))
     return replace(frame, data=frame.data[:length])

@@ -1,18 +1,23 @@
-"""`CanShape`: the messages of the simulated CAN DAQ, from which both its DBC and its frames follow.
+"""`CanShape`: messages of the simulated CAN DAQ; its DBC, and the settings that read it.
 
-A block of samples begins with messages that say what holds for it: index, epoch, health, time and
-slow values, each with a counter that ties it to the block's first sample. Then come the samples.
+A block of samples begins with messages of its index, epoch, health, time and slow values, each with
+a counter that assigns it to the first sample of the block. The samples follow.
 """
 
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.errors import ConfigError
 
-_FD_LENGTHS = (8, 12, 16, 20, 24, 32, 48, 64)
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+"""Lengths of a frame in bytes; classic frames have up to eight."""
+
 _FD_SAMPLES = 5
 _FD_WAVE_HEAD, _FD_HEAD, _CLASSIC_HEAD = 4, 24, 2
 _MAX_CHANNELS = 32
@@ -20,7 +25,7 @@ _MAX_SLOW = 50
 
 
 class Kind(Enum):
-    """Types of signals: letter and size of numpy."""
+    """Type of a signal, by its numpy code."""
 
     U8 = "u1"
     U16 = "u2"
@@ -52,7 +57,7 @@ class MessageShape:
     Parameters
     ----------
     first_channel
-        Of those it carries samples of; None if it carries none.
+        First channel whose samples it carries; None if it carries none.
     """
 
     name: str
@@ -65,7 +70,7 @@ class MessageShape:
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """The message as a numpy record; classic ones are Intel, FD ones Motorola."""
+        """Numpy record of the message: little-endian if classic, big-endian if FD."""
         order = ">" if self.fd else "<"
         return np.dtype(
             {
@@ -77,18 +82,18 @@ class MessageShape:
         )
 
     def records(self, n_frames: int) -> npt.NDArray[np.void]:
-        """Empty frames to be filled in."""
+        """Frames of zeros."""
         return np.zeros(n_frames, dtype=self.dtype)
 
 
 @dataclass(frozen=True)
 class DaqSignal:
-    """A channel as the DBC describes it.
+    """A channel in the DBC.
 
     Parameters
     ----------
     unit, factor
-        Of its counts; a DAQ that sends float32 gives engineering units, factor 1.
+        Unit of its values, and value of one count; float32 samples have factor 1.
     """
 
     id: str
@@ -98,14 +103,14 @@ class DaqSignal:
 
 @dataclass(frozen=True, kw_only=True)
 class CanShape:
-    """What the simulated DAQ sends.
+    """Messages of the simulated DAQ.
 
     Parameters
     ----------
     floats
         Whether samples are float32 engineering units rather than int16 counts.
     base_id
-        Id of the first message; the others follow.
+        Id of the first message; the others have the following ids.
 
     Raises
     ------
@@ -135,12 +140,12 @@ class CanShape:
 
     @property
     def samples_per_frame(self) -> int:
-        """Of each channel."""
+        """Samples of each channel in a waveform frame."""
         return _FD_SAMPLES if self.fd else 1
 
     @property
     def messages(self) -> tuple[MessageShape, ...]:
-        """All messages in the order in which a block is sent."""
+        """All messages in the order in which a block sends them."""
         shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
         return tuple(
             MessageShape(
@@ -157,7 +162,7 @@ class CanShape:
 
     @property
     def waves(self) -> tuple[MessageShape, ...]:
-        """Those messages that carry samples."""
+        """Messages that carry samples."""
         return tuple(m for m in self.messages if m.first_channel is not None)
 
     def _classic_heads(self) -> "list[_Shape]":
@@ -214,7 +219,7 @@ _COUNTER = Field("counter", 0, Kind.U16)
 
 
 def dbc_name(channel_id: str) -> str:
-    """A channel's id as DBC allows names: letters, digits and underscores, no digit first."""
+    """Id of a channel as a DBC name: letters, digits and underscores, no digit first."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in channel_id)
     return f"_{name}" if name[0].isdigit() else name
 
@@ -225,4 +230,105 @@ def _floats(slow: tuple[DaqSignal, ...], offset: int) -> list[Field]:
 
 def _wire_length(fields: list[Field], fd: bool) -> int:
     end = max(field.offset + field.kind.n_bytes for field in fields)
-    return next(n for n in _FD_LENGTHS if n >= end) if fd else end
+    return next(n for n in FD_LENGTHS if n >= max(end, 8)) if fd else end
+
+
+_NODE = "DAQ"
+_NAME = "the simulated CAN DAQ's own DBC"
+_CLASSIC_FORMAT, _FD_FORMAT = 0, 14
+_HEADER = f"""VERSION ""
+
+NS_ :
+
+BS_:
+
+BU_: {_NODE}
+"""
+_ATTRIBUTES = """
+BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","reserved","reserved",\
+"reserved","reserved","reserved","reserved","reserved","reserved","reserved","reserved",\
+"reserved","StandardCAN_FD","ExtendedCAN_FD";
+BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
+"""
+
+
+def daq_dbc(shape: CanShape) -> str:
+    """Text of the DBC file that describes the simulated DAQ's messages."""
+    parts = [_HEADER]
+    parts += [_message(message) for message in shape.messages]
+    parts.append(_ATTRIBUTES)
+    for message in shape.messages:
+        number = (_FD_FORMAT if message.fd else _CLASSIC_FORMAT) + message.extended
+        parts.append(f'BA_ "VFrameFormat" BO_ {_dbc_id(message)} {number};\n')
+    for message in shape.messages:
+        for field in message.fields:
+            if field.kind is Kind.F32:
+                parts.append(f"SIG_VALTYPE_ {_dbc_id(message)} {field.name} : 1;\n")
+    return "".join(parts)
+
+
+def daq_settings(
+    shape: CanShape, link: CanLinkSettings, units: tuple[str, ...], **others: Any
+) -> CanSettings:
+    """Settings of a source that reads the simulated DAQ, with its DBC as text.
+
+    Parameters
+    ----------
+    units
+        Engineering unit of each waveform channel.
+    others
+        Further settings of the source.
+    """
+    where = {field.name: m.name for m in shape.messages for field in m.fields}
+    return CanSettings(
+        link=link,
+        dbc=Path(_NAME),
+        dbc_text=daq_dbc(shape),
+        channels=tuple(
+            CanChannel(c.id, unit, tuple(f"{where[n]}.{n}" for n in shape.sample_names(c.id)))
+            for c, unit in zip(shape.channels, units, strict=True)
+        ),
+        slow=tuple(
+            CanSlowChannel(s.id, s.unit, f"{where[dbc_name(s.id)]}.{dbc_name(s.id)}")
+            for s in shape.slow
+        ),
+        **_beside(shape),
+        **others,
+    )
+
+
+def _beside(shape: CanShape) -> dict[str, Any]:
+    """Settings of counters and of all signals that are not channels."""
+    where = {field.name: m.name for m in shape.messages for field in m.fields}
+    counters = [
+        f"{message.name}.{field.name}"
+        for message in shape.messages
+        for field in message.fields
+        if field.name in ("counter", "index")
+    ]
+    return {
+        "counters": tuple(counters),
+        "frame_samples": tuple(f"{m.name}.valid" for m in shape.waves) if shape.fd else (),
+        "epoch": "HEAD.epoch",
+        "ok_bits": f"{where['ok']}.ok",
+        "seconds": f"{where['seconds']}.seconds",
+        "microseconds": f"{where['microseconds']}.microseconds",
+        "hold_samples": f"{where['n_samples']}.n_samples",
+    }
+
+
+def _message(message: MessageShape) -> str:
+    lines = [f"\nBO_ {_dbc_id(message)} {message.name}: {message.length} {_NODE}\n"]
+    lines += [_signal(field, message.fd) for field in message.fields]
+    return "".join(lines)
+
+
+def _signal(field: Field, motorola: bool) -> str:
+    start = 8 * field.offset + (7 if motorola else 0)
+    sign = "-" if field.kind in (Kind.I16, Kind.F32) else "+"
+    place = f"{start}|{8 * field.kind.n_bytes}@{0 if motorola else 1}{sign}"
+    return f' SG_ {field.name} : {place} ({field.factor!r},0) [0|0] "{field.unit}" {_NODE}\n'
+
+
+def _dbc_id(message: MessageShape) -> int:
+    return message.frame_id | (1 << 31 if message.extended else 0)

@@ -1,24 +1,23 @@
-"""slcan servers: the simulated CAN DAQ behind a serial adapter, on a TCP port or a pseudo-terminal.
+"""slcan servers of the simulated CAN DAQ: a serial adapter on a TCP port or a pseudo-terminal.
 
-The text protocol of Lawicel's adapters, with the FD lines ``d D b B`` of newer ones and the state
-lines ``s`` and ``e`` of Linux' slcan driver.
+The protocol is the text protocol of Lawicel adapters, with the FD lines ``d D b B`` of newer ones
+and the state lines ``s`` and ``e`` of the slcan driver of Linux.
 """
 
 import asyncio
-import os
-import tty
+from abc import abstractmethod
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from acquisition.clock import Clock
 from acquisition.errors import LinkError
-from acquisition.simulated.devices import line_link
-from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_faults import Item
-from acquisition.simulated.devices.can_frames import FD_LENGTHS, FrameKind, WireFrame
+from acquisition.simulated.devices.can_device import CanDevice, Item
+from acquisition.simulated.devices.can_frames import FrameKind, WireFrame
 from acquisition.simulated.devices.can_server import CanDaqServer
+from acquisition.simulated.devices.can_shape import FD_LENGTHS
+from acquisition.simulated.devices.server import PseudoTerminal
 
 _MAX_COMMAND = 64
 _OK, _ERROR = b"\r", b"\a"
@@ -45,12 +44,12 @@ def _padded(length: int) -> int:
 
 
 class _SlcanServer(CanDaqServer):
-    """Commands and the state of the adapter's channel.
+    """Commands to an adapter, and the state of its channel.
 
     Attributes
     ----------
     commands
-        How often each command letter has come; frames to be sent have ``t``, ``T``, ``r``, ….
+        Number of commands by letter; frames to be sent have ``t``, ``T``, ``r``, ….
     """
 
     def __init__(
@@ -74,11 +73,19 @@ class _SlcanServer(CanDaqServer):
             self._bus_off = isinstance(item, WireFrame) and item.kind is FrameKind.BUS_OFF
         await self._write(b"".join(lines))
 
+    @abstractmethod
+    def cut(self) -> None:
+        """Cut the connection, as a cable does that is unplugged for a moment."""
+
+    @abstractmethod
     async def _write(self, data: bytes) -> None:
-        raise NotImplementedError
+        """Send bytes, waiting as long as the reader does not take them."""
+
+    def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
+        return {**super()._faults_by_name(), "cut": lambda _: self.cut()}
 
     def _answer(self, data: bytes) -> bytes:
-        """Carry out the commands that came; return the answers."""
+        """Execute received commands; return the answers."""
         *commands, self._command = (self._command + data).split(b"\r")
         self._command = self._command[:_MAX_COMMAND]
         return b"".join(self._carried_out(command) for command in commands)
@@ -98,12 +105,12 @@ class _SlcanServer(CanDaqServer):
 
 
 class SlcanTcpServer(_SlcanServer):
-    """An slcan adapter on a TCP port; a new reader takes the place of an old one.
+    """An slcan adapter on a TCP port; a new reader replaces the one before.
 
     Parameters
     ----------
     port
-        0 takes a free one, and keeps it.
+        0 takes a free port, and keeps it.
     """
 
     def __init__(
@@ -124,7 +131,7 @@ class SlcanTcpServer(_SlcanServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Where a reader finds it."""
+        """Interface and URL of the socket."""
         return {"interface": "slcan", "channel": f"socket://{self._host}:{self._port}"}
 
     async def _plug_in(self) -> None:
@@ -172,12 +179,12 @@ class SlcanTcpServer(_SlcanServer):
 
 
 class SlcanPtyServer(_SlcanServer):
-    """An slcan adapter at a pseudo-terminal.
+    """An slcan adapter on a pseudo-terminal.
 
     Parameters
     ----------
     link
-        A symbolic link to be kept on the terminal, whose own name changes with each plugging in.
+        See `PseudoTerminal`.
     """
 
     def __init__(
@@ -190,72 +197,31 @@ class SlcanPtyServer(_SlcanServer):
         patient: bool = False,
     ) -> None:
         super().__init__(device, clock, on_demand, patient)
-        self._link = link
-        self._master = self._slave = -1
-        self._path = ""
-        self._writable = asyncio.Event()
+        self._line = PseudoTerminal(link, self._receive)
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Where a reader finds it."""
-        return {"interface": "slcan", "channel": str(self._link or self._path)}
+        """Interface and path of the terminal."""
+        return {"interface": "slcan", "channel": self._line.name}
 
     async def _plug_in(self) -> None:
-        self._attach()
-
-    def _attach(self) -> None:
-        try:
-            self._master, self._slave = os.openpty()
-        except OSError as exc:
-            raise LinkError(f"cannot make a pseudo-terminal: {exc.strerror}") from exc
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self._path = os.ttyname(self._slave)
-        if self._link is not None:
-            line_link.point(self._link, self._path)
-        asyncio.get_running_loop().add_reader(self._master, self._read)
+        self._line.open()
 
     async def _pull_out(self) -> None:
-        self._detach()
-
-    def _detach(self) -> None:
         self._open.clear()
-        loop = asyncio.get_running_loop()
-        loop.remove_reader(self._master)
-        loop.remove_writer(self._master)
-        os.close(self._master)
-        os.close(self._slave)
-        self._master = -1
-        self._writable.set()
-        if self._link is not None:
-            line_link.remove(self._link)
+        self._line.close()
 
     def cut(self) -> None:
         """Unplug the adapter and plug it in again."""
-        self._detach()
-        self._attach()
+        self._open.clear()
+        self._line.close()
+        self._line.open()
 
-    def _read(self) -> None:
-        with suppress(BlockingIOError):
-            data = os.read(self._master, 4096)
-            with suppress(BlockingIOError):
-                os.write(self._master, self._answer(data))
+    def _receive(self, data: bytes) -> None:
+        self._line.write(self._answer(data))
 
     async def _write(self, data: bytes) -> None:
         while data and self._open.is_set():
-            try:
-                data = data[os.write(self._master, data) :]
-            except BlockingIOError:
-                await self._room()
-
-    async def _room(self) -> None:
-        """Wait until the terminal takes more."""
-        loop = asyncio.get_running_loop()
-        master = self._master
-        self._writable.clear()
-        loop.add_writer(master, self._writable.set)
-        try:
-            await self._writable.wait()
-        finally:
-            if master == self._master:
-                loop.remove_writer(master)
+            data = self._line.write(data)
+            if data:
+                await self._line.writable()

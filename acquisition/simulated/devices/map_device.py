@@ -1,54 +1,56 @@
-"""`MapDevice`: a simulated device whose registers show the newest sample of a feed."""
+"""Simulated devices whose registers show the newest sample of a feed, or vectors of the newest."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.read_plan import plan_reads
 from acquisition.modbus.register_map import MapValue, RegisterMap
+from acquisition.simulated.devices.modbus_device import ModbusDevice
 from acquisition.simulated.devices.register_image import RegisterImage, no_value
-from acquisition.simulated.feed import Ledger, SlotFeed
+from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import FloatArray
+from core.spectra.lines import exact_phasors, tapered
+from core.spectra.vector_rows import VectorPart, VectorRow
+from core.units import hz_from_rpm
 
 _BEAT_MODULUS = 65536
-_LAST_LOOKS = 2
+_SENTINEL, _FLAG = "sentinel", "flag"
 
 
-class MapDevice:
-    """One unit's device, of which everything is read from registers.
+class MapDevice(ModbusDevice):
+    """Device of one unit that shows the newest sample in registers.
 
     Parameters
     ----------
     feed
-        Where the samples come from.
+        Source of the samples.
     registers
-        Its map, written by the ids of `rows` and of the calibration's slow channels; what else the
-        map names stays zero.
+        Register map, whose values are written by the ids of `rows` and of the slow channels of the
+        calibration; other values of the map stay zero.
     rows
-        Id of the value that each channel of the feed becomes.
+        Id of the value of each channel of the feed.
     calibration
-        Turns the feed's counts into the channels' units.
+        Converts the counts of the feed to units.
     step_samples
-        Samples that pass before the registers change; they show the last of them.
+        Samples between two changes of the registers, which show the last one.
 
     Attributes
     ----------
     image
         The registers.
     newest
-        What was written last.
-    frozen
-        While set, the device answers but its data stand still.
-    on_demand
-        Whether time passes only when a reader begins to read the map again.
+        Samples that were shown last.
     """
 
     def __init__(
         self,
-        feed: RawFeed,
+        feed: SampleFeed,
         registers: RegisterMap,
         rows: Sequence[str],
         calibration: UnitCalibration,
@@ -56,22 +58,17 @@ class MapDevice:
         step_samples: int = 1,
         ledger: Ledger | None = None,
     ) -> None:
-        self._feed = SlotFeed(feed, step_samples)
+        super().__init__(feed, step_samples, unit, ledger)
         self._map, self._rows, self._calibration = registers, rows, calibration
-        self._unit, self._step_samples = unit, step_samples
-        self.ledger = ledger or Ledger()
+        self._step_samples = step_samples
         self.image = RegisterImage(registers)
-        self.identification: Mapping[int, bytes] = {}
-        self.frozen = self.on_demand = self.ended = False
         self._values = {value.id: value for value in registers.values}
         self._first = next(iter(plan_reads(registers).spans))
-        self._spoilt: dict[str, int] = {}
-        self._beat = self._n_looks = 0
-        first = self._feed.take()
-        if first is None:
+        self._spoilt: Counter[str] = Counter()
+        self._beat = 0
+        if self._feed.peek() is None:
             raise ConfigError("the feed has nothing to show")
-        self._position = self._feed.number(first)
-        self._show(first)
+        self._take()
 
     @property
     def step_s(self) -> float:
@@ -79,24 +76,10 @@ class MapDevice:
         return self._step_samples / self.newest.rate_hz
 
     @property
-    def drained(self) -> bool:
-        """Whether the feed has ended and a reader has seen the last of it."""
-        return self.ended and self._n_looks >= _LAST_LOOKS
-
-    def produce(self, n_steps: int = 1) -> None:
-        """Let so much time pass; nobody sees what is overwritten."""
-        for _ in range(n_steps):
-            if self.frozen or self._spend("freeze"):
-                continue
-            ahead = self._feed.peek()
-            if ahead is None:
-                self.ended = True
-                return
-            self._position += 1
-            if ahead.epoch != self.newest.epoch or self._feed.number(ahead) <= self._position:
-                self._position = self._feed.number(ahead)
-                self._show(ahead)
-                self._feed.take()
+    def faults(self) -> Mapping[str, Callable[[int], None]]:
+        """A standstill; the device's error number, or a bad status, in all values."""
+        spoils = {name: partial(self._spoil_values, name) for name in (_SENTINEL, _FLAG)}
+        return {**super().faults, **spoils}
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
         """Answer functions 3 and 4."""
@@ -108,21 +91,6 @@ class MapDevice:
         self._look(function, address)
         return self.image.read_bits(function, address, count)
 
-    def read_fifo(self, address: int) -> bytes | None:  # noqa: ARG002
-        """There is no queue."""
-        return None
-
-    def fault_names(self) -> list[str]:
-        """What can happen to the next values."""
-        return ["freeze", "sentinel", "flag"]
-
-    def spoil(self, fault: str, count: int) -> None:
-        """Let one of these happen so many steps long, to all values.
-
-        A sentinel is the device's own number for an error, a flag its word for a bad value.
-        """
-        self._spoilt[fault] = self._spoilt.get(fault, 0) + count
-
     def _look(self, function: int, address: int) -> None:
         if (function, address) != (self._first.function, self._first.address):
             return
@@ -130,27 +98,25 @@ class MapDevice:
         if self.on_demand:
             self.produce()
 
-    def _spend(self, fault: str) -> bool:
-        left = self._spoilt.get(fault, 0)
-        self._spoilt[fault] = max(left - 1, 0)
-        return left > 0
+    def _spoil_values(self, fault: str, count: int) -> None:
+        self._spoilt[fault] += count
 
     def _show(self, raw: RawBlock) -> None:
         self.newest = raw
         self.ledger.offer(self._unit, raw.epoch, raw.n_samples)
-        is_error, is_flagged = self._spend("sentinel"), self._spend("flag")
+        self._spoilt, spoilt = self._spoilt - Counter((_SENTINEL, _FLAG)), self._spoilt
         numbers = self._numbers(raw, in_units(raw, self._calibration))
         for id_, (number, good) in numbers.items():
             value = self._values.get(id_)
             if value is not None:
-                self._write(value, number, good and not is_flagged, is_error)
+                self._write(value, number, good and not spoilt[_FLAG], bool(spoilt[_SENTINEL]))
         self._beat = (self._beat + 1) % _BEAT_MODULUS
         if self._map.heartbeat is not None:
             self.image.put(self._map.heartbeat, self._beat)
         self.image.put_time(raw.start_ns)
 
     def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:
-        """Number and goodness of every value that the device shows."""
+        """Number of every shown value, and whether it is good."""
         channels = {
             row: (float(samples[-1]), ok)
             for row, samples, ok in zip(self._rows, units, raw.ok, strict=True)
@@ -173,3 +139,80 @@ def in_units(raw: RawBlock, calibration: UnitCalibration) -> FloatArray:
     gain = np.array([channel.unit_per_count for channel in calibration.channels])
     units: FloatArray = raw.counts * gain[:, np.newaxis]
     return units
+
+
+class VectorDevice(MapDevice):
+    """Rack of one unit, which shows amplitudes and phases of a transform over the newest samples.
+
+    At constant speed phases count from a mark at sample number 0 of the feed.
+
+    Parameters
+    ----------
+    channels
+        Ids of the feed's channels, in their order.
+    rows
+        Quantities that the rack shows; must be in the map.
+    speed_channel
+        Slow channel of the running speed in r/min, the frequency of the 1× line.
+    window_samples
+        Samples that are transformed: a multiple of `step_samples`, some turns long.
+    vortex_order
+        Frequency of the vortex line, in multiples of the speed.
+    """
+
+    def __init__(
+        self,
+        feed: SampleFeed,
+        registers: RegisterMap,
+        rows: Sequence[VectorRow],
+        calibration: UnitCalibration,
+        *,
+        channels: Sequence[str],
+        speed_channel: str,
+        unit: str = "U1",
+        step_samples: int = 600,
+        window_samples: int = 6000,
+        vortex_order: float = 0.25,
+        ledger: Ledger | None = None,
+    ) -> None:
+        self._vector_rows, self._vortex_order = rows, vortex_order
+        self._channel = {id_: n for n, id_ in enumerate(channels)}
+        self._speed = [slow.id for slow in calibration.slow].index(speed_channel)
+        self._window: deque[RawBlock] = deque(maxlen=window_samples // step_samples)
+        super().__init__(feed, registers, (), calibration, unit, step_samples, ledger)
+
+    def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:  # noqa: ARG002
+        if self._window and (self._window[-1].epoch, self._window[-1].stop_index) != (
+            raw.epoch,
+            raw.first_index,
+        ):
+            self._window.clear()
+        self._window.append(raw)
+        samples = np.concatenate([in_units(r, self._calibration) for r in self._window], axis=1)
+        found = self._parts(samples, self._window[0].first_index, raw.slow[self._speed])
+        ok = np.all([r.ok for r in self._window], axis=0)
+        vectors = {
+            row.id: (float(found[row.part][n]), bool(ok[n]))
+            for row in self._vector_rows
+            for n in [self._channel[row.channel]]
+        }
+        slow = {c.id: (v, True) for c, v in zip(self._calibration.slow, raw.slow, strict=True)}
+        return vectors | slow
+
+    def _parts(
+        self, samples: FloatArray, first_index: int, speed_rpm: float
+    ) -> dict[VectorPart, FloatArray]:
+        """All quantities of a rack, (n_channels,); lines are NaN at standstill."""
+        rate_hz, turn_hz = self._calibration.rate_hz, hz_from_rpm(speed_rpm)
+        turns = np.full((len(samples), 2), np.nan, dtype=np.complex128)
+        if 0.0 < turn_hz < rate_hz / 2.0:
+            order_hz = turn_hz * np.array([1.0, self._vortex_order])
+            turns = exact_phasors(tapered(samples), rate_hz, order_hz)
+            turns *= np.exp(-2j * np.pi * order_hz * first_index / rate_hz)
+        return {
+            VectorPart.ORDER1_AMPLITUDE: np.abs(turns[:, 0]),
+            VectorPart.ORDER1_PHASE: np.rad2deg(np.angle(turns[:, 0])),
+            VectorPart.VORTEX_AMPLITUDE: np.abs(turns[:, 1]),
+            VectorPart.OVERALL: np.ptp(samples, axis=1) / 2.0,
+            VectorPart.GAP: samples.mean(axis=1),
+        }

@@ -1,27 +1,26 @@
-"""`RecordedFeed`: a recording behind a simulated DAQ, as its converter once was."""
+"""`RecordedFeed`: a recording as the feed of a simulated DAQ."""
 
 from collections import deque
 
 from acquisition.delivery.block_grid import BlockGrid
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.selection import Selection, all_of
+from acquisition.simulated.feed import FeedEndedError
 
 
 class RecordedFeed:
-    """The recorded samples in pieces as long as a DAQ wants them: a `RawFeed`.
+    """Recorded samples in pieces of the requested length.
 
-    Pieces begin at multiples of their length and keep epoch, index and stamps of the recording. One
-    is shorter where samples are missing in the recording, or where the device began anew. A piece
-    of several recorded blocks has the slow values of its first sample, and is OK where all are.
-
-    What the adapter had refused when it was recorded is missing here, like a gap: no wire carries
-    what was not accepted from it.
+    Pieces begin at multiples of their length and keep epoch, index and stamps of the recording. A
+    piece is shorter before a gap of the recording or a restart of the device. A piece of several
+    recorded blocks has the slow values of its first sample, and is OK where all blocks are. Samples
+    that were rejected during recording are a gap.
 
     Parameters
     ----------
     selection
-        Which channels, in which order; all as recorded if not given.
+        Channels and their order; all as recorded by default.
     """
 
     def __init__(self, recording: Recording, selection: Selection | None = None) -> None:
@@ -32,16 +31,16 @@ class RecordedFeed:
         self._ready: deque[RawBlock] = deque()
 
     def advance(self, n_samples: int) -> RawBlock:
-        """Give the next samples, at most this many.
+        """Return the next samples, at most this many.
 
         Raises
         ------
         FeedEndedError
-            If the recording has come to its end.
+            If the recording has ended.
         ConfigError
             If a file of the recording cannot be read any more.
         ValueError
-            If no samples are asked for.
+            If no samples are requested.
         """
         if n_samples < 1:
             raise ValueError(f"{n_samples} samples asked for; at least one is needed")

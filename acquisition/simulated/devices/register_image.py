@@ -1,4 +1,4 @@
-"""`RegisterImage`: what a simulated device has in its registers, written by its own map."""
+"""`RegisterImage`: registers of a simulated device, written through its register map."""
 
 import math
 import struct
@@ -19,12 +19,12 @@ _OF_CENTURY = 100
 
 
 class RegisterImage:
-    """Registers and bits of one device; only those that its map names exist.
+    """Registers and bits of one device; only those of its map exist.
 
     Parameters
     ----------
     ranges
-        Full scale of values whose map says that the device knows it; default -1000 to 1000.
+        Full scale of values whose map reads it from the device; default -1000 to 1000.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class RegisterImage:
         return None if len(found) < count else np.packbits(found, bitorder="little").tobytes()
 
     def put(self, cell: Cell, number: float) -> None:
-        """Write a number as it is to stand there; one that is too large becomes the largest."""
+        """Write a raw number; one out of range becomes the limit of its type."""
         start = cell.start(self._base)
         if cell.function in BIT_FUNCTIONS:
             self._bits[cell.function, start] = bool(number)
@@ -70,7 +70,7 @@ class RegisterImage:
                 self._words[cell.function, start + n] = word
 
     def put_bits(self, cell: Cell, mask: int, are_set: bool) -> None:
-        """Set or clear bits of a register and leave the others."""
+        """Set or clear bits of a register; the others are unchanged."""
         place = (cell.function, cell.start(self._base))
         if cell.byte_order.low_byte_first:
             mask = (mask & 0xFF) << 8 | mask >> 8
@@ -78,7 +78,7 @@ class RegisterImage:
         self._words[place] = word | mask if are_set else word & ~mask
 
     def put_value(self, value: MapValue, number: float) -> None:
-        """Write a value in the unit of its channel; not a number becomes the device's error."""
+        """Write a value in the unit of its channel; NaN becomes the error number of the device."""
         wanted = (number - value.offset) / value.scale
         if value.scale_register is not None:
             scale = max(1.0, math.ceil(abs(wanted))) if math.isfinite(wanted) else 1.0
@@ -98,7 +98,7 @@ class RegisterImage:
         self.put(value.cell, wanted if math.isfinite(wanted) else no_value(value))
 
     def put_flag(self, flag: FlagCheck, good: bool) -> None:
-        """Say by a status register whether a value is good."""
+        """Write to a status register whether a value is good."""
         is_bit = flag.cell.type is NumberType.BIT
         if flag.set_means is not None:
             is_set = good is (flag.set_means is Meaning.OK)
@@ -117,7 +117,7 @@ class RegisterImage:
         self.put_bits(flag.cell, number * flag.lowest_bit & flag.mask, True)
 
     def put_time(self, time_ns: int) -> None:
-        """Write the time of the measurement, if the map has one."""
+        """Write the time of the measurement, if it is in the map."""
         time = self._map.time
         if time is None:
             return
@@ -128,9 +128,9 @@ class RegisterImage:
             for cell in cells[1:]:
                 self.put(cell, int(rest_ns * time.parts_per_s / NS_PER_S))
             return
-        moment = datetime.fromtimestamp(time_ns // NS_PER_S + time.utc_offset_s, UTC)
+        utc = datetime.fromtimestamp(time_ns // NS_PER_S + time.utc_offset_s, UTC)
         for cell, name in zip(cells, time.fields, strict=True):
-            self.put(cell, getattr(moment, name) % (_OF_CENTURY if name == "year" else 1 << 16))
+            self.put(cell, getattr(utc, name) % (_OF_CENTURY if name == "year" else 1 << 16))
 
     def _create(self, function: int, start: int, stop: int) -> None:
         for at in range(start, stop):
@@ -141,7 +141,7 @@ class RegisterImage:
 
 
 def encoded(number: float, cell: Cell) -> bytes:
-    """Bytes of a number as they stand in the registers of its cell."""
+    """Bytes of a number in the registers of its cell."""
     dtype = np.dtype(DTYPES[cell.type])
     if cell.type not in FLOATS:
         limits = np.iinfo(dtype)
@@ -154,7 +154,7 @@ def encoded(number: float, cell: Cell) -> bytes:
 
 
 def no_value(value: MapValue) -> float:
-    """Raw number by which the device says that there is no value; zero if it cannot say so."""
+    """Raw number that the device shows without a value; zero if it has none."""
     if value.cell.type in FLOATS:
         return math.nan
     if value.invalid_values:

@@ -1,1 +1,1 @@
-"""Years in the life of a unit's guide bearings: as readings, or a moment of them as a scenario."""
+"""Simulated years of a unit's guide bearings: readings, and scenarios of single moments."""

@@ -1,41 +1,40 @@
-"""The bearings of the machine, warm and cold."""
+"""Guide bearings of the simulated machine, and their thermal course."""
 
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from acquisition.simulated.life.operation import Operation, lagged, wander
+from acquisition.simulated.life.operation import DAY_S, YEAR_S, Operation, lagged, wander
 from acquisition.simulated.plant.films import Oil, PadRing
 from core.arrays import FloatArray
 from core.units import NS_PER_S
 
 DESIGN_VISCOSITY_PA_S = 0.0340
-"""Of the paper's oil at 47.5 °C, the middle of the range its Table 1 gives (40 to 55 °C)."""
+"""Viscosity of the paper's oil at 47.5 °C, the middle of the range of its Table 1 (40 to 55 °C)."""
 
 DESIGN_SPEED_RPM = 92.3
 
 
 @dataclass(frozen=True)
 class LifeBearing:
-    """One guide bearing.
+    """Geometry and thermal behaviour of one guide bearing.
 
     Parameters
     ----------
     ring
-        Its pads, with the stiffness of Table 2 at the clearance in operation of Table 1 (Brito et
-        al.).
+        Pads, with the stiffness of Table 2 at the operating clearance of Table 1 (Brito et al.).
     cold_clearance_um
-        Radial clearance when shaft and housing are equally warm.
+        Radial clearance with shaft and housing at the same temperature.
     closing_um
-        By how much clearance closes once the shaft has got warmer than the housing.
+        Loss of clearance when the shaft has become warmer than the housing.
     opening_um
-        By how much the pads move out along one diameter once the bracket's arms are warmed by the
-        field of the generator at full load (Figure 3); across it they move in as much.
-    told_clearance_um
-        Clearance in the plant file, that of the warm machine; eccentricity is a ratio of it.
+        Outward motion of the pads along one diameter when the field of the generator at full load
+        has warmed the arms of the bracket (Figure 3); across it they move inward as much.
+    configured_clearance_um
+        Clearance in the plant file, that of the warm machine; the reference of eccentricity.
     oil_rise_c, oil_rise_at_load_c
-        Oil over cooling water at speed without load, and what full load adds.
+        Oil over cooling water at speed without load, and the additional rise at full load.
     oil_time_s, closing_time_s, opening_time_s
         Time constants while running.
     """
@@ -45,7 +44,7 @@ class LifeBearing:
     cold_clearance_um: float
     closing_um: float
     opening_um: float
-    told_clearance_um: float
+    configured_clearance_um: float
     oil_rise_c: float
     oil_rise_at_load_c: float
     oil_time_s: float = 0.8 * 3600.0
@@ -66,16 +65,16 @@ def _ring(n_pads: int, stiffness_n_per_m: float, clearance_um: float) -> PadRing
     )
 
 
-# Clearances are fitted, and nothing else: cold to k_eff at t1, closing to k_eff at t1 + 6.5 h of
-# Table 8 (UJB) and Table 9 (LJB, X), closing times to the gaps after 0.5 h and 1 h. The fitted
-# closing, 165 and 172 µm, compares with gaps that shrank by 127 to 153 µm and 251 to 274 µm.
+# Only clearances are fitted: cold to k_eff at t1, closing to k_eff at t1 + 6.5 h of Table 8 (UJB)
+# and Table 9 (LJB, X), closing times to the gaps after 0.5 h and 1 h. The fitted closing, 165 and
+# 172 µm, compares with gaps that shrank by 127 to 153 µm and 251 to 274 µm.
 LIFE_UJB = LifeBearing(
     "UJB",
     _ring(16, 6.67e9, 200.0),
     cold_clearance_um=668.0,
     closing_um=165.0,
     opening_um=6.0,
-    told_clearance_um=500.0,
+    configured_clearance_um=500.0,
     oil_rise_c=22.0,
     oil_rise_at_load_c=2.5,
 )
@@ -85,19 +84,19 @@ LIFE_LJB = LifeBearing(
     cold_clearance_um=795.0,
     closing_um=172.0,
     opening_um=2.0,  # less susceptible than the UJB (section 3.1)
-    told_clearance_um=615.0,
+    configured_clearance_um=615.0,
     oil_rise_c=21.5,
     oil_rise_at_load_c=4.0,
 )
-# The paper measured no stiffness of the TJB: it is taken to be one order of magnitude below the
-# design value, as "usually" (section 4). It has no thrust block beside it, nor arms in the field.
+# The paper has no measured stiffness of the TJB: it is assumed one order of magnitude below the
+# design value, as "usually" (section 4). It has no thrust block beside it and no arms in the field.
 LIFE_TJB = LifeBearing(
     "TJB",
     _ring(12, 6.67e9, 200.0),
     cold_clearance_um=455.0,
     closing_um=30.0,
     opening_um=0.0,
-    told_clearance_um=425.0,
+    configured_clearance_um=425.0,
     oil_rise_c=19.0,
     oil_rise_at_load_c=1.5,
 )
@@ -105,32 +104,31 @@ LIFE_BEARINGS = (LIFE_UJB, LIFE_LJB, LIFE_TJB)
 
 
 STANDING_TIME_FACTOR = 10.0
-"""By how much slower everything cools at standstill than it warms: the oil no longer flows."""
+"""Time constants at standstill, when the oil no longer flows, over those of running."""
 
 STANDING_OIL_C = 3.0
-"""Oil over water at standstill in the end: that of the hall."""
+"""Final temperature of the oil over the water at standstill: that of the hall."""
 
 WATER_MEAN_C = 22.5
 WATER_SEASON_C = 4.5
-"""The Paraná at Itaipu, warmest in February."""
+"""Mean and seasonal amplitude of the Paraná at Itaipu, warmest in February."""
 
 WARMEST_DAY = 45.0
-YEAR_S = 365.25 * 86_400.0
 
-CLOSING_RMS, CLOSING_TIME_S = 0.006, 6.0 * 86_400.0
-"""Of 165 µm it is 1 µm: what a kelvin's tenth between shaft and housing does."""
+CLOSING_RMS, CLOSING_TIME_S = 0.006, 6.0 * DAY_S
+"""1 µm of 165 µm: the effect of 0.1 K between shaft and housing."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThermalCourse:
-    """How warm a bearing is, and what that does to its clearance; all (n,).
+    """Temperature of a bearing and its effect on the clearance; all (n,).
 
     Parameters
     ----------
     closing_um
-        By which clearance is smaller than cold.
+        Loss of clearance from cold.
     opening_um
-        By which pads have moved out along the diameter that the field of the generator stretches.
+        Outward motion of the pads along the diameter that the field of the generator stretches.
     """
 
     oil_temperature_c: FloatArray
@@ -141,14 +139,14 @@ class ThermalCourse:
 def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArray:
     """Temperature of the cooling water: season and weather, (n,)."""
     n, step_s = len(operation), operation.step_s
-    year = (operation.time_ns / NS_PER_S - WARMEST_DAY * 86_400.0) / YEAR_S
+    year = (operation.time_ns / NS_PER_S - WARMEST_DAY * DAY_S) / YEAR_S
     season = WATER_SEASON_C * np.cos(2.0 * math.pi * year)
-    weather = wander(random, n, step_s, 12.0 * 86_400.0, 0.9)
+    weather = wander(random, n, step_s, 12.0 * DAY_S, 0.9)
     return np.asarray(WATER_MEAN_C + season + weather)
 
 
 def draw_closing_share(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw how much of the usual closing there is: air and water reach shaft and housing apart."""
+    """Draw the share of the usual closing: air and water reach shaft and housing separately."""
     n, step_s = len(operation), operation.step_s
     return 1.0 + wander(random, n, step_s, CLOSING_TIME_S, CLOSING_RMS)
 
@@ -161,18 +159,18 @@ def thermal_course(
     oil_offset_c: FloatArray | float = 0.0,
     initial_oil_c: float | None = None,
 ) -> ThermalCourse:
-    """Follow a bearing from cold.
+    """Compute the thermal course of a bearing from cold.
 
     Parameters
     ----------
     water_c : (n,)
-        Of the cooling water.
+        Temperature of the cooling water.
     closing_share : (n,) or one number
-        Of the usual difference between shaft and housing.
+        Share of the usual difference between shaft and housing.
     oil_offset_c : (n,) or one number
-        Warmer oil than usual while running, for a want of cooling.
+        Additional oil temperature while running, from lack of cooling.
     initial_oil_c
-        By default that of the hall.
+        That of the hall by default.
     """
     turns = operation.is_turning
     slower = np.where(turns, 1.0, STANDING_TIME_FACTOR)

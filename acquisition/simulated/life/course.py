@@ -1,4 +1,4 @@
-"""A life from one moment on, as a running plant."""
+"""Course of a life from one moment on, as a running plant."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -11,7 +11,7 @@ from acquisition.simulated.life.damage import Damage, alteration
 from acquisition.simulated.life.excitation import rotor_of
 from acquisition.simulated.life.films import film_course, mean_clearance_um, row_between, rows_of
 from acquisition.simulated.life.inputs import BearingInputs, LifeInputs, draw_inputs
-from acquisition.simulated.life.life import life_of, refuse_strange
+from acquisition.simulated.life.life import life_of, require_known_bearings
 from acquisition.simulated.life.moment import (
     TRANSDUCER_NOISE,
     bearing_at,
@@ -20,38 +20,38 @@ from acquisition.simulated.life.moment import (
     hydraulic_noise,
     vortex_rope,
 )
-from acquisition.simulated.life.operation import YEAR_DAYS, HeldLoad, Operation
+from acquisition.simulated.life.operation import DAY_NS, YEAR_S, HeldLoad, Operation
 from acquisition.simulated.life.truth import BearingMoments, UnitLife
 from acquisition.simulated.plant.scenario import HydraulicNoise, Scenario, TransducerNoise
 from core.machine.unit import Unit
 from core.units import NS_PER_S, ns_from_s
 
-LEAST_FILM_SPEED = 0.2
-"""Share of rated speed: below it films count as stiff as there. What holds a shaft that hardly
-turns is no film, but nothing shakes it either."""
+MIN_FILM_SPEED = 0.2
+"""Share of rated speed below which films keep the stiffness of that speed. A shaft that hardly
+turns is not held by a film, but not excited either."""
 
 
 class LifeCourse:
-    """A life from some moment on; between two readings everything runs in straight lines.
+    """Course of a life from one moment on, interpolated linearly between readings.
 
-    A unit that stands still is simulated too: forces fall with the square of speed, so that only
-    the noise of transducers is left, and gaps and oil go on as they do.
+    A unit at standstill is simulated too: forces fall with the square of speed, which leaves the
+    noise of transducers, and gaps and oil temperature continue.
 
     Parameters
     ----------
     damage
-        Sets in to the second, not with the next reading.
+        Begins at its onset, not with the next reading.
     machine
-        The unit to be sampled; see `scenario_at`.
+        Unit to be sampled; see `scenario_at`.
     start_ns
         Time of the first sample.
 
     Raises
     ------
     ValueError
-        If damage names an unknown bearing, or the moment does not lie within the life.
+        If damage names an unknown bearing, or the moment is not within the life.
     KeyError
-        If the machine has a bearing that the life has not.
+        If the life lacks a bearing of the machine.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class LifeCourse:
         start_ns: int,
         noise: TransducerNoise = TRANSDUCER_NOISE,
     ) -> None:
-        refuse_strange(damage, tuple(one.bearing for one in inputs.bearings))
+        require_known_bearings(damage, tuple(one.bearing for one in inputs.bearings))
         self._inputs, self._damage, self._noise = inputs, damage, noise
         self._machine, self._start_ns = machine, start_ns
         self._bearings = {one.bearing.id: one for one in inputs.bearings}
@@ -77,16 +77,16 @@ class LifeCourse:
 
     @property
     def rated_speed_rpm(self) -> float:
-        """Speed that the unit has while it runs."""
+        """Speed of the unit while it runs."""
         return self._inputs.operation.rated_speed_rpm
 
     def at(self, elapsed_s: float) -> Scenario:
-        """What holds some time after the first sample.
+        """Scenario at a time after the first sample.
 
         Raises
         ------
         ValueError
-            If the life does not last so long.
+            If the life is over by then.
         """
         time_ns = self._start_ns + ns_from_s(elapsed_s)
         row, share = self._place(time_ns)
@@ -116,7 +116,7 @@ class LifeCourse:
         )
 
     def _place(self, time_ns: int) -> tuple[int, float]:
-        """Row before a moment, and how far the moment is on the way to the next row."""
+        """Row before a moment, and the share of the way to the next row."""
         grid_ns = self._inputs.operation.time_ns
         row = int(np.searchsorted(grid_ns, time_ns, side="right")) - 1
         if not 0 <= row < self._n_rows - 1:
@@ -135,8 +135,8 @@ class LifeCourse:
         here = row_between(inputs, n, *place)
         thermal = row_between(inputs.thermal, n, *place)
         altered = alteration(self._damage, inputs.bearing.id, np.array([time_ns]))
-        least_rpm = LEAST_FILM_SPEED * self.rated_speed_rpm
-        speed_rpm = np.maximum(operation.speed_rpm, least_rpm)
+        min_rpm = MIN_FILM_SPEED * self.rated_speed_rpm
+        speed_rpm = np.maximum(operation.speed_rpm, min_rpm)
         course = film_course(
             *(inputs.bearing, inputs.setting, thermal, speed_rpm, here.position_um),
             altered,
@@ -152,7 +152,7 @@ class LifeCourse:
         )
 
     def _hydraulic(self, operation: Operation) -> HydraulicNoise:
-        """Broadband force: at standstill no water flows."""
+        """Broadband force, none at standstill without flow."""
         share = min(float(operation.speed_rpm[0]) / self.rated_speed_rpm, 1.0)
         running = hydraulic_noise(float(operation.load[0]))
         return HydraulicNoise(share**2 * running.rms_n, running.cutoff_hz)
@@ -164,22 +164,20 @@ def _usual_clearance_um(inputs: BearingInputs, turns: npt.NDArray[np.bool_]) -> 
 
 
 YEARS = 3.0
-"""Last year, this one and the next."""
-
-DAY_NS = 86_400 * NS_PER_S
+"""Duration of a life: last year, this year and the next."""
 
 
 @dataclass(frozen=True)
 class LifePlan:
-    """Which life a unit lives, and what comes to it.
+    """Choice of the life of a unit.
 
     Parameters
     ----------
     seed
-        Even: of a unit of 92.3 r/min, odd: of 90.9 r/min.
+        Even for a unit of 92.3 r/min, odd for 90.9 r/min.
     held_load
-        Share of rated power at which the unit is kept running from the beginning of yesterday on,
-        by UTC; None lets it start and stop as it will.
+        Share of rated power at which the unit runs without a stop since the beginning of yesterday
+        in UTC; None starts and stops it at random.
     """
 
     seed: int
@@ -188,38 +186,38 @@ class LifePlan:
 
 
 def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
-    """Readings of a life until now, with the truth beside them.
+    """Readings of a life until now, with the truth.
 
     Parameters
     ----------
     years
-        How far back; a year is always there.
+        Length; at least one year is available.
 
     Raises
     ------
     ValueError
         If the life does not reach so far back, or damage names an unknown bearing.
     """
-    refuse_strange(plan.damage, LIFE_BEARINGS)
+    require_known_bearings(plan.damage, LIFE_BEARINGS)
     inputs = _inputs(plan, now_ns)
-    time_ns, from_ns = inputs.operation.time_ns, now_ns - ns_from_s(years * YEAR_DAYS * 86_400.0)
+    time_ns, from_ns = inputs.operation.time_ns, now_ns - ns_from_s(years * YEAR_S)
     if from_ns < time_ns[0] - DAY_NS:
         raise ValueError(f"years = {years:g} reach back beyond the life of unit {plan.seed}")
-    wanted = inputs.operation.is_turning & (time_ns >= from_ns) & (time_ns < now_ns)
-    return life_of(inputs, plan.damage, np.asarray(wanted))
+    selected = inputs.operation.is_turning & (time_ns >= from_ns) & (time_ns < now_ns)
+    return life_of(inputs, plan.damage, np.asarray(selected))
 
 
 def course_from(
     plan: LifePlan, now_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> LifeCourse:
-    """Course of the same life from now on; it ends with next year.
+    """Course of the same life from now on, until the end of next year.
 
     Raises
     ------
     ValueError
         If damage names an unknown bearing.
     KeyError
-        If the machine has a bearing that the life has not.
+        If the life lacks a bearing of the machine.
     """
     return LifeCourse(_inputs(plan, now_ns), plan.damage, machine, now_ns, noise)
 

@@ -1,4 +1,4 @@
-"""What goes wrong with a bearing or its transducers, and how it grows."""
+"""Damage of a bearing or its transducers, and its growth."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -11,7 +11,7 @@ from core.units import NS_PER_S
 
 
 class DamageKind(StrEnum):
-    """What goes wrong. In films the first four, then what only looks like it, or not even that."""
+    """Kind of damage: four of the film, then of the bracket and of the transducers."""
 
     STIFFNESS_LOSS = "stiffness_loss"
     CLEARANCE_GROWTH = "clearance_growth"
@@ -32,19 +32,19 @@ class Damage:
     Parameters
     ----------
     size
-        Share that is lost in the end: of the film's stiffness (a step of all pads; growing
-        clearance, with the shaft following the pads), of the viscosity, of the bracket's
-        stiffness. For a pivot, by how much its pad recedes, over the clearance told. For a gain its
-        relative change, with its sign: -0.2 loses a fifth.
+        Final loss as a share: of the stiffness of the film (all pads; or by growing clearance, with
+        the shaft following the pads), of the viscosity, of the stiffness of the bracket. Of a
+        pivot, recession of its pad over the configured clearance. Of a gain, its signed relative
+        change: -0.2 loses a fifth.
     ramp_days
-        Time from onset to `size`, evenly; 0 is a step.
+        Time of linear growth from onset to `size`; 0 is a step.
     directions
-        Whose transducers change, for gains.
+        Directions of the changed transducers, for gains.
 
     Raises
     ------
     ValueError
-        If size, ramp or directions make no sense; with key and value.
+        If size, ramp or directions are out of range; the message has key and value.
     """
 
     kind: DamageKind
@@ -55,10 +55,10 @@ class Damage:
     directions: tuple[str, ...] = field(default=DIRECTIONS)
 
     def __post_init__(self) -> None:
-        least = -1.0 if self.kind in GAINS else 0.0
-        if not (least < self.size < 1.0 and self.size != 0.0):
+        minimum = -1.0 if self.kind in GAINS else 0.0
+        if not (minimum < self.size < 1.0 and self.size != 0.0):
             raise ValueError(
-                f"size = {self.size:g} of {self.kind} must lie between {least:g} and 1"
+                f"size = {self.size:g} of {self.kind} must lie between {minimum:g} and 1"
             )
         if not self.ramp_days >= 0.0:
             raise ValueError(f"ramp_days = {self.ramp_days:g} must be 0 or more")
@@ -66,7 +66,7 @@ class Damage:
             raise ValueError(f"directions = {self.directions} must be of {DIRECTIONS}")
 
     def extent(self, time_ns: TimeArray) -> FloatArray:
-        """(n,) part of `size` that is reached."""
+        """(n,) reached share of `size`."""
         since_days = (time_ns - self.onset_ns) / (86_400.0 * NS_PER_S)
         if self.ramp_days == 0.0:
             return (since_days >= 0.0).astype(np.float64)
@@ -75,14 +75,14 @@ class Damage:
 
 @dataclass(frozen=True, eq=False)
 class Alteration:
-    """What damage has done to one bearing; factors and lengths, 1 and 0 where nothing.
+    """Effect of damage on one bearing: factors and lengths, 1 and 0 without damage.
 
     Parameters
     ----------
     stiffness, clearance, viscosity, bracket : (n,)
         Factors.
     pivot_share : (n,)
-        By which the pad nearest the shaft has receded, over the clearance told.
+        Recession of the pad nearest to the shaft, over the configured clearance.
     probe_gain, accelerometer_gain : (2, n)
         Factors, x and y.
     """
@@ -97,7 +97,7 @@ class Alteration:
 
 
 def alteration(damage: tuple[Damage, ...], bearing: str, time_ns: TimeArray) -> Alteration:
-    """Gather what all damage does to one bearing."""
+    """Combine the effect of all damage on one bearing."""
     lost = {
         kind: sum(
             (d.size * d.extent(time_ns) for d in damage if d.bearing == bearing and d.kind is kind),

@@ -1,10 +1,11 @@
-"""Unbalance, turbulence and vortex over the years, and the answer at 1×."""
+"""Unbalance, turbulence and vortex over the years, and the response at 1×."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from acquisition.simulated.life.bearing import STANDING_TIME_FACTOR
 from acquisition.simulated.life.operation import Operation, lagged, wander
 from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film, FilmColumns
 from acquisition.simulated.plant.rotor import (
@@ -20,33 +21,32 @@ WARM_UNBALANCE = 0.76
 """Unbalance of the warm rotor over that of the cold one.
 
 Fitted: with the films of Table 8 (Brito et al.) alone, shaft motion at the UJB falls from 85 to
-51 µm. Bearing motion fell with it, in both bearings and directions, which no film explains.
+51 µm. Bearing motion fell too, in both bearings and directions, which films do not explain.
 """
 
 WARM_UNBALANCE_TIME_S = 1.2 * 3600.0
-STANDING_TIME_FACTOR = 10.0
 
 BALANCED_GRADES_MM_S = (0.8, 2.0)
 MAGNETIC_UNBALANCE = 0.12
-"""What the field adds to unbalance at full load."""
+"""Relative increase of unbalance by the field at full load."""
 
 GRADE_WANDER, GRADE_TIME_S = 0.03, 5.0 * 86_400.0
 
 NO_LOAD_FORCE_N = 6.0e3
 FULL_LOAD_FORCE_N = 20.0e3
-"""Broadband hydraulic force, rms: the latter is what the design's accuracy trial took."""
+"""Broadband hydraulic force, rms; at full load that of the accuracy trial of the design."""
 
 VORTEX_LOADS = (0.35, 0.65)
-"""Share of rated power between which a Francis turbine has its vortex (320 MW of 700 in Brito et
-al., section 3.2)."""
+"""Load over rated power with a vortex in a Francis turbine (320 MW of 700 in Brito et al., section
+3.2)."""
 
 VORTEX_FORCE_N = 60.0e3
 VORTEX_TURBULENCE = 1.6
-"""By how much more turbulent the flow is there."""
+"""Relative turbulence of the flow there."""
 
 
 def warm_unbalance(operation: Operation) -> FloatArray:
-    """Unbalance over that of the cold rotor, as the rotor warms and cools, (n,)."""
+    """Unbalance over that of the cold rotor, over warming and cooling, (n,)."""
     turns = operation.is_turning
     time_s = WARM_UNBALANCE_TIME_S * np.where(turns, 1.0, STANDING_TIME_FACTOR)
     return lagged(np.where(turns, WARM_UNBALANCE, 1.0), time_s, operation.step_s, 1.0)
@@ -61,10 +61,10 @@ def draw_grade_mm_s(random: np.random.Generator, operation: Operation) -> FloatA
 
 
 def has_vortex(load: FloatArray) -> FloatArray:
-    """(n,) 1 where the part-load vortex is, rising and falling over a twentieth of rated power."""
-    least, most = VORTEX_LOADS
-    rising = np.clip((load - least) / 0.05, 0.0, 1.0)
-    return rising * np.clip((most - load) / 0.05, 0.0, 1.0)
+    """(n,) 1 with the part-load vortex, with flanks of a twentieth of rated power."""
+    low, high = VORTEX_LOADS
+    rising = np.clip((load - low) / 0.05, 0.0, 1.0)
+    return rising * np.clip((high - load) / 0.05, 0.0, 1.0)
 
 
 def hydraulic_force_n(load: FloatArray) -> FloatArray:
@@ -84,17 +84,17 @@ def order1_um_pk(
     grade_mm_s: FloatArray,
     rotor: RotorParameters,
 ) -> dict[str, ComplexArray]:
-    """Answer to an unbalance in the plane of the mass centre, the model of `plant.rotor`.
+    """Response to an unbalance in the plane of the mass centre, by the model of `plant.rotor`.
 
     Brackets are eliminated: with D = K + iΩC of the film and b = k_b − m_b Ω² of the bracket, the
-    shaft meets (D⁻¹ + b⁻¹)⁻¹, which leaves four equations instead of ten.
+    shaft has the support (D⁻¹ + b⁻¹)⁻¹, which leaves four equations instead of ten.
 
     Parameters
     ----------
     bracket_factors : (n,) by bearing
         True stiffness of the brackets over that of `rotor`.
     speed_rpm
-        Rated: it does not vary enough to matter.
+        Rated speed; its variation is negligible.
     grade_mm_s : (n,)
 
     Returns
@@ -123,7 +123,7 @@ def order1_um_pk(
 
 
 def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
-    """The paper's rotor on the brackets of some bearings."""
+    """Rotor of the paper on the brackets of some bearings."""
     rotor = RotorParameters()
     return replace(rotor, brackets=tuple(b for b in rotor.brackets if b.bearing in ids))
 

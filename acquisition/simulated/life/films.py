@@ -1,4 +1,4 @@
-"""Films over the years."""
+"""Films over the years; rows of dataclasses of columns."""
 
 import math
 from collections.abc import Callable
@@ -15,19 +15,19 @@ from core.arrays import FloatArray
 
 UNIT_CLEARANCE_RMS = 0.02
 PAD_CLEARANCE_RMS = 0.01
-"""Scatter of clearance from machine to machine and from pad to pad: how well wedges are set."""
+"""Scatter of clearance from machine to machine and from pad to pad: accuracy of the wedges."""
 
 
 @dataclass(frozen=True, eq=False)
 class PadSetting:
-    """How one machine's pads were set.
+    """Setting of the pads of one machine.
 
     Parameters
     ----------
     cold_um : (n_pads,)
         Cold clearance of each pad.
     opening_angle_rad
-        Diameter along which the field of the generator stretches the housing.
+        Direction of the diameter that the field of the generator stretches.
     """
 
     cold_um: FloatArray
@@ -52,12 +52,12 @@ class FilmCourse:
 
 
 def even_setting(bearing: LifeBearing) -> PadSetting:
-    """Pads exactly as the drawing says."""
+    """Pads exactly as in the drawing."""
     return PadSetting(np.full(bearing.ring.n_pads, bearing.cold_clearance_um))
 
 
 def draw_setting(random: np.random.Generator, bearing: LifeBearing) -> PadSetting:
-    """Draw how the pads of one machine were set."""
+    """Draw the setting of the pads of one machine."""
     each = 1.0 + PAD_CLEARANCE_RMS * random.standard_normal(bearing.ring.n_pads)
     whole = 1.0 + UNIT_CLEARANCE_RMS * random.standard_normal()
     angle_rad = float(random.uniform(0.0, math.pi))
@@ -73,22 +73,22 @@ def film_course(
     altered: Alteration | None = None,
     worn: int = 0,
 ) -> FilmCourse:
-    """Stiffness of a film where the shaft is put.
+    """Stiffness of a film at given shaft positions.
 
     Parameters
     ----------
     speed_rpm : (n,)
     centre_um : (2, n)
-        Where the shaft runs if nothing is altered; it follows pads that wear.
+        Shaft position without damage; the shaft follows worn pads.
     worn
-        The pad whose pivot wears.
+        Index of the pad with a worn pivot.
     """
     pads_um = _pad_clearance_um(bearing, setting, thermal)
     viscosity_pa_s = bearing.oil.viscosity_pa_s(thermal.oil_temperature_c)
     factor: FloatArray | float = 1.0
     if altered is not None:
         pads_um, centre_um = pads_um * altered.clearance, centre_um * altered.clearance
-        pads_um[worn] += altered.pivot_share * bearing.told_clearance_um
+        pads_um[worn] += altered.pivot_share * bearing.configured_clearance_um
         viscosity_pa_s = viscosity_pa_s * altered.viscosity
         factor = altered.stiffness
     film = bearing.ring.film(pads_um, centre_um, viscosity_pa_s, speed_rpm)
@@ -113,7 +113,7 @@ def _pad_clearance_um(
 
 
 def worn_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
-    """The pad that the shaft leans on most of the time, and wears."""
+    """Index of the pad that carries the shaft most of the time, and wears."""
     x_um, y_um = np.median(centre_um, axis=1)
     angles = bearing.ring.pad_angles_rad
     return int(np.argmax(x_um * np.cos(angles) + y_um * np.sin(angles)))
@@ -121,30 +121,30 @@ def worn_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
 
 T = TypeVar("T")
 Column: TypeAlias = npt.NDArray[Any]
-"""Numbers, or codes, with as many as there are rows along its last axis."""
+"""Numbers or codes, with rows along the last axis."""
 
 
 def rows_of(columns: T, rows: npt.NDArray[np.bool_]) -> T:
-    """Some rows of all arrays in a dataclass that have as many.
+    """Select rows of all arrays of a dataclass.
 
     Parameters
     ----------
     rows : (n,)
-        Wanted rows. Arrays whose last axis is not n long are the same for all and stay.
+        Selected rows. Arrays whose last axis is not n long have no rows, and are kept.
     """
     return _mapped(columns, rows.size, lambda value: value[..., rows])
 
 
 def row_between(columns: T, n: int, row: int, share: float) -> T:
-    """One row that lies between two, as columns of one row.
+    """Interpolate one row between two, as columns of one row.
 
     Parameters
     ----------
     n
-        Number of rows that there are.
+        Number of all rows.
     share
-        Of the way from `row` to the next one; 0 is `row` itself. What is counted or coded is that
-        of `row`.
+        Share of the way from `row` to the next; 0 is `row` itself. Integers and codes are those of
+        `row`.
     """
 
     def between(value: Column) -> Column:

@@ -1,4 +1,4 @@
-"""What makes a life: a unit's operation, warmth and shaft position, also while it stands still."""
+"""Inputs of a life: operation, temperatures and shaft position of a unit, at all times."""
 
 from dataclasses import dataclass
 
@@ -20,19 +20,19 @@ from acquisition.simulated.life.truth import Chain, draw_chain
 from core.arrays import FloatArray
 
 RATED_SPEEDS_RPM = (92.3, 90.9)
-"""Of the units for 60 Hz and for 50 Hz (Brito et al., section 1): even and odd seeds."""
+"""Rated speeds of units for 60 Hz and 50 Hz (Brito et al., section 1): even and odd seeds."""
 
 
 @dataclass(frozen=True, eq=False)
 class BearingInputs:
-    """One bearing on an even grid of times; damage comes later.
+    """Inputs of one bearing on an even grid of times, without damage.
 
     Parameters
     ----------
     position_um : (2, n)
-        Where the shaft runs if nothing is altered.
+        Shaft position without damage.
     worn_pad
-        The pad that the shaft leans on most of the time it turns.
+        Pad that carries the shaft most of the time it turns.
     """
 
     bearing: LifeBearing
@@ -45,13 +45,13 @@ class BearingInputs:
 
 @dataclass(frozen=True, eq=False)
 class LifeInputs:
-    """One unit on an even grid of times.
+    """Inputs of one unit on an even grid of times.
 
     Parameters
     ----------
     water_c, grade_mm_s : (n,)
     noise
-        Where the scatter of readings comes from, by bearing.
+        Seeds of the scatter of readings, by bearing.
     """
 
     unit_seed: int
@@ -71,12 +71,12 @@ def draw_inputs(
     bearings: tuple[LifeBearing, ...] = LIFE_BEARINGS,
     held: HeldLoad | None = None,
 ) -> LifeInputs:
-    """Draw a life.
+    """Draw the inputs of a life.
 
     Parameters
     ----------
     start_ns
-        Midnight where the plant is.
+        Midnight in the time zone of the plant.
 
     Raises
     ------
@@ -106,12 +106,12 @@ def draw_inputs(
 
 
 def rated_speed_rpm(unit_seed: int) -> float:
-    """Rated speed of the unit with a seed."""
+    """Rated speed of the unit of a seed."""
     return RATED_SPEEDS_RPM[unit_seed % 2]
 
 
 class _Streams:
-    """Independent randomness for every subject, so that none shifts another."""
+    """Independent random generators, so that a draw of one subject changes no other."""
 
     def __init__(self, unit_seed: int, n_bearings: int) -> None:
         plant, *own = np.random.SeedSequence(unit_seed).spawn(1 + 3 * n_bearings)

@@ -1,4 +1,4 @@
-"""Years of readings together with the truth."""
+"""`live`: years of readings of a unit, with the truth."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -40,11 +40,11 @@ def readings(
     chain: Chain,
     operation: Operation,
 ) -> StiffnessHistory:
-    """Measure one bearing at every row; all of them are turning.
+    """Readings of one bearing at every row, all with the shaft turning.
 
-    Stiffness is measured as force over motion, k = |X_b| / |U| · k_b (Brito et al., equation 5; the
-    other estimators differ in how they find the ratio), with the k_b that the monitor is told: it
-    takes over whatever is wrong with accelerometer, probe or bracket.
+    Stiffness is force over motion, k = |X_b| / |U| · k_b (Brito et al., equation 5; other
+    estimators differ in the way to the ratio), with the configured k_b: errors of accelerometer,
+    probe and bracket enter it.
     """
     n = len(operation)
     probe_gain = chain.probe_gain[:, np.newaxis] * truth.altered.probe_gain
@@ -98,7 +98,7 @@ def _position(
     """Eccentricity ratio, its standard uncertainty, attitude angle in degrees."""
     gain = chain.gap_gain[:, np.newaxis] * truth.altered.probe_gain
     x_um, y_um = gain * truth.centre_um + chain.position_error_um
-    told_um = bearing.told_clearance_um
+    told_um = bearing.configured_clearance_um
     u_ratio = float(np.std(chain.position_error_um)) / told_um
     return np.hypot(x_um, y_um) / told_um, u_ratio, np.degrees(np.arctan2(y_um, x_um))
 
@@ -110,7 +110,7 @@ def _oil_c(truth: BearingLifeTruth, chain: Chain) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _BearingLife:
-    """Everything about one bearing but what the others do to it."""
+    """State of one bearing, without the coupling to the others."""
 
     bearing: LifeBearing
     course: FilmCourse
@@ -129,16 +129,16 @@ def live(
     bearings: tuple[LifeBearing, ...] = LIFE_BEARINGS,
     held: HeldLoad | None = None,
 ) -> UnitLife:
-    """Let one unit live, with a reading every 10 minutes while it turns.
+    """Simulate the life of one unit, with a reading every 10 minutes while the shaft turns.
 
-    The same seed gives the same life; damage and changes alter nothing in it but themselves.
+    The same seed gives the same life; damage and changes have no effect on its random draws.
 
     Parameters
     ----------
     start_ns
-        Midnight where the plant is.
+        Midnight in the time zone of the plant.
     held
-        By default the unit starts and stops as it will.
+        Operation at one load; by default the unit starts and stops at random.
 
     Raises
     ------
@@ -146,18 +146,18 @@ def live(
         If years are too few or damage names an unknown bearing.
     """
     damage = tuple(damage)
-    refuse_strange(damage, bearings)
+    require_known_bearings(damage, bearings)
     inputs = draw_inputs(unit_seed, start_ns, years, tuple(changes), bearings, held)
     return life_of(inputs, damage, inputs.operation.is_turning)
 
 
-def refuse_strange(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
-    """Refuse damage of bearings that are not there.
+def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
+    """Check that all damage is of existing bearings.
 
     Raises
     ------
     ValueError
-        With the name.
+        If it is not; the message has the name.
     """
     known = {bearing.id for bearing in bearings}
     for one in damage:
@@ -168,12 +168,12 @@ def refuse_strange(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]
 def life_of(
     inputs: LifeInputs, damage: tuple[Damage, ...], turns: npt.NDArray[np.bool_]
 ) -> UnitLife:
-    """What becomes of a life, and how it reads.
+    """Truth and readings of a life.
 
     Parameters
     ----------
     turns : (n,)
-        Rows that are wanted; the shaft turns in all of them.
+        Selected rows, all with the shaft turning.
     """
     turning, grade_mm_s = rows_of(inputs.operation, turns), inputs.grade_mm_s[turns]
     lives = [_bearing_life(one, turns, turning, damage) for one in inputs.bearings]

@@ -1,4 +1,4 @@
-"""One moment of a life as a scenario, so that the same bearings can be sampled at 600 Hz."""
+"""One moment of a life as a scenario, whose bearings can be sampled at 600 Hz."""
 
 from collections.abc import Iterator
 
@@ -23,32 +23,32 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing, Unit
 
 TRANSDUCER_NOISE = TransducerNoise(gap_um_rms=1.2, accelerometer_g_per_sqrt_hz=5e-6)
-"""What the accuracy benchmark calls realistic."""
+"""The realistic noise of the accuracy benchmark."""
 
 HYDRAULIC_CUTOFF_HZ = 20.0
-"""Turbulence has died down well above the harmonics that stiffness is read between."""
+"""Upper limit of turbulence, well above the harmonics between which stiffness is measured."""
 
 
 def scenario_at(
     life: UnitLife, time_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> Scenario:
-    """What the unit goes through at the newest reading up to a moment, held for as long as wanted.
+    """Steady scenario of the newest reading up to a moment.
 
-    The transducers are those that the readings were made with. Gaps grow with the shaft where four
-    probes can tell that from a displacement; two are shown what four would find.
+    The transducers are those of the readings. Gaps grow with the shaft where four probes separate
+    growth from displacement; two probes show the displacement that four would measure.
 
     Parameters
     ----------
     machine
-        The unit to be sampled; its bearings are those of the life. Its clearances should be
-        `LifeBearing.told_clearance_um`, for eccentricity to be that of the readings.
+        Unit to be sampled, with bearings of the life. Clearances equal to
+        `LifeBearing.configured_clearance_um` give the eccentricity of the readings.
 
     Raises
     ------
     ValueError
-        If the life has not begun, or the unit is not at speed then.
+        If the life has not begun, or the unit is not at speed.
     KeyError
-        If the machine has a bearing that the life has not.
+        If the life lacks a bearing of the machine.
     """
     row, grow = row_at(life, time_ns), growing(machine)
     operation = life.operation
@@ -71,7 +71,7 @@ def scenario_at(
 
 
 def growing(machine: Unit) -> frozenset[str]:
-    """Bearings with four probes, which can tell growth from a displacement."""
+    """Bearings with four probes, which separate growth from displacement."""
     return frozenset(b.id for b in machine.bearings if b.opposite_reference_um is not None)
 
 
@@ -81,7 +81,7 @@ def row_at(life: UnitLife, time_ns: int) -> int:
     Raises
     ------
     ValueError
-        If there is none, or the unit is not at speed in it.
+        If there is none, or the unit is not at speed.
     """
     row = int(np.searchsorted(life.operation.time_ns, time_ns, side="right")) - 1
     if row < 0:
@@ -97,21 +97,21 @@ def hydraulic_noise(load: float) -> HydraulicNoise:
 
 
 def vortex_rope(load: float) -> VortexRope:
-    """Vortex at a share of rated power, if there is one."""
+    """Vortex at a share of rated power; without force outside its range."""
     return VortexRope(VORTEX_FORCE_N * float(has_vortex(np.array([load]))[0]))
 
 
 def bearing_at(
     truth: BearingMoments, row: int, grows: bool, usual_clearance_um: float | None = None
 ) -> BearingScenario:
-    """One bearing in one row.
+    """Scenario of one bearing in one row.
 
     Parameters
     ----------
     grows
-        Whether gaps show how the shaft grows.
+        Whether gaps show the growth of the shaft.
     usual_clearance_um
-        At which the gaps have their reference; by default the median over all rows.
+        Clearance of the reference gaps; the median over all rows by default.
     """
     usual_um = usual_clearance_um or float(np.median(truth.clearance_um))
     x_um, y_um = (float(x) for x in truth.centre_um[:, row])
@@ -131,7 +131,7 @@ def bearing_at(
 def channels_at(
     truth: BearingMoments, row: int, bearing: Bearing
 ) -> Iterator[tuple[str, ChannelScenario]]:
-    """What the transducers of a bearing are like in one row, by channel."""
+    """Transducers of a bearing in one row, by channel."""
     probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
     near, far = bearing.channels[:2], (bearing.opposite_x, bearing.opposite_y)
     for axis in range(2):
@@ -147,17 +147,17 @@ def _probe_gain(truth: BearingMoments, row: int) -> FloatArray:
 
 
 def _accelerometer_gain(truth: BearingMoments, row: int) -> FloatArray:
-    """(2,) with all that makes stiffness stray alike over hours and days."""
-    strays = np.exp(truth.chain.ln_k_error[:, row])
+    """Gain including the errors of stiffness common over hours and days, (2,)."""
+    errors = np.exp(truth.chain.ln_k_error[:, row])
     return np.asarray(
-        truth.chain.accelerometer_gain * truth.altered.accelerometer_gain[:, row] * strays
+        truth.chain.accelerometer_gain * truth.altered.accelerometer_gain[:, row] * errors
     )
 
 
 def _position_error_um(truth: BearingMoments, row: int) -> FloatArray:
-    """(2,) by which gaps err before the probe's gain, for readings to err as the life says.
+    """Error of the gaps before the gain of the probe that gives the errors of the readings, (2,).
 
-    Mean gaps have a gain of their own there, that of four probes together.
+    In a life mean gaps have their own gain, that of four probes together.
     """
     centre_um, chain = truth.centre_um[:, row], truth.chain
     read_um = chain.gap_gain * truth.altered.probe_gain[:, row] * centre_um

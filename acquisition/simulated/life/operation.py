@@ -1,4 +1,4 @@
-"""When a unit runs, and at what load."""
+"""Operation of a unit over years: running times, load, speed; random processes over time."""
 
 import math
 from dataclasses import dataclass
@@ -11,6 +11,10 @@ from core.units import NS_PER_S
 
 RATED_POWER_MW = 700.0
 STEP_S = 600.0
+DAY_S = 86_400.0
+DAY_NS = 86_400 * NS_PER_S
+YEAR_DAYS = 365.25
+YEAR_S = YEAR_DAYS * DAY_S
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +24,7 @@ class Operation:
     Parameters
     ----------
     time_ns
-        The step divides time constants, and is that of the readings.
+        Times of the readings.
     """
 
     time_ns: TimeArray
@@ -49,7 +53,7 @@ class Operation:
 
     @property
     def is_at_speed(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether it has its rated speed, not counting run-ups."""
+        """(n,) whether the shaft has its rated speed, which excludes run-ups."""
         return self.speed_rpm > 0.95 * self.rated_speed_rpm
 
     @property
@@ -64,29 +68,29 @@ def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArr
     Raises
     ------
     ValueError
-        If there would be less than a day.
+        If the years are less than a day.
     """
-    n = int(years * 365.25 * 86_400.0 / step_s)
-    if not n * step_s >= 86_400.0:
+    n = int(years * YEAR_S / step_s)
+    if not n * step_s >= DAY_S:
         raise ValueError(f"a life needs at least a day, got {years} years")
     return start_ns + np.arange(n, dtype=np.int64) * np.int64(step_s * NS_PER_S)
 
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """From a moment on a unit runs without a stop, at one load.
+    """Operation without a stop at one load, from a time on.
 
     Parameters
     ----------
     from_ns
-        What was before stays as it is.
+        Begin; earlier operation is unchanged.
     load
         Share of rated power.
 
     Raises
     ------
     ValueError
-        If the load does not lie between 0 and 1.
+        If the load is not above 0 and up to 1.
     """
 
     from_ns: int
@@ -112,7 +116,7 @@ def wander(
 def change_rows(
     random: np.random.Generator, n: int, step_s: float, interval_s: float
 ) -> FloatArray:
-    """(n,) number of the level that holds, counting from 0; changes come by chance.
+    """Number of the current level, from 0, (n,); changes are random.
 
     Parameters
     ----------
@@ -123,7 +127,7 @@ def change_rows(
 
 
 def held(levels: FloatArray, which: FloatArray) -> FloatArray:
-    """Level that holds at each row."""
+    """Current level at each row."""
     return np.asarray(levels[which.astype(np.int64)])
 
 
@@ -133,7 +137,7 @@ def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float
     Parameters
     ----------
     target, time_s : (n,)
-        The time constant may change from row to row, but should seldom.
+        The time constant may change from row to row; each change costs time.
     initial
         Value before the first row.
     """
@@ -151,15 +155,13 @@ def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float
     return followed
 
 
-STEPS_PER_DAY = int(86_400.0 / STEP_S)
+STEPS_PER_DAY = int(DAY_S / STEP_S)
 STEPS_PER_HOUR = STEPS_PER_DAY // 24
-YEAR_DAYS = 365.25
-DAY_NS = 86_400 * NS_PER_S
 
 BASE, TWO_SHIFT, WEEKDAYS, RESERVE = range(4)
 WET_SHARES = (0.72, 0.20, 0.06, 0.02)
 DRY_SHARES = (0.40, 0.36, 0.18, 0.06)
-"""How often a week is of each kind."""
+"""Probability of each kind of week."""
 
 LOAD_EDGES_H = (0, 6, 9, 12, 17, 22, 24)
 LOAD_RANGES = (
@@ -175,10 +177,10 @@ OUTAGE_DAYS = (12.0, 26.0)
 TRIPS_PER_YEAR = 5.0
 TRIP_H = (2.0, 40.0)
 LONG_NO_LOAD_SHARE = 0.03
-"""Of starts: tests and warm-ups at speed without load, 3 to 8 h instead of 10 to 30 min."""
+"""Share of starts with tests at speed without load, 3 to 8 h instead of 10 to 30 min."""
 
 RUN_UP_SHARE = 0.3
-"""Of starts: those in which a reading falls into the three minutes of the run-up."""
+"""Share of starts with a reading during the three minutes of the run-up."""
 
 
 def draw_operation(
@@ -187,7 +189,7 @@ def draw_operation(
     rated_speed_rpm: float,
     held: HeldLoad | None = None,
 ) -> Operation:
-    """Draw how a unit is run, on a grid of 10 min; its first row counts as midnight."""
+    """Draw the operation of a unit, on a grid of 10 min whose first row is midnight."""
     first_day = int(time_ns[0] // DAY_NS)
     n_weeks = math.ceil(time_ns.size / STEPS_PER_DAY / 7)
     load = np.concatenate([_week(random, first_day + 7 * week) for week in range(n_weeks)])
@@ -196,7 +198,7 @@ def draw_operation(
     _trip(random, load)
     speed = np.where(load > 0.0, 1.0, 0.0)
     _start(random, load, speed)
-    if held is not None:  # after all that is drawn by chance, which stays what it was before
+    if held is not None:  # after all random draws, which it does not change
         load[time_ns >= held.from_ns], speed[time_ns >= held.from_ns] = held.load, 1.0
     speed *= 1.0 + wander(random, load.size, STEP_S, 1800.0, 3e-4)
     power_mw = RATED_POWER_MW * np.maximum(load, 0.0)
@@ -244,7 +246,7 @@ def _trip(random: np.random.Generator, load: FloatArray) -> None:
 
 
 def _start(random: np.random.Generator, load: FloatArray, speed: FloatArray) -> None:
-    """Let every start pass through speed without load, and some show the run-up itself."""
+    """Begin every run at speed without load, and some with a reading during run-up."""
     for first in np.flatnonzero(np.diff((load > 0.0).astype(np.int8), prepend=np.int8(0)) == 1):
         is_long = random.random() < LONG_NO_LOAD_SHARE
         steps = random.integers(18, 49) if is_long else random.integers(1, 4)

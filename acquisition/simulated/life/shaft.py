@@ -1,4 +1,4 @@
-"""Where the shaft runs in its bearings over the years, and sudden changes of that."""
+"""Shaft position in its bearings over the years, and changes of condition."""
 
 import math
 from dataclasses import dataclass
@@ -6,23 +6,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.simulated.life.bearing import LifeBearing
-from acquisition.simulated.life.operation import Operation, change_rows, held, lagged, wander
+from acquisition.simulated.life.operation import (
+    DAY_NS,
+    Operation,
+    change_rows,
+    held,
+    lagged,
+    wander,
+)
 from core.arrays import FloatArray, TimeArray
-from core.units import NS_PER_S
-
-DAY_NS = 86_400 * NS_PER_S
 
 
 @dataclass(frozen=True)
 class ConditionChange:
-    """A change of condition that is no damage.
+    """A temporary change of condition that is not damage.
 
     Parameters
     ----------
     eccentricity_ratio
-        Where the shaft runs meanwhile, in every bearing, with its usual wander; None as usual.
+        Mean eccentricity in every bearing, with the usual wander; None leaves it unchanged.
     oil_offset_c
-        By how much the oil is warmer than usual while running: a failing cooler, or one valve more.
+        Additional oil temperature while running: a failing cooler, or one more open valve.
     """
 
     start_ns: int
@@ -42,12 +46,12 @@ WARM_C, COLD_C = 3.0, -3.0
 def four_fold(
     start_ns: int, days: float = 30.0, *, stiffer: bool = True
 ) -> tuple[ConditionChange, ConditionChange]:
-    """Let films become four times as stiff, or as soft, by condition alone.
+    """Changes that make films four times as stiff, or as soft, by condition alone.
 
-    For `days` before `start_ns` the shaft runs near the centre in warm oil, then for as long far
-    out in cold oil, or the other way round. It is 3.5 to 8 times in the direction that feels it
-    most, as machines differ. Both are within what a healthy machine meets in spring and autumn; in
-    midwinter the colder oil, in midsummer the warmer, may be beyond it.
+    For `days` before `start_ns` the shaft runs near the centre in warm oil, then as long far out in
+    cold oil, or in reverse order. The factor is 3.5 to 8 in the most sensitive direction, depending
+    on the machine. Both conditions are usual for a healthy machine in spring and autumn; in
+    midwinter the colder oil, in midsummer the warmer, may be unusual.
     """
     first, second = (CENTRED, WARM_C), (OUTWARD, COLD_C)
     if not stiffer:
@@ -62,13 +66,13 @@ def four_fold(
 def cooling_failure(
     start_ns: int, days: float = 5.0, oil_offset_c: float = 12.0
 ) -> ConditionChange:
-    """Oil far warmer than it ever was: a condition that no healthy history holds."""
+    """Oil far warmer than ever before: a condition outside every healthy history."""
     return ConditionChange(start_ns, start_ns + round(days * DAY_NS), oil_offset_c=oil_offset_c)
 
 
 LEVEL_MEAN = 0.33
 LEVEL_RMS = 0.14
-LEVEL_LEAST, LEVEL_MOST = 0.07, 0.58
+MIN_LEVEL, MAX_LEVEL = 0.07, 0.58
 LEVEL_TIME_S = 1200.0
 LEVEL_INTERVAL_S = 9.0 * 86_400.0
 COMMON_SHARE = 0.6
@@ -79,8 +83,8 @@ LOAD_PULL = 0.05
 SLOW_RMS, SLOW_TIME_S = 0.02, 4.0 * 86_400.0
 FAST_RMS, FAST_TIME_S = 0.01, 2.0 * 3600.0
 ACROSS_RMS, ACROSS_TIME_S = 0.010, 20.0 * 86_400.0
-LEAST, MOST = 0.02, 0.66
-"""Eccentricity ratios within which a healthy shaft stays."""
+MIN_ECCENTRICITY, MAX_ECCENTRICITY = 0.02, 0.66
+"""Limits of the eccentricity ratio of a healthy shaft."""
 
 
 def draw_positions_um(
@@ -98,23 +102,24 @@ def draw_positions_um(
     for bearing in bearings:
         own = random.standard_normal(n)
         mixed = math.sqrt(COMMON_SHARE) * common + math.sqrt(1.0 - COMMON_SHARE) * own
-        level = _changed(held(_folded(LEVEL_MEAN + LEVEL_RMS * mixed), which), operation, changes)
+        usual = held(_reflected(LEVEL_MEAN + LEVEL_RMS * mixed), which)
+        level = _changed(usual, operation, changes)
         level = lagged(level, np.full(n, LEVEL_TIME_S), step_s, float(level[0]))
-        along = np.clip(level + _unrest(random, operation), LEAST, MOST)
+        along = np.clip(level + _deviation(random, operation), MIN_ECCENTRICITY, MAX_ECCENTRICITY)
         across = wander(random, n, step_s, ACROSS_TIME_S, ACROSS_RMS)
         angle_rad = line_rad + math.radians(12.0) * random.standard_normal()
-        placed[bearing.id] = bearing.told_clearance_um * _turned(along, across, angle_rad)
+        placed[bearing.id] = bearing.configured_clearance_um * _turned(along, across, angle_rad)
     return placed
 
 
-def _folded(level: FloatArray) -> FloatArray:
-    """Levels reflected at both limits, so that none piles up there."""
-    width = LEVEL_MOST - LEVEL_LEAST
-    return LEVEL_LEAST + np.abs((level - LEVEL_LEAST + width) % (2.0 * width) - width)
+def _reflected(level: FloatArray) -> FloatArray:
+    """Levels reflected at both limits, which avoids accumulation there."""
+    width = MAX_LEVEL - MIN_LEVEL
+    return MIN_LEVEL + np.abs((level - MIN_LEVEL + width) % (2.0 * width) - width)
 
 
-def _unrest(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Departure from the level by starts, load and wander."""
+def _deviation(random: np.random.Generator, operation: Operation) -> FloatArray:
+    """Deviation from the level by starts, load and wander."""
     n, step_s = len(operation), operation.step_s
     run = np.cumsum(np.isin(np.arange(n), operation.starts)).astype(np.float64)
     by_start = held(START_RMS * random.standard_normal(n), run)

@@ -1,4 +1,4 @@
-"""The truth of a life, and the errors of the chain that measures it."""
+"""Truth of a life, and errors of the measuring chain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.simulated.life.damage import Alteration, Damage
-from acquisition.simulated.life.operation import Operation, wander
+from acquisition.simulated.life.operation import YEAR_S, Operation, wander
 from acquisition.simulated.life.shaft import ConditionChange
 from acquisition.simulated.plant.films import FilmColumns
 from core.arrays import ComplexArray, FloatArray
@@ -15,19 +15,19 @@ from core.baseline.stiffness_history import CodeArray, Evidence, StiffnessHistor
 
 U_RANDOM_AT_REFERENCE = 0.005
 REFERENCE_FORCE_N = 20.0e3
-"""Scatter of `dynamic` over 5 min under this hydraulic force (benchmarks/accuracy.py)."""
+"""Relative scatter of `dynamic` over 5 min, and its hydraulic force (benchmarks/accuracy.py)."""
 
 U_RANDOM_KNOWN = 0.1
-"""How well a reading knows its own random uncertainty, relative."""
+"""Relative error of the random uncertainty of a reading."""
 
-ALIKE = ((4.0 * 3600.0, 0.004), (8.0 * 86_400.0, 0.003))
-"""Time and relative rms of what else strays, alike from reading to reading: chains, excitation."""
+COMMON_ERRORS = ((4.0 * 3600.0, 0.004), (8.0 * 86_400.0, 0.003))
+"""Time constant and relative rms of errors that successive readings share: chains, excitation."""
 
 GAIN_HALF_WIDTH = 0.05
-"""Class of probes and accelerometers (Brito et al., section 2.2.1)."""
+"""Accuracy class of probes and accelerometers (Brito et al., section 2.2.1)."""
 
 GAP_DRIFT = ((30.0 * 86_400.0, 0.8), (6.0 * 3600.0, 0.5), (600.0, 0.3))
-"""Time and rms in µm of what a displacement from four probes strays by. It is an assumption: a
+"""Time constant and rms in µm of the error of a displacement from four probes. An assumption: a
 drift of 0.03 % of the gap of 2 mm per kelvin, most of which opposite probes share."""
 
 REFERENCE_UM_RMS = 3.0
@@ -39,27 +39,25 @@ OIL_RESOLUTION_C = 0.1
 
 SHAFT_NOISE_UM, BEARING_NOISE_UM = 0.15, 0.02
 RUNOUT_UM_PK = 1.0
-"""Left over at 1× after the slow-roll vector is taken off."""
+"""Residue at 1× after subtraction of the slow-roll vector."""
 
 NO_LOAD_SILENCE, LOADED_SILENCE = 0.08, 0.002
-"""Share of readings that excitation does not suffice for."""
+"""Share of readings with insufficient excitation."""
 
 OUTAGES_PER_YEAR, OUTAGE_H = 3.0, (1.0, 10.0)
-"""Transducer out of order, per direction."""
-
-YEAR_S = 365.25 * 86_400.0
+"""Outages of a transducer, per direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """What the transducers of one bearing add and multiply.
+    """Errors of the transducers of one bearing.
 
     Parameters
     ----------
     probe_gain, accelerometer_gain : (2,)
-        True sensitivity over the one told, before any damage.
+        True sensitivity over the configured one, before any damage.
     ln_k_error : (2, n)
-        Of stiffness, alike over hours and days.
+        Error of stiffness, common over hours and days.
     position_error_um : (2, n)
     oil_error_c : (n,)
     runout_um_pk : (2,)
@@ -79,24 +77,24 @@ class Chain:
 
 
 def u_random(force_n: FloatArray) -> FloatArray:
-    """Random relative uncertainty of stiffness under a broadband force: it falls as 1/F, (n,)."""
+    """Random relative uncertainty of stiffness under a broadband force, falling as 1/F, (n,)."""
     return U_RANDOM_AT_REFERENCE * REFERENCE_FORCE_N / force_n
 
 
 def draw_chain(random: np.random.Generator, operation: Operation) -> Chain:
-    """Draw how one bearing is measured."""
+    """Draw the measuring chain of one bearing."""
     n, step_s = len(operation), operation.step_s
 
-    def strays(parts: tuple[tuple[float, float], ...]) -> FloatArray:
+    def wanders(parts: tuple[tuple[float, float], ...]) -> FloatArray:
         return np.stack([sum((wander(random, n, step_s, *p) for p in parts), 0.0) for _ in "xy"])
 
-    position_error_um = strays(GAP_DRIFT) + REFERENCE_UM_RMS * random.standard_normal((2, 1))
+    position_error_um = wanders(GAP_DRIFT) + REFERENCE_UM_RMS * random.standard_normal((2, 1))
     phase = np.exp(2j * np.pi * random.uniform(size=2))
     return Chain(
         probe_gain=_gains(random, GAIN_HALF_WIDTH),
         gap_gain=_gains(random, GAP_GAIN_HALF_WIDTH),
         accelerometer_gain=_gains(random, GAIN_HALF_WIDTH),
-        ln_k_error=strays(ALIKE),
+        ln_k_error=wanders(COMMON_ERRORS),
         position_error_um=position_error_um,
         oil_error_c=OIL_OFFSET_C_RMS * random.standard_normal()
         + wander(random, n, step_s, *OIL_WANDER),
@@ -128,7 +126,7 @@ def _is_out_of_order(random: np.random.Generator, n: int, step_s: float) -> npt.
 
 @dataclass(frozen=True, eq=False)
 class BearingMoments:
-    """All of one bearing that samples depend on, row by row.
+    """State of one bearing that samples depend on, row by row.
 
     Parameters
     ----------
@@ -138,9 +136,9 @@ class BearingMoments:
         Shaft centre from bearing centre.
     oil_temperature_c : (n,)
     altered
-        What damage has done to film, bracket and transducers.
+        Effect of damage on film, bracket and transducers.
     chain
-        What the transducers make of it.
+        Errors of the transducers.
     """
 
     film: FilmColumns
@@ -153,12 +151,12 @@ class BearingMoments:
 
 @dataclass(frozen=True, eq=False)
 class BearingLifeTruth(BearingMoments):
-    """One bearing; rows are those of its readings.
+    """Truth of one bearing, at the rows of its readings.
 
     Parameters
     ----------
     ln_k, ln_k_healthy : (2, n)
-        Of the film as it is, and as it would be without damage.
+        Stiffness of the film, with and without damage.
     order1_um_pk : (4, n)
         Phasors of u_x, u_y, x_b, y_b at 1×.
     """
@@ -169,27 +167,25 @@ class BearingLifeTruth(BearingMoments):
 
     @property
     def eccentricity_ratio(self) -> FloatArray:
-        """(n,) distance of the shaft centre over the clearance that there is."""
+        """(n,) distance of the shaft centre over the true clearance."""
         return np.asarray(np.hypot(*self.centre_um) / self.clearance_um)
 
     @property
     def film_loss(self) -> FloatArray:
-        """(2, n) share of stiffness that damage has taken from the film."""
+        """(2, n) share of the stiffness of the film lost by damage."""
         return np.asarray(1.0 - np.exp(self.ln_k - self.ln_k_healthy))
 
 
 @dataclass(frozen=True, eq=False)
 class UnitLife:
-    """Years of one unit.
+    """Years of one unit: readings and truth, by bearing.
 
     Parameters
     ----------
     operation
-        At the rows of the readings: while the shaft turns. Its times are not evenly spaced.
+        Operation at the rows of the readings, while the shaft turns; unevenly spaced.
     grade_mm_s, water_c : (n,)
         Residual unbalance and cooling water at these rows.
-    readings, truth
-        By bearing.
     """
 
     unit_seed: int

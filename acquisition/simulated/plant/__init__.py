@@ -1,1 +1,1 @@
-"""The 10-DOF machine, its excitation, transducers and converter."""
+"""Simulated generating unit: 10-DOF rotor, films, excitation, transducers and converter."""

@@ -1,17 +1,153 @@
-"""From the motion of the machine to the readings of its transducers, chunk by chunk."""
+"""Transducer chain of one unit: gap, runout, key phase, response, gain and noise of its channels.
+
+Noise of accelerometers is white, rises as 1/f below a corner, and is integrated on velocity
+channels. It extends down to `FLOOR_HZ`, where a double high-pass cuts it off: 1/f noise integrated
+to velocity has infinite power towards 0 Hz, and charge amplifiers do not pass it either.
+"""
+
+import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.simulated.plant.accelerometer_noise import AccelerometerNoise
 from acquisition.simulated.plant.conditions import Conditions
-from acquisition.simulated.plant.forces import straight
-from acquisition.simulated.plant.key_phase import KeyPhasePulses
-from acquisition.simulated.plant.probes import ShaftRunout, reference_gap_um, standing_gap_um
+from acquisition.simulated.plant.excitation import straight
+from acquisition.simulated.plant.probes import ShaftRunout, standing_gap_um
 from acquisition.simulated.plant.response_filter import ResponseFilter
-from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
+from acquisition.simulated.plant.scenario import (
+    ChannelScenario,
+    KeyPhasePulse,
+    Scenario,
+    TransducerNoise,
+)
 from core.arrays import FloatArray
 from core.machine.unit import Measurand, Unit
+from core.units import STANDARD_GRAVITY_M_S2
+
+
+class KeyPhasePulses:
+    """Pulses at the beginning of each turn, on every key-phase channel.
+
+    The converter averages over its sampling interval: a sample on an edge is the share of the
+    interval that the pulse filled.
+    """
+
+    def __init__(self, machine: Unit, pulse: KeyPhasePulse) -> None:
+        self._directions = {
+            row: channel.direction
+            for row, channel in enumerate(machine.channels)
+            if channel.measurand is Measurand.KEY_PHASE_V
+        }
+        self._pulse = pulse
+
+    def add_to(self, readings: FloatArray, turns: FloatArray) -> None:
+        """Add the pulses to the key-phase channels, in place.
+
+        Parameters
+        ----------
+        readings
+            (n_channels, n_samples)
+        turns
+            (n_samples,) angle of the shaft, at nearly constant speed.
+        """
+        if not self._directions:
+            return
+        step = (turns[-1] - turns[0]) / (turns.size - 1)
+        passed = np.fmod(turns, 1.0) + self._pulse.mark_turns
+        if step > 0.0:
+            filled = (self._so_far(passed + step / 2) - self._so_far(passed - step / 2)) / step
+        else:  # standing still, under the mark or not
+            filled = (np.fmod(passed, 1.0) < self._pulse.width_turns).astype(np.float64)
+        for row, direction in self._directions.items():
+            readings[row] += self._pulse.rest_v + direction * self._pulse.height_v * filled
+
+    def _so_far(self, turns: FloatArray) -> FloatArray:
+        """Turns under the pulse since turn 0."""
+        whole = np.floor(turns)
+        covered: FloatArray = whole * self._pulse.width_turns
+        covered += np.minimum(turns - whole, self._pulse.width_turns)
+        return covered
+
+
+FLOOR_HZ = 0.1
+PINK_BAND_HZ = (0.02, 60.0)
+"""Band of accurate 1/f noise: to 2 % in power, and to 0.3 % between 0.1 and 25 Hz."""
+POLES_PER_DECADE = 3
+
+
+class AccelerometerNoise:
+    """Noise of some channels, as endless streams.
+
+    Parameters
+    ----------
+    integrated
+        (n_channels,) whether the channel reads velocity in mm/s; else acceleration in m/s².
+    density_g_per_sqrt_hz
+        One-sided, above the corner.
+    """
+
+    def __init__(
+        self,
+        random: np.random.Generator,
+        integrated: tuple[bool, ...],
+        density_g_per_sqrt_hz: float,
+        corner_hz: float,
+        rate_hz: float,
+    ) -> None:
+        self._random = random
+        self._n_channels = len(integrated)
+        # a one-sided density of 1 over the band up to half the rate is a variance of rate / 2
+        self._white = density_g_per_sqrt_hz * STANDARD_GRAVITY_M_S2 * math.sqrt(rate_hz / 2.0)
+        self._pink = _pink(corner_hz, rate_hz)
+        self._floors = [_floor(velocity, rate_hz) for velocity in integrated]
+        self._pink_state = np.zeros((len(self._pink), len(integrated), 2))
+        self._floor_states = [np.zeros((len(floor), 2)) for floor in self._floors]
+
+    def advance(self, n_samples: int) -> FloatArray:
+        """Return the next noise, (n_channels, n_samples)."""
+        import scipy.signal  # slow to load, and not needed to begin
+
+        white, pink = self._white * self._random.standard_normal((2, self._n_channels, n_samples))
+        pink, self._pink_state = scipy.signal.sosfilt(self._pink, pink, zi=self._pink_state)
+        return np.array(list(self._floored(white + pink))).reshape(white.shape)
+
+    def _floored(self, noise: FloatArray) -> Iterator[FloatArray]:
+        import scipy.signal  # slow to load, and not needed to begin
+
+        for channel, floor in enumerate(self._floors):
+            row, self._floor_states[channel] = scipy.signal.sosfilt(
+                floor, noise[channel], zi=self._floor_states[channel]
+            )
+            yield row
+
+
+def _floor(integrates: bool, rate_hz: float) -> FloatArray:
+    """High-pass of order 2, from m/s² to m/s² or, with one zero less, to mm/s."""
+    import scipy.signal  # slow to load, and not needed to begin
+
+    floor_rad_s = 2.0 * math.pi * FLOOR_HZ
+    numerator = [1e3, 0.0] if integrates else [1.0, 0.0, 0.0]
+    denominator = [1.0, math.sqrt(2.0) * floor_rad_s, floor_rad_s**2]
+    return np.atleast_2d(np.hstack(scipy.signal.bilinear(numerator, denominator, rate_hz)))
+
+
+def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
+    """Filter whose power falls as corner / f, of alternating poles and zeros (Oustaloup, 1991)."""
+    import scipy.signal  # slow to load, and not needed to begin
+
+    low_hz, high_hz = PINK_BAND_HZ
+    high_hz = min(high_hz, 0.3 * rate_hz)
+    n_poles = math.ceil(POLES_PER_DECADE * math.log10(high_hz / low_hz))
+    edges_hz = np.geomspace(low_hz / 4.0, 4.0 * high_hz, 2 * n_poles + 1)
+    poles, zeros = -2 * np.pi * edges_hz[0:-1:2], -2 * np.pi * edges_hz[1::2]
+    middle = 2j * np.pi * math.sqrt(low_hz * high_hz)
+    shape = abs(np.prod(middle - zeros) / np.prod(middle - poles))
+    wanted = math.sqrt(2 * np.pi * corner_hz / abs(middle))
+    sections: FloatArray = scipy.signal.zpk2sos(
+        *scipy.signal.bilinear_zpk(zeros, poles, wanted / shape, rate_hz)
+    )
+    return sections
 
 
 class TransducerChain:
@@ -20,13 +156,12 @@ class TransducerChain:
     Parameters
     ----------
     white, own
-        Where white noise and the accelerometers' own noise come from.
+        Generators of the white noise and of the accelerometers' own noise.
 
     Raises
     ------
     ConfigError
-        If the scenario names a channel the machine does not have, or asks for a response that
-        cannot be simulated.
+        If the scenario names an unknown channel or a response that cannot be simulated.
     """
 
     def __init__(
@@ -45,19 +180,19 @@ class TransducerChain:
             for row, channel in enumerate(channels)
             if channel.response is not None
         }
-        self._reference_um = reference_gap_um(machine)
+        self._reference_um = standing_gap_um(machine)
         self._white, self._white_rms = white, noise_rms(machine, scenario.noise)
         self._noisy, self._own = _own_noise(machine, scenario.noise, own)
 
     def read(
         self, motion: FloatArray, turns: FloatArray, start: Conditions, stop: Conditions
     ) -> FloatArray:
-        """Give what the transducers make of a chunk of motion, without white noise.
+        """Readings of the transducers for a chunk of motion, without white noise.
 
         Parameters
         ----------
         motion
-            (n_channels, n_samples) in each channel's engineering unit; used up.
+            (n_channels, n_samples) in each channel's engineering unit; overwritten.
         turns
             (n_samples,) angle of the shaft.
         start, stop
@@ -78,7 +213,7 @@ class TransducerChain:
         return motion
 
     def add_white_noise(self, readings: FloatArray) -> None:
-        """Add the noise of what stands behind the transducers, in place."""
+        """Add the noise of the electronics behind the transducers, in place."""
         noise = self._white.standard_normal(readings.shape, dtype=np.float32)
         readings += noise * self._white_rms[:, np.newaxis]
 
@@ -113,8 +248,8 @@ def _own_noise(
 
 
 def _channels(machine: Unit, scenario: Scenario) -> list[ChannelScenario]:
-    """What every channel of the machine is really like, in wire order."""
-    strange = scenario.channels.keys() - {channel.id for channel in machine.channels}
-    if strange:
-        raise ConfigError(f"unit {machine.id!r} has no channel {', '.join(sorted(strange))}")
-    return [scenario.channels.get(channel.id, ChannelScenario()) for channel in machine.channels]
+    """Scenario of every channel of the machine, in wire order."""
+    unknown = scenario.channels.keys() - {channel.id for channel in machine.channels}
+    if unknown:
+        raise ConfigError(f"unit {machine.id!r} has no channel {', '.join(sorted(unknown))}")
+    return [scenario.channel(channel.id) for channel in machine.channels]

@@ -1,11 +1,11 @@
-"""What changes slowly while the machine runs: where shafts are, how warm, how well it is read."""
+"""Slow conditions of a running machine: shaft position, temperature, power, gain."""
 
 import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from acquisition.simulated.plant.scenario import ChannelScenario, Scenario
+from acquisition.simulated.plant.scenario import Scenario
 from core.arrays import FloatArray
 from core.machine.unit import Unit
 
@@ -17,11 +17,11 @@ class Conditions:
     Parameters
     ----------
     centre_um, position_error_um
-        (n_bearings, 2) shaft centre from bearing centre, and what gaps tell beyond it.
+        (n_bearings, 2) shaft centre from bearing centre, and error of the gaps.
     oil_temperature_c, oil_temperature_error_c
-        (n_bearings,) of the oil, and what thermometers tell beyond it.
+        (n_bearings,) oil temperature, and error of the thermometers.
     gap_growth_um
-        (n_bearings,) what all gaps of a bearing have in common.
+        (n_bearings,) growth common to all gaps of a bearing.
     gain
         (n_channels,) true sensitivity over the nominal one.
     """
@@ -52,10 +52,10 @@ class SlowWander:
 
     Parameters
     ----------
-    random, growth_random
-        Where the wander of everything but the gaps' growth, and that of the growth, comes from.
+    growth_random, random
+        Generators of the wander of gap growth, and of everything else.
     scenario
-        That of the first step; how much everything wanders stays as it says.
+        Scenario of the first step, which sets the rms of the wander for good.
     """
 
     def __init__(
@@ -77,12 +77,11 @@ class SlowWander:
         self._growth = _Wander(growth_random, memory, np.array(growth_rms))
 
     def now(self, scenario: Scenario) -> Conditions:
-        """Conditions at the present step, about the means of a scenario."""
+        """Conditions at the current step, about the means of a scenario."""
         bearings = [scenario.bearings[b.id] for b in self._machine.bearings]
         mean = [centre for b in bearings for centre in (b.centre_x_um, b.centre_y_um)]
         mean += [b.oil_temperature_c for b in bearings] + [scenario.active_power_mw]
         values = self._rest.about(np.array(mean))
-        channels = (scenario.channels.get(c.id, ChannelScenario()) for c in self._machine.channels)
         n_bearings = len(bearings)
         return Conditions(
             centre_um=values[: 2 * n_bearings].reshape(-1, 2),
@@ -90,12 +89,12 @@ class SlowWander:
             oil_temperature_c=values[2 * n_bearings : -1],
             oil_temperature_error_c=np.array([b.oil_temperature_error_c for b in bearings]),
             gap_growth_um=self._growth.about(np.array([b.gap_growth_um for b in bearings])),
-            gain=np.array([channel.gain for channel in channels]),
+            gain=np.array([scenario.channel(c.id).gain for c in self._machine.channels]),
             active_power_mw=float(values[-1]),
         )
 
     def advance(self) -> None:
-        """Move on by one step."""
+        """Advance by one step."""
         self._rest.advance()
         self._growth.advance()
 

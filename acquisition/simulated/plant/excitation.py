@@ -1,27 +1,105 @@
-"""Forces on the rotor, as endless streams: however a stream is cut, its samples are the same."""
+"""Rotation of the shaft and forces on the rotor, as streams independent of the requested pieces."""
 
 import math
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.simulated.plant.rotation import Turning
+from acquisition.simulated.plant.rotor import ForcePlane, unbalance_force_n
+from acquisition.simulated.plant.scenario import Scenario
 from core.arrays import FloatArray
+from core.units import hz_from_rpm
+
+PARTS = ((0.5, 1.0), (0.3, 0.57), (0.2, 0.31))
+"""Share of the whole wander, and period in wander times, of its swings."""
 
 CUTOFF_FILTER_ORDER = 4
 IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
 
 
-class Excitation(Protocol):
-    """A radial force on the rotor."""
+class FollowedRotation:
+    """Rotation of a shaft whose speed runs in straight lines from chunk to chunk.
 
-    def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
-        ...
+    Only samples of the newest chunk are available.
+    """
+
+    def __init__(self, rated_speed_rpm: float, rate_hz: float) -> None:
+        self._rated_speed_rpm = rated_speed_rpm
+        self._turns_per_sample = hz_from_rpm(rated_speed_rpm) / rate_hz
+        self._first, self._n_samples, self._turns = 0, 1, 0.0
+        self._start, self._stop = 1.0, 1.0
+
+    def follow(self, first: int, n_samples: int, start_rpm: float, stop_rpm: float) -> None:
+        """Change from one speed to another over the next samples."""
+        self._turns = float(self.turns(np.array([float(first)]))[0])
+        self._first, self._n_samples = first, n_samples
+        self._start = start_rpm / self._rated_speed_rpm
+        self._stop = stop_rpm / self._rated_speed_rpm
+
+    def relative_speed(self, index: FloatArray) -> FloatArray:
+        """Speed over the rated one at some samples, (n_samples,)."""
+        share = (index - self._first) / self._n_samples
+        return np.asarray(self._start + (self._stop - self._start) * share)
+
+    def turns(self, index: FloatArray) -> FloatArray:
+        """Whole and broken turns since sample 0, (n_samples,)."""
+        mean = 0.5 * (self._start + self.relative_speed(index))
+        return np.asarray(self._turns + self._turns_per_sample * mean * (index - self._first))
+
+
+class Rotation:
+    """Rotation of a shaft whose speed wanders slowly, as a closed function of the sample number.
+
+    The wander is a sum of three slow swings: speed and angle agree exactly, and the speed never
+    leaves its limits.
+
+    Parameters
+    ----------
+    speed_wander
+        Largest relative deviation from the mean speed.
+    wander_time_s
+        Period of the largest swing.
+    """
+
+    def __init__(
+        self,
+        random: np.random.Generator,
+        turn_hz: float,
+        rate_hz: float,
+        speed_wander: float = 0.0,
+        wander_time_s: float = 600.0,
+    ) -> None:
+        self._turns_per_sample = turn_hz / rate_hz
+        self._swings = [
+            (
+                speed_wander * share,
+                2.0 * math.pi / (period * wander_time_s * rate_hz),
+                random.uniform(0.0, 2.0 * math.pi),
+            )
+            for share, period in PARTS
+        ]
+
+    def relative_speed(self, index: FloatArray) -> FloatArray:
+        """Speed over its mean at some samples, (n_samples,)."""
+        relative = np.ones_like(index)
+        for swing, step_rad, phase_rad in self._swings:
+            relative += swing * np.cos(step_rad * index + phase_rad)
+        return relative
+
+    def turns(self, index: FloatArray) -> FloatArray:
+        """Whole and broken turns since sample 0, (n_samples,)."""
+        evenly = index.copy()
+        for swing, step_rad, phase_rad in self._swings:
+            evenly += swing / step_rad * np.sin(step_rad * index + phase_rad)
+        return np.asarray(self._turns_per_sample * evenly)
+
+
+Turning: TypeAlias = FollowedRotation | Rotation
+"""Rotation of a shaft by number of samples."""
 
 
 class UnbalanceForce:
-    """Force that turns forward with the shaft and grows with the square of its speed.
+    """Force that rotates forward with the shaft and grows with the square of its speed.
 
     Parameters
     ----------
@@ -35,7 +113,7 @@ class UnbalanceForce:
         self._index = 0
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the next forces (x, y) in newtons, (2, n_samples)."""
         index = np.arange(self._index, self._index + n_samples, dtype=np.float64)
         self._index += n_samples
         angle = 2.0 * math.pi * np.fmod(self._rotation.turns(index), 1.0)
@@ -43,7 +121,7 @@ class UnbalanceForce:
 
 
 class RopeForce:
-    """Force that turns forward at a frequency of its own while its phase wanders.
+    """Force that rotates forward at its own frequency, with a wandering phase.
 
     The phase is a random walk, which spreads the line into a Lorentzian of the given width at half
     power (phase noise of a free oscillator: variance 2π · width · time).
@@ -64,7 +142,7 @@ class RopeForce:
         self._angle = float(random.uniform(0.0, 2.0 * math.pi))
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the next forces (x, y) in newtons, (2, n_samples)."""
         steps = self._mean_step + self._step_rms * self._random.standard_normal(n_samples)
         angle = np.cumsum(np.concatenate([[self._angle], steps]))
         self._angle = float(angle[-1]) % (2.0 * math.pi)
@@ -83,7 +161,7 @@ class HydraulicForce:
         self._filter_state = np.zeros((CUTOFF_FILTER_ORDER // 2, 2, 2))
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Give the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the next forces (x, y) in newtons, (2, n_samples)."""
         import scipy.signal  # slow to load, and not needed to begin
 
         force_n = self._rms_n * self._random.standard_normal((n_samples, 2)).T
@@ -94,12 +172,16 @@ class HydraulicForce:
         return force_n
 
 
+Excitation: TypeAlias = UnbalanceForce | RopeForce | HydraulicForce
+"""Radial force on the rotor."""
+
+
 def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
     return force_n * np.stack([np.cos(angle_rad), np.sin(angle_rad)])
 
 
 def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
-    """Second-order sections that keep the rms value of white noise."""
+    """Second-order sections that preserve the rms value of white noise."""
     import scipy.signal  # slow to load, and not needed to begin
 
     sections: FloatArray = scipy.signal.butter(
@@ -110,3 +192,73 @@ def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
     response = scipy.signal.sosfilt(sections, impulse)
     sections[0, :3] /= math.sqrt(float(np.sum(response**2)))
     return sections
+
+
+def force_planes(scenario: Scenario) -> list[ForcePlane]:
+    """Planes on which forces act, in order; each costs computing time."""
+    used = {ForcePlane.MASS_CENTRE, ForcePlane.RUNNER, scenario.hydraulic.plane}
+    return [plane for plane in ForcePlane if plane in used]
+
+
+class Forces:
+    """Unbalance, broadband hydraulic force and vortex rope.
+
+    Parameters
+    ----------
+    first
+        Scenario of the first chunk, which sets the planes, the band of the hydraulic force, order
+        and width of the rope; only the size of the forces may change later.
+    rated_speed_rpm
+        Reference speed of `rotation`.
+    """
+
+    def __init__(
+        self,
+        first: Scenario,
+        rated_speed_rpm: float,
+        rate_hz: float,
+        rotation: Turning,
+        hydraulic: np.random.Generator,
+        rope: np.random.Generator,
+    ) -> None:
+        self._rated_speed_rpm = rated_speed_rpm
+        noise, vortex = first.hydraulic, first.rope
+        rope_hz = vortex.order * hz_from_rpm(rated_speed_rpm)
+        of_one_newton: tuple[tuple[ForcePlane, Excitation], ...] = (
+            (ForcePlane.MASS_CENTRE, UnbalanceForce(1.0, rotation)),
+            (noise.plane, HydraulicForce(hydraulic, 1.0, noise.cutoff_hz, rate_hz)),
+            (ForcePlane.RUNNER, RopeForce(rope, 1.0, rope_hz, vortex.line_width_hz, rate_hz)),
+        )
+        planes = force_planes(first)
+        self._excitations = [(planes.index(p), excitation) for p, excitation in of_one_newton]
+        self._n_planes = len(planes)
+
+    def advance(self, n_samples: int, start: Scenario, stop: Scenario) -> FloatArray:
+        """Return the next forces, during the transition from one scenario to another.
+
+        Returns
+        -------
+        (2 · n_planes, n_samples) in newtons.
+        """
+        total = np.zeros((self._n_planes, 2, n_samples))
+        sizes = zip(self._sizes_n(start), self._sizes_n(stop), strict=True)
+        for (plane, excitation), (from_n, to_n) in zip(self._excitations, sizes, strict=True):
+            force = excitation.advance(n_samples)
+            total[plane] += straight(from_n, to_n, n_samples) * force
+        return total.reshape(2 * self._n_planes, n_samples)
+
+    def _sizes_n(self, scenario: Scenario) -> tuple[float, float, float]:
+        """Unbalance at rated speed, rms of the hydraulic force, rope."""
+        grade_mm_s = scenario.unbalance_grade_mm_s
+        return (
+            unbalance_force_n(grade_mm_s, self._rated_speed_rpm),
+            scenario.hydraulic.rms_n,
+            scenario.rope.force_n,
+        )
+
+
+def straight(start: float, stop: float, n_samples: int) -> FloatArray | float:
+    """Straight line over a chunk, without its end point; one number if it is constant."""
+    if start == stop:
+        return start
+    return np.linspace(start, stop, n_samples, endpoint=False)

@@ -1,4 +1,4 @@
-"""What becomes of a channel whose transducer, cable or amplifier fails."""
+"""Converter from engineering units to counts; failing transducers, cables and amplifiers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,36 +7,36 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE
-from core.arrays import CountArray
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE, UnitCalibration
+from core.arrays import CountArray, FloatArray
 
 RAIL_HIT_SPACING = 997
-"""Samples from one hit to the next; a prime, so that they fall everywhere in blocks."""
+"""Samples between two hits; a prime, so that hits fall anywhere in blocks."""
 
 RAILS = (COUNTS_FULL_SCALE - 1, -COUNTS_FULL_SCALE)
 
 
 class FaultKind(StrEnum):
-    """What goes wrong."""
+    """Kind of failure of a channel."""
 
     DEAD = "dead"
-    """No voltage at all: 0 counts."""
+    """No voltage: 0 counts."""
     STUCK = "stuck"
-    """The last value for ever, give or take a count."""
+    """The last value from then on, ±1 count."""
     CLIPPED = "clipped"
-    """The bias has drifted to the positive rail, where the upper half of the signal is cut off."""
+    """The bias has drifted to the positive rail, which cuts off the upper half of the signal."""
     RAIL_HITS = "rail_hits"
-    """A loose contact: now and then a single sample on one rail or the other."""
+    """A loose contact: single samples on one rail or the other."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One channel fails.
+    """Permanent failure of a channel.
 
     Parameters
     ----------
     from_sample
-        Index of the first sample that is wrong; from there on the fault stays.
+        Index of the first wrong sample.
     """
 
     kind: FaultKind
@@ -44,12 +44,12 @@ class Fault:
 
 
 class FaultInjector:
-    """Breaks the counts of some channels of one stream.
+    """Applies faults to the counts of one stream.
 
     Parameters
     ----------
     faults
-        By row of the counts; later ones work on what earlier ones leave.
+        By row of the counts; each applies to the result of those before.
     """
 
     def __init__(self, random: np.random.Generator, faults: Mapping[int, Sequence[Fault]]) -> None:
@@ -57,7 +57,7 @@ class FaultInjector:
         self._running = [(row, _Running(fault)) for row, found in faults.items() for fault in found]
 
     def spoil(self, counts: CountArray, first_index: int) -> None:
-        """Break the next counts of the stream, (n_channels, n_samples), where they stand."""
+        """Apply the faults to the next counts of the stream, (n_channels, n_samples), in place."""
         for row, running in self._running:
             jitter = self._random.integers(-1, 2, (counts.shape[1],))
             running.spoil(counts[row], first_index, jitter)
@@ -67,7 +67,7 @@ class FaultInjector:
 class _Running:
     fault: Fault
     last: int | None = None
-    """The sample before the fault; of a channel that never worked, its first."""
+    """Sample before the fault; the first of all if the fault is there from the start."""
 
     def spoil(self, counts: CountArray, first_index: int, jitter: npt.NDArray[np.int64]) -> None:
         healthy = min(max(self.fault.from_sample - first_index, 0), counts.size)
@@ -101,3 +101,16 @@ def _broken(
             hit, turn = since % RAIL_HIT_SPACING == 0, since // RAIL_HIT_SPACING % 2
             wide[hit] = np.array(RAILS)[turn[hit]]
     return wide.clip(lower, upper).astype(np.int16)
+
+
+def to_counts(readings: FloatArray, calibration: UnitCalibration) -> CountArray:
+    """Convert readings to whole counts, clipped at the rails.
+
+    Parameters
+    ----------
+    readings
+        (n_channels, n_samples) in engineering units.
+    """
+    per_unit = np.array([1.0 / channel.unit_per_count for channel in calibration.channels])
+    counts: FloatArray = np.rint(readings * per_unit[:, np.newaxis])
+    return counts.clip(-COUNTS_FULL_SCALE, COUNTS_FULL_SCALE - 1, out=counts).astype(np.int16)

@@ -1,4 +1,4 @@
-"""Films: coefficients of a bearing, its tilting pads, the viscosity of its oil."""
+"""Oil films: coefficients of a bearing, tilting pads, viscosity of oil."""
 
 import math
 from dataclasses import dataclass
@@ -89,8 +89,8 @@ class FilmColumns:
     def at(self, row: int) -> Film:
         """Film at one moment.
 
-        Damping is proportional to all of the stiffness: squeezed out from under a pad that follows
-        the shaft, oil resists by μ/h³ as it does by sliding.
+        Damping is proportional to the full stiffness matrix: oil squeezed out from under a pad that
+        follows the shaft resists by μ/h³, as it does in sliding.
         """
         k_xx, k_xy, k_yy = (
             float(k[row]) for k in (self.k_xx_n_per_m, self.k_xy_n_per_m, self.k_yy_n_per_m)
@@ -101,15 +101,15 @@ class FilmColumns:
 
 @dataclass(frozen=True)
 class PadRing:
-    """Equal pads evenly around the shaft, known by the stiffness they have centred.
+    """Equal pads evenly spaced around the shaft, described by their stiffness when centred.
 
     Parameters
     ----------
     first_pad_deg
         Angle of the first pad's pivot from x towards y.
     stiffness_n_per_m
-        Direct stiffness, the same in every direction, with the shaft centred and the next three as
-        given.
+        Direct stiffness, equal in all directions, with the shaft centred and the clearance,
+        viscosity and speed below.
     clearance_um
         Film thickness at the pivots with the shaft centred: the assembled radial clearance.
     """
@@ -171,7 +171,7 @@ class PadRing:
         viscosity_pa_s: FloatArray,
         speed_rpm: FloatArray,
     ) -> FloatArray:
-        """Mean force (x, y) of the pads on the bearing, (2, n); the parameters are those of `film`.
+        """Mean force (x, y) of the pads on the bearing, (2, n); parameters as in `film`.
 
         It is the static load that holds the shaft in this position.
         """
@@ -207,7 +207,7 @@ KELVIN_AT_0_C = 273.15
 
 @dataclass(frozen=True)
 class Oil:
-    """An oil known by its viscosity at two temperatures.
+    """Oil described by its viscosity at two temperatures.
 
     The defaults are Lubrax Turbina Plus 50 as in Brito et al., Table 1.
 
@@ -221,7 +221,7 @@ class Oil:
     Raises
     ------
     ValueError
-        If the oil is not thinner at 100 °C than at 40 °C, or a viscosity is not above zero.
+        If the viscosity at 100 °C is not above zero and below that at 40 °C.
     """
 
     viscosity_40_pa_s: float = 0.047

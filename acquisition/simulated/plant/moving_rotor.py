@@ -1,4 +1,4 @@
-"""The rotor of a unit on films and brackets that change while it moves."""
+"""Rotor of a unit on changing films and brackets."""
 
 import math
 from collections.abc import Iterator
@@ -7,28 +7,28 @@ from dataclasses import fields, replace
 import numpy as np
 
 from acquisition.errors import ConfigError
+from acquisition.simulated.plant.excitation import force_planes
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.forces import force_planes
+from acquisition.simulated.plant.probes import output_map
 from acquisition.simulated.plant.rotor import force_map, rotor_matrices
-from acquisition.simulated.plant.rotor_steps import Hold, LiftedRotor, discretize, lift, simulate
+from acquisition.simulated.plant.rotor_steps import LiftedRotor, discretize, lift, simulate
 from acquisition.simulated.plant.scenario import Scenario
-from acquisition.simulated.plant.transducers import output_map
 from core.arrays import FloatArray
 from core.machine.unit import Unit
 
 LIFTED_STEPS = 32
 
-LEAST_CHANGE = 1e-4
-"""Relative change of a film or bracket that is worth a new rotor."""
+MIN_CHANGE = 1e-4
+"""Relative change of a film or bracket above which the rotor is computed anew."""
 
-LARGEST_STEP, MOST_PIECES = 1e-3, 16
-"""Relative change within one piece of a chunk, above which it is cut into more, up to so many. The
-motion goes on from where it is: a step so small is lost in the noise of accelerometers, the only
-ones that could see it."""
+MAX_STEP, MAX_PIECES = 1e-3, 16
+"""Relative change within one piece of a chunk, above which the chunk is cut into more pieces, and
+their largest number. The state continues across a step: its jump is below the noise of the
+accelerometers, the only transducers that show it."""
 
 
 class MovingRotor:
-    """Motion of a rotor as its transducers see it.
+    """Motion of a rotor at its transducers.
 
     Raises
     ------
@@ -43,19 +43,19 @@ class MovingRotor:
         self._state = np.zeros(self._rotor.transition.shape[0])
 
     def advance(self, forces: FloatArray, start: Scenario, stop: Scenario) -> FloatArray:
-        """Move under the next forces, while one scenario goes over into another.
+        """Return the motion under the next forces, during the transition between two scenarios.
 
         Parameters
         ----------
         forces
-            (n_forces, n_samples), n_samples a multiple of `MOST_PIECES` times `LIFTED_STEPS`.
+            (n_forces, n_samples), n_samples a multiple of `MAX_PIECES` times `LIFTED_STEPS`.
 
         Returns
         -------
         (n_channels, n_samples) in each channel's engineering unit.
         """
         change = _change(_coefficients(start), _coefficients(stop))
-        n_pieces = min(MOST_PIECES, 2 ** max(0, math.ceil(math.log2(change / LARGEST_STEP + 1e-9))))
+        n_pieces = min(MAX_PIECES, 2 ** max(0, math.ceil(math.log2(change / MAX_STEP + 1e-9))))
         readings = []
         for number, piece in enumerate(np.split(forces, n_pieces, axis=1)):
             self._follow(_between(start, stop, (number + 0.5) / n_pieces))
@@ -64,14 +64,14 @@ class MovingRotor:
         return np.concatenate(readings, axis=1)
 
     def _follow(self, scenario: Scenario) -> None:
-        """Take the films, brackets and speed of a scenario from the next sample on."""
+        """Use the films, brackets and speed of a scenario from the next sample on."""
         wanted = _coefficients(scenario)
-        if _change(self._coefficients, wanted) > LEAST_CHANGE:
+        if _change(self._coefficients, wanted) > MIN_CHANGE:
             self._rotor, self._coefficients = _lifted_rotor(self._machine, scenario), wanted
 
 
 def _coefficients(scenario: Scenario) -> FloatArray:
-    """(n_bearings + 1, 5) of every film with its bracket, and the speed."""
+    """Coefficients of every film with its bracket, and the speed, (n_bearings + 1, 5)."""
     return np.array([*_rows(scenario), 5 * (scenario.speed_rpm,)])
 
 
@@ -86,7 +86,7 @@ def _rows(scenario: Scenario) -> Iterator[tuple[float, ...]]:
 
 
 def _change(before: FloatArray, after: FloatArray) -> float:
-    """Largest change relative to what is largest in the same row."""
+    """Largest change relative to the largest value of the same row."""
     scale = np.maximum(np.max(np.abs(before), axis=1), np.max(np.abs(after), axis=1))
     change = np.max(np.abs(after - before), axis=1)
     return float(np.max(np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0)))
@@ -125,5 +125,5 @@ def _lifted_rotor(machine: Unit, scenario: Scenario) -> LiftedRotor:
     matrices = rotor_matrices(parameters, films, scenario.speed_rpm)
     forces = np.hstack([force_map(parameters, plane) for plane in force_planes(scenario)])
     outputs = output_map(machine, parameters, matrices)
-    rotor = discretize(matrices, forces, outputs, machine.rate_hz, Hold.RAMP)
+    rotor = discretize(matrices, forces, outputs, machine.rate_hz)
     return lift(rotor, LIFTED_STEPS)

@@ -1,4 +1,4 @@
-"""The motion of one unit and what its transducers read, in chunks of fixed length."""
+"""Motion of one unit and readings of its transducers, in chunks of fixed length."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,15 @@ import numpy as np
 
 from acquisition.simulated.plant.chain import TransducerChain
 from acquisition.simulated.plant.conditions import Conditions, SlowWander
-from acquisition.simulated.plant.course import Course, SteadyCourse
-from acquisition.simulated.plant.forces import Forces
+from acquisition.simulated.plant.excitation import FollowedRotation, Forces, Rotation
 from acquisition.simulated.plant.moving_rotor import LIFTED_STEPS, MovingRotor
-from acquisition.simulated.plant.rotation import FollowedRotation, Rotation
-from acquisition.simulated.plant.scenario import Scenario
+from acquisition.simulated.plant.scenario import Course, Scenario
 from core.arrays import FloatArray
 from core.machine.unit import Unit
 from core.units import hz_from_rpm
 
 CHUNK_SAMPLES = 64 * LIFTED_STEPS
-"""Length of the pieces in which everything random is drawn, whatever pieces are asked for."""
+"""Length of the pieces in which random numbers are drawn, independent of the requested pieces."""
 
 WARM_UP_S = 15.0
 """Transients of films as soft as 0.3 GN/m have died to 1e-7 by then (7 % damping at 3 Hz)."""
@@ -33,7 +31,7 @@ class Chunk:
     first_index
         Samples since the plant began to warm up.
     scenario
-        What holds at the start.
+        Scenario at the start.
     """
 
     readings: FloatArray
@@ -48,8 +46,8 @@ class SimulatedPlant:
 
     Parameters
     ----------
-    scenario
-        One for ever, or a course of them.
+    course
+        Steady operation, or a course of scenarios.
 
     Raises
     ------
@@ -57,8 +55,7 @@ class SimulatedPlant:
         If machine and scenario do not fit together.
     """
 
-    def __init__(self, machine: Unit, scenario: Scenario | Course, seed: int) -> None:
-        course = SteadyCourse(scenario) if isinstance(scenario, Scenario) else scenario
+    def __init__(self, machine: Unit, course: Course, seed: int) -> None:
         seeds = np.random.SeedSequence(seed).spawn(7)
         hydraulic, rope, noise, wander, growth, speed, own = (
             np.random.Generator(np.random.SFC64(s)) for s in seeds
@@ -94,7 +91,7 @@ class SimulatedPlant:
         return self._course.rated_speed_rpm * float(self._rotation.relative_speed(index)[0])
 
     def _readings(self, following: Scenario, start: Conditions, stop: Conditions) -> FloatArray:
-        """Readings while the scenario goes over into the following one, without white noise."""
+        """Readings during the transition to the following scenario, without white noise."""
         index = np.arange(self._index, self._index + CHUNK_SAMPLES, dtype=np.float64)
         if isinstance(self._rotation, FollowedRotation):
             speeds_rpm = self._scenario.speed_rpm, following.speed_rpm
@@ -109,7 +106,7 @@ class SimulatedPlant:
 def _rotation(
     course: Course, first: Scenario, rate_hz: float, random: np.random.Generator
 ) -> Rotation | FollowedRotation:
-    if not isinstance(course, SteadyCourse):
+    if course is not first:
         return FollowedRotation(course.rated_speed_rpm, rate_hz)
     turn_hz = hz_from_rpm(first.speed_rpm)
     return Rotation(random, turn_hz, rate_hz, first.speed_wander, first.wander_time_s)

@@ -1,7 +1,7 @@
-"""A transducer's frequency response as digital filters that run through a stream without a seam.
+"""Frequency response of a transducer as digital filters over a continuous stream.
 
-A filter has the response's own poles, exactly; its numerator is fitted so that the response of the
-samples is the transducer's, not one bent towards the sampling rate as a bilinear transform gives.
+A filter has exactly the poles of the response; its numerator is fitted so that the sampled response
+is that of the transducer, without the frequency warping of a bilinear transform.
 """
 
 from collections.abc import Sequence
@@ -14,19 +14,19 @@ from core.arrays import ComplexArray, FloatArray
 from core.machine.response import HighPass, Resonance, Response, ResponseChain, ResponseTable
 
 EXACT_BAND_HZ = (0.1, 25.0)
-"""Where a filter has its transducer's response to `TOLERANCE`."""
+"""Band in which a filter matches the response of its transducer to `TOLERANCE`."""
 TOLERANCE = 1e-3
 
 N_TAPS = 6
 N_POINTS = 400
 CARE_ABOVE_BAND = 1e-3
-"""Weight of the fit above the band: enough to keep it tame there."""
+"""Weight of the fit above the band, which keeps the filter bounded there."""
 
 
 class ResponseFilter:
-    """One channel's response, applied to a stream piece by piece.
+    """Response of one channel, applied to a stream piece by piece.
 
-    The first sample is taken for a standing signal that was there for ever.
+    The filter starts in the steady state of the first sample.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def _section(
         case HighPass(corner_hz, order, damping):
             return _fitted(response, _pole_pair(corner_hz, damping), order, rate_hz)
         case Resonance(natural_hz, damping):
-            # what lies above half the sampling rate has no pole among the samples
+            # a resonance above half the sampling rate has no pole in the sampled response
             poles = _pole_pair(natural_hz, damping) if natural_hz < rate_hz / 4.0 else []
             return _fitted(response, poles, order=0, rate_hz=rate_hz)
         case ResponseTable():
@@ -108,19 +108,19 @@ def _pole_pair(natural_hz: float, damping: float) -> list[complex]:
 def _fitted(
     response: Response, poles: Sequence[complex], order: int, rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Poles as they are, `order` zeros at 0 Hz, and a numerator fitted to what is left."""
+    """Filter of the given poles, `order` zeros at 0 Hz, and a numerator fitted to the rest."""
     denominator, zeros = _polynomial(np.exp(np.array(poles) / rate_hz)), _polynomial(np.ones(order))
     frequency_hz = np.linspace(0.1, 0.45 * rate_hz, 10 * N_POINTS)
     shape = _response(zeros, denominator, frequency_hz, rate_hz)
     target = response.at(frequency_hz)
     delays = np.exp(-2j * np.pi * np.outer(frequency_hz / rate_hz, np.arange(N_TAPS)))
     care = np.where(frequency_hz <= 1.5 * EXACT_BAND_HZ[1], 1.0, CARE_ABOVE_BAND)
-    # relative to the target, so that the foot of a high-pass counts as much as its top
+    # relative to the target, so that all frequencies of a high-pass count alike
     taps = _taps(delays * (shape / target * care)[:, np.newaxis], care)
-    if not poles:  # a recursion by name: pure convolution would round by the length of the pieces
+    if not poles:  # a formal recursion: rounding of convolution depends on the piece length
         denominator = np.array([1.0, 0.0])
     if order == 0:
-        taps *= denominator.sum() / taps.sum()  # a standing gap is read exactly
+        taps *= denominator.sum() / taps.sum()  # exact for a constant gap
     return np.convolve(zeros, taps), denominator
 
 

@@ -1,4 +1,4 @@
-"""The 10-DOF rotor of Brito et al.: parameters, matrices, response to unbalance."""
+"""10-DOF rotor of Brito et al.: parameters, matrices, response to unbalance."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from core.arrays import ComplexArray, FloatArray
 from core.units import rad_s_from_rpm
 
 N_SHAFT_COORDINATES = 4
-"""X, Y of the mass centre and the tilts φ_x, φ_y."""
+"""Position X, Y of the mass centre and tilts φ_x, φ_y."""
 
 UNBALANCE_REFERENCE_FORCE_N = 75.6e3
 """Rotating force of unbalance grade G4.25 at 92.3 r/min, read back from the paper's Table 4."""
@@ -22,7 +22,7 @@ UNBALANCE_REFERENCE_SPEED_RPM = 92.3
 
 @dataclass(frozen=True)
 class Bracket:
-    """The structure that holds a guide bearing: an effective mass on an isotropic spring.
+    """Structure that holds a guide bearing: an effective mass on an isotropic spring.
 
     Parameters
     ----------
@@ -48,11 +48,11 @@ class RotorParameters:
     Parameters
     ----------
     magnetic_stiffness_n_per_m
-        Of the generator's air gap. Table 2 gives -0.60e9 for the excited machine; the paper's
-        simulations, and so the default, are those of the machine not excited.
+        Stiffness of the air gap of the generator. Table 2 gives -0.60e9 for the excited machine;
+        the default and the paper's simulations are for the machine without excitation.
     thrust_stiffness_n_per_m, thrust_radius_m
-        Axial stiffness of the thrust bearing and radius of its pad circle. The text does not say
-        how it acts; the tables follow if its pads resist tilt.
+        Axial stiffness of the thrust bearing and radius of its pad circle. The paper does not
+        describe its action; its tables follow if the pads resist tilt.
     """
 
     rotor_mass_kg: float = 2.37e6
@@ -78,7 +78,7 @@ class RotorParameters:
 
 
 class ForcePlane(StrEnum):
-    """Where a radial force acts on the rotor."""
+    """Plane in which a radial force acts on the rotor."""
 
     MASS_CENTRE = "mass_centre"
     GENERATOR = "generator"
@@ -86,9 +86,9 @@ class ForcePlane(StrEnum):
 
 
 def unbalance_force_n(grade_mm_s: float, speed_rpm: float) -> float:
-    """Rotating force of an unbalance that has the given ISO grade at 92.3 r/min.
+    """Rotating force of an unbalance of the given ISO grade at 92.3 r/min.
 
-    The unbalance is a mass on a radius, so its force grows with the square of speed.
+    The force of an unbalanced mass grows with the square of speed.
     """
     grade = grade_mm_s / UNBALANCE_REFERENCE_GRADE_MM_S
     return UNBALANCE_REFERENCE_FORCE_N * grade * (speed_rpm / UNBALANCE_REFERENCE_SPEED_RPM) ** 2
@@ -213,7 +213,7 @@ def _gyroscopic(parameters: RotorParameters) -> FloatArray:
 
 
 def _structure_stiffness(parameters: RotorParameters) -> FloatArray:
-    """Stiffness of everything but the films: brackets, thrust bearing, seals, air gap."""
+    """Stiffness without films: brackets, thrust bearing, seals, air gap."""
     tilt = parameters.tilt_stiffness_n_m_per_rad
     brackets = [b.stiffness_n_per_m for b in parameters.brackets for _ in "xy"]
     seals = _shaft_motion(parameters, parameters.runner_height_m)

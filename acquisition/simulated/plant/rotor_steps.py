@@ -1,7 +1,6 @@
-"""The rotor in exact discrete steps, lifted over blocks of samples."""
+"""Exact discrete steps of the rotor, lifted over blocks of samples."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 import scipy.linalg
@@ -10,23 +9,11 @@ from acquisition.simulated.plant.rotor import RotorMatrices
 from core.arrays import FloatArray
 
 
-class Hold(StrEnum):
-    """How a force runs from one sample to the next.
-
-    A held force is a staircase. Its steps contain the force once more near the sampling rate, which
-    folds back on sampling: harmless in displacement and velocity, but at 1.5 Hz and 600 Hz it turns
-    the acceleration of a stiffly held bracket by 1.5° and more. A ramp has no such steps.
-    """
-
-    ZERO = "zero"
-    RAMP = "ramp"
-
-
 @dataclass(frozen=True)
 class DiscreteRotor:
     """``s[n+1] = A s[n] + B f[n]``, ``y[n] = C s[n] + D f[n]``.
 
-    The state s is (x, dx/dt) if forces are held, and that less a share of the force if they ramp.
+    Forces run in ramps from sample to sample. The state s is (x, dx/dt) minus a share of the force.
 
     Parameters
     ----------
@@ -61,9 +48,12 @@ def discretize(
     force_map: FloatArray,
     output_map: FloatArray,
     rate_hz: float,
-    hold: Hold = Hold.ZERO,
 ) -> DiscreteRotor:
-    """Integrate exactly over one step.
+    """Integrate exactly over one step, under forces that run in ramps from sample to sample.
+
+    A force held over each step contains an image of itself near the sampling rate, which aliases:
+    negligible in displacement and velocity, but at 1.5 Hz and 600 Hz it turns the acceleration of a
+    stiffly held bracket by 1.5° and more. A ramp has no such image.
 
     Parameters
     ----------
@@ -80,9 +70,6 @@ def discretize(
     if not rate_hz > 0.0:
         raise ValueError(f"sampling rate must be above 0 Hz, got {rate_hz}")
     transition, held, ramped = _step(matrices, force_map, rate_hz)
-    if hold is Hold.ZERO:
-        still = np.zeros((output_map.shape[0], force_map.shape[1]))
-        return DiscreteRotor(transition, held, output_map, still)
     # s = (x, dx/dt) − ramped f takes f[n+1] out of the recursion (Franklin, Powell, Workman,
     # Digital Control of Dynamic Systems, triangle hold)
     driven = held + transition @ ramped - ramped
@@ -108,7 +95,7 @@ def _step(
 
 @dataclass(frozen=True)
 class LiftedRotor:
-    """`n_steps` steps of a :class:`DiscreteRotor` written out as one.
+    """`n_steps` steps of a :class:`DiscreteRotor` combined into one.
 
     Parameters
     ----------
@@ -117,8 +104,8 @@ class LiftedRotor:
     input_map
         (n_states, n_forces * n_steps)
     output_map, feedthrough
-        (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); in both,
-        time runs fastest. The second maps the block's forces to its outputs.
+        (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); time is the
+        fastest index. The second maps the forces of the block to its outputs.
     """
 
     n_steps: int
@@ -131,7 +118,7 @@ class LiftedRotor:
 
 
 def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
-    """Write out `n_steps` steps as one.
+    """Combine `n_steps` steps into one.
 
     Raises
     ------
@@ -159,19 +146,19 @@ def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
 def simulate(
     rotor: LiftedRotor, state: FloatArray, forces: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Move the rotor under given forces.
+    """Simulate the rotor under given forces.
 
     Parameters
     ----------
     state
-        (n_states,) at the first sample, in the terms of :class:`DiscreteRotor`.
+        (n_states,) at the first sample, as in :class:`DiscreteRotor`.
     forces
         (n_forces, n_samples) in newtons, n_samples a multiple of the block's steps.
 
     Returns
     -------
     outputs, state
-        (n_outputs, n_samples) and the state at the sample that follows.
+        (n_outputs, n_samples), and the state at the next sample.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""What a simulated unit goes through: its films, what shakes it, how well it is measured."""
+"""Scenario of a simulated unit: films, excitation, transducers; and courses of scenarios."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from acquisition.simulated.plant.faults import Fault
 from acquisition.simulated.plant.films import Film
@@ -11,27 +12,27 @@ from core.machine.response import Response
 
 @dataclass(frozen=True)
 class BearingScenario:
-    """One bearing: its oil film and where the shaft sits in it.
+    """Oil film of a bearing and position of the shaft in it.
 
     Parameters
     ----------
     centre_x_um, centre_y_um
         Mean position of the shaft centre from the bearing centre.
     centre_wander_um_rms
-        Slow wander of that position, for each direction.
+        Slow wander of that position, in each direction.
     gap_growth_um, gap_growth_wander_um_rms
-        By how much all gaps of the bearing are wider than with the shaft centred at reference
-        temperature, and its slow wander: positive where the housing grows more than the shaft.
+        Growth common to all gaps of the bearing, relative to the centred shaft at reference
+        temperature, and its slow wander; positive where the housing grows more than the shaft.
     runout_um_pk
         Runout of the shaft under the probes, 1×, 2×, …: phasors at the x probe, locked to the
-        shaft; the other probes see the same surface later. Towards a probe is positive.
+        shaft; the other probes see the same surface later. Positive is towards the probe.
     bracket_stiffness_factor
-        True stiffness of the bracket over the one of `Scenario.rotor`, which monitors are told.
+        True stiffness of the bracket over that of `Scenario.rotor`, which monitors use.
     position_error_um
-        Displacement (x, y) that the gaps tell and that is not there: drift of probes, before their
-        gain. It does not move the film.
+        False displacement (x, y) in the gaps, before the gain of the probes: probe drift. It does
+        not affect the film.
     oil_temperature_error_c
-        By how much the thermometer reads high.
+        Error of the thermometer; positive reads high.
     """
 
     film: Film
@@ -55,9 +56,9 @@ class HydraulicNoise:
     Parameters
     ----------
     rms_n
-        Of the force in each direction.
+        Force in each direction.
     cutoff_hz
-        The spectrum is flat below and falls steeply above; ``None`` is white up to half the
+        Upper limit of the flat spectrum, which falls steeply above; None is white up to half the
         sampling rate.
     """
 
@@ -85,12 +86,12 @@ class VortexRope:
 
 @dataclass(frozen=True)
 class KeyPhasePulse:
-    """What a key-phase pick-up gives once a turn.
+    """Pulse of a key-phase pick-up, once a turn.
 
     Parameters
     ----------
     mark_turns
-        Angle from where it passes the pick-up to the zero that unbalance and runout count from.
+        Angle from the passage of the mark to the zero that unbalance and runout count from.
     height_v
         Above `rest_v`, or below it on a channel whose direction is -1.
     """
@@ -108,12 +109,12 @@ class TransducerNoise:
     Parameters
     ----------
     gap_um_rms, displacement_um_rms, velocity_mm_s_rms, acceleration_m_s2_rms, key_phase_v_rms
-        White over the whole band, behind the transducer: its response does not touch it.
+        White noise over the whole band, added behind the transducer's frequency response.
     accelerometer_g_per_sqrt_hz
         One-sided density of the accelerometers' own noise, before their response; a velocity
         channel is an accelerometer whose charge amplifier integrates.
     accelerometer_corner_hz
-        Below here it rises as 1/f in power: at the corner itself the power is twice the density's.
+        Corner below which the power rises as 1/f; at the corner it is twice that of the density.
     """
 
     gap_um_rms: float = 0.0
@@ -127,17 +128,17 @@ class TransducerNoise:
 
 @dataclass(frozen=True)
 class ChannelScenario:
-    """What one transducer really is like, whatever the monitor is told.
+    """True properties of one transducer, which may differ from the configured ones.
 
     Parameters
     ----------
     response
-        Complex response; none is flat. Must be a model, not a table.
+        Complex response; None is flat. Must be a model, not a table.
     gain
         True sensitivity over the nominal one. A probe's reference gap was read with the probe
-        itself, so that the gain acts on what differs from it.
+        itself, so the gain acts on the difference from it.
     runout_um_pk
-        What this probe alone sees besides the runout of the shaft, 1×, 2×, …: phasors of motion
+        Runout seen by this probe only, added to that of the shaft, 1×, 2×, …: phasors of motion
         along its axis.
     """
 
@@ -149,7 +150,7 @@ class ChannelScenario:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One unit in steady operation.
+    """One unit in steady operation; also the `Course` that stays there.
 
     Parameters
     ----------
@@ -158,14 +159,14 @@ class Scenario:
     unbalance_grade_mm_s
         ISO grade at 92.3 r/min, as in the paper: G4.25 is 75.6 kN there.
     wander_time_s
-        How slowly shaft centres, temperatures and power wander, and the speed.
+        Time constant of the wander of shaft centres, temperatures, power and speed.
     speed_wander
-        Largest departure of the running speed from `speed_rpm`, as a share of it; 0.003 is 0.3 %.
-        The film and the gyroscopic forces stay those of `speed_rpm`.
+        Largest relative deviation of the running speed from `speed_rpm`; 0.003 is 0.3 %. Film and
+        gyroscopic forces remain those of `speed_rpm`.
     channels
-        Transducers that differ from perfect ones, by channel.
+        Imperfect transducers, by channel.
     exchanged
-        Pairs of channels whose cables are swapped.
+        Pairs of channels with swapped cables.
     """
 
     bearings: Mapping[str, BearingScenario]
@@ -185,10 +186,40 @@ class Scenario:
 
     @property
     def true_rotor(self) -> RotorParameters:
-        """The rotor on its brackets as they are."""
+        """Rotor on brackets of their true stiffness."""
         factors = {id_: bearing.bracket_stiffness_factor for id_, bearing in self.bearings.items()}
         brackets = tuple(
             replace(b, stiffness_n_per_m=factors.get(b.bearing, 1.0) * b.stiffness_n_per_m)
             for b in self.rotor.brackets
         )
         return replace(self.rotor, brackets=brackets)
+
+    @property
+    def rated_speed_rpm(self) -> float:
+        """Speed of the scenario."""
+        return self.speed_rpm
+
+    def at(self, elapsed_s: float) -> "Scenario":  # noqa: ARG002  steady operation
+        """Return this scenario."""
+        return self
+
+    def channel(self, id_: str) -> ChannelScenario:
+        """Transducer of a channel; a perfect one by default."""
+        return self.channels.get(id_, ChannelScenario())
+
+
+class Course(Protocol):
+    """Sequence of scenarios over time.
+
+    Films, brackets, forces, speed and the fields of `Conditions` may change between two scenarios;
+    everything else keeps its initial value. The unit interpolates linearly, its films in steps.
+    """
+
+    @property
+    def rated_speed_rpm(self) -> float:
+        """Usual speed of the unit, above zero."""
+        ...
+
+    def at(self, elapsed_s: float) -> Scenario:
+        """Scenario at a time after the first sample; times of successive calls rise."""
+        ...

@@ -1,4 +1,4 @@
-"""`SimulatedSource`: a simulated unit as a sample source, without a wire in between."""
+"""`SimulatedSource`: a sample feed as a sample source, without a wire."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
@@ -6,24 +6,24 @@ from contextlib import aclosing, asynccontextmanager
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawFeed
+from acquisition.simulated.feed import SampleFeed
 from core.samples.blocks import SampleBlock
 
 SKIP_SAMPLES = 65536
-"""Samples that are produced and thrown away before the event loop gets its turn."""
+"""Samples that are produced and discarded before the event loop continues."""
 
 
 class SimulatedSource:
-    """Calibrated blocks of a raw feed, in real time or as fast as they are taken.
+    """Calibrated blocks of a sample feed, in real time or as fast as the reader takes them.
 
-    In real time the feed runs from the first connection on, connected or not: what passed while
-    nobody was connected is missing, and the sample index jumps. Unpaced, a new connection goes on
-    where the last one stopped.
+    In real time the feed runs from the first connection on: samples that pass between connections
+    are lost, and the sample index jumps. Unpaced, a new connection continues at the end of the
+    previous one.
     """
 
     def __init__(
         self,
-        feed: RawFeed,
+        feed: SampleFeed,
         calibration: UnitCalibration,
         clock: Clock,
         paced: bool = True,

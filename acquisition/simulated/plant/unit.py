@@ -1,6 +1,8 @@
-"""`SimulatedUnit`: a generating unit with its converter, read like a device."""
+"""`SimulatedUnit`: a generating unit with its converter; its slow values and true state."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,28 +10,99 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.conditions import Conditions, between
-from acquisition.simulated.plant.converter import to_counts
-from acquisition.simulated.plant.course import Course
-from acquisition.simulated.plant.faults import FaultInjector
+from acquisition.simulated.plant.faults import FaultInjector, to_counts
+from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
-from acquisition.simulated.plant.scenario import Scenario
-from acquisition.simulated.plant.slow_values import slow_values
-from acquisition.simulated.plant.truth import UnitTruth, unit_truth
+from acquisition.simulated.plant.probes import probes
+from acquisition.simulated.plant.scenario import Course, Scenario
 from core.machine.unit import Unit
-from core.units import NS_PER_S
+from core.units import NS_PER_S, rad_s_from_rpm
+
+
+def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, float]:
+    """Values of all slow channels of a simulated unit, by channel id; gaps in mm."""
+    values: dict[str | None, float] = {
+        machine.speed_channel: speed_rpm,
+        machine.power_channel: now.active_power_mw,
+    }
+    oil_c = now.oil_temperature_c + now.oil_temperature_error_c
+    values |= {b.oil_temperature: float(c) for b, c in zip(machine.bearings, oil_c, strict=True)}
+    for probe in probes(machine):
+        from_reference_um = probe.gap_um(now) - probe.reference_um
+        shown_um = probe.reference_um + float(now.gain[probe.row]) * from_reference_um
+        values[probe.slow_channel] = shown_um / 1e3
+    return {name: value for name, value in values.items() if name is not None}
+
+
+@dataclass(frozen=True)
+class BearingTruth:
+    """True state of one bearing.
+
+    Parameters
+    ----------
+    k_eff_xx_n_per_m, k_eff_yy_n_per_m
+        ``|k + iΩc|`` at the running speed, which equation (5) of Brito et al. estimates.
+    eccentricity
+        Distance of the shaft centre from the bearing centre over the clearance.
+    gap_growth_um
+        Growth common to all gaps of the bearing.
+    bracket_stiffness_n_per_m
+        True stiffness, which may differ from the configured one.
+    """
+
+    film: Film
+    k_eff_xx_n_per_m: float
+    k_eff_yy_n_per_m: float
+    centre_x_um: float
+    centre_y_um: float
+    eccentricity: float
+    oil_temperature_c: float
+    gap_growth_um: float
+    bracket_stiffness_n_per_m: float
+
+
+@dataclass(frozen=True)
+class UnitTruth:
+    """True state of a unit at one instant."""
+
+    speed_rpm: float
+    active_power_mw: float
+    bearings: Mapping[str, BearingTruth]
+
+
+def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
+    """Collect the true state at one instant."""
+    brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
+    bearings = {}
+    for index, bearing in enumerate(machine.bearings):
+        film = scenario.bearings[bearing.id].film
+        k_eff = film.effective_stiffness_n_per_m(rad_s_from_rpm(speed_rpm))
+        centre_x_um, centre_y_um = (float(c) for c in now.centre_um[index])
+        bearings[bearing.id] = BearingTruth(
+            film=film,
+            k_eff_xx_n_per_m=k_eff[0],
+            k_eff_yy_n_per_m=k_eff[1],
+            centre_x_um=centre_x_um,
+            centre_y_um=centre_y_um,
+            eccentricity=math.hypot(centre_x_um, centre_y_um) / bearing.clearance_um,
+            oil_temperature_c=float(now.oil_temperature_c[index]),
+            gap_growth_um=float(now.gap_growth_um[index]),
+            bracket_stiffness_n_per_m=brackets[bearing.id],
+        )
+    return UnitTruth(speed_rpm, now.active_power_mw, bearings)
 
 
 class SimulatedUnit:
-    """Raw feed of one simulated unit.
+    """Sample feed of one simulated unit.
 
-    The same seed gives the same counts, however the samples are asked for.
+    The same seed gives the same counts, whatever pieces the samples are requested in.
 
     Parameters
     ----------
     machine
-        Its bearings are called UJB, LJB and TJB; it need not have all three.
+        Has some or all of the bearings UJB, LJB and TJB.
     scenario
-        One for ever, or a course of them.
+        Steady operation, or a course of scenarios.
     start_ns
         Time of sample 0; in whole seconds it is also the epoch of the blocks.
 
@@ -43,14 +116,14 @@ class SimulatedUnit:
         self,
         machine: Unit,
         calibration: UnitCalibration,
-        scenario: Scenario | Course,
+        scenario: Course,
         seed: int,
         start_ns: int,
     ) -> None:
         _check(machine, calibration)
         self._machine = machine
         self._calibration = calibration
-        first = scenario if isinstance(scenario, Scenario) else scenario.at(0.0)
+        first = scenario.at(0.0)
         self._start_ns = start_ns
         self._plant = SimulatedPlant(machine, scenario, seed)
         self._faults = _faults(machine, first, seed)
@@ -59,12 +132,12 @@ class SimulatedUnit:
         self._next_chunk()
 
     def advance(self, n_samples: int) -> RawBlock:
-        """Produce the next samples, following directly on the previous ones.
+        """Return the next samples, following directly on the previous ones.
 
         Raises
         ------
         ValueError
-            If less than one sample is asked for.
+            If less than one sample is requested.
         """
         if n_samples < 1:
             raise ValueError(f"a block needs at least 1 sample, got {n_samples}")
@@ -89,11 +162,11 @@ class SimulatedUnit:
         )
 
     def begin_at(self, start_ns: int) -> None:
-        """Move the time of sample 0, because making a plant of many machines takes its time."""
+        """Set the time of sample 0; building a plant of many machines takes time."""
         self._start_ns = start_ns
 
     def truth(self) -> UnitTruth:
-        """Tell what is really so at the next sample."""
+        """Return the true state at the next sample."""
         return unit_truth(
             self._machine, self._chunk.scenario, self._conditions(), self._speed_rpm()
         )
@@ -140,7 +213,7 @@ def _faults(machine: Unit, scenario: Scenario, seed: int) -> FaultInjector:
 
 
 def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) -> list[list[int]]:
-    """Pairs of rows whose cables are swapped."""
+    """Pairs of rows with swapped cables."""
     rows = {channel.id: row for row, channel in enumerate(machine.channels)}
     pairs = []
     for pair in scenario.exchanged:

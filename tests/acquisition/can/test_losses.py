@@ -16,9 +16,9 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
 from acquisition.delivery.calibration import calibrate
-from acquisition.simulated.devices.can_bus import _message
-from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_frames import FrameEncoder, shortened
+from acquisition.simulated.devices.can_server import can_message
+from acquisition.simulated.devices.can_shape import daq_settings
 from core.samples.blocks import Rejection
 from core.samples.ring import Ring
 
@@ -95,7 +95,7 @@ def assembler_of(counts_calibration):
         gate = FrameGate(plan, assembler.refused)
 
         def take(frames, arrived_ns):
-            admitted = [gate.admit(_message(frame)) for frame in frames]
+            admitted = [gate.admit(can_message(frame)) for frame in frames]
             return assembler.take([f for f in admitted if f is not None], arrived_ns)
 
         assembler.take_wire = take
@@ -242,7 +242,7 @@ def gate(shape, counts_calibration, refused) -> FrameGate:
 
 @pytest.fixture
 def good(shape, counting_feed):
-    return _message(FrameEncoder(shape).frames(counting_feed(n_channels=4).advance(50))[-1])
+    return can_message(FrameEncoder(shape).frames(counting_feed(n_channels=4).advance(50))[-1])
 
 
 def other_length(message, random):

@@ -10,7 +10,8 @@ import pytest
 import serial
 
 from acquisition.can.slcan import open_slcan
-from acquisition.simulated.devices.can_frames import FD_LENGTHS, WireFrame
+from acquisition.simulated.devices.can_frames import WireFrame
+from acquisition.simulated.devices.can_shape import FD_LENGTHS
 from acquisition.simulated.devices.can_slcan import slcan_line
 
 N_KINDS = 200

@@ -15,11 +15,9 @@ from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 from acquisition.simulated.devices.map_device import MapDevice
-from acquisition.simulated.devices.register_memory import RegisterMemory
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_device import RegisterMemory
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from core.samples.blocks import SampleBlock
 
 
@@ -124,9 +122,8 @@ def plant(stepped_clock) -> Callable:
 class Bench:
     """A device with some of everything that can be read."""
 
-    drained = False
-
     def __init__(self) -> None:
+        self.drained, self.faults = False, {}
         self.memory = RegisterMemory(100, 300)
         self.memory.write(100, bytes(range(200)))
         self.bits = bytes([0b1010_0101, 0b11, 0xFF] * 100)

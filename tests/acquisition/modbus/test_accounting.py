@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.simulated.devices import faults
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices import ring_faults as faults
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from core.samples.blocks import SampleBlock
 
 N_SLOTS = 16
@@ -29,7 +28,7 @@ class LossyPlant:
             "torn_slot": faults.torn,
             "wrong_sequence": faults.wrong_sequence,
             "inconsistent_index": self._wrong_index,
-            "impossible_time": faults.impossible_time,
+            "impossible_time": self._impossible_time,
             "damaged_slot": self._damage,
         }
         self.lost: Counter[str] = Counter()
@@ -71,6 +70,9 @@ class LossyPlant:
     def _wrong_index(self, slot):
         shift = int(self._random.integers(1, 2**31))
         return dataclasses.replace(slot, first_index=(slot.first_index + shift) % 2**32)
+
+    def _impossible_time(self, slot):
+        return dataclasses.replace(slot, microseconds=slot.microseconds + 1_000_000)
 
     def _damage(self, slot):
         return dataclasses.replace(slot, damage=int(self._random.integers(1, 2**32)))

@@ -19,8 +19,8 @@ from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import Signature
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, TcpTransport
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 
 ACME = ExpectedIdentification(vendor="Acme")
 SIGNED = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))

@@ -15,7 +15,7 @@ from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.fifo_device import FifoDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from core.samples.blocks import SampleBlock
 
 STEP = 50

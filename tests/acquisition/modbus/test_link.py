@@ -10,7 +10,7 @@ from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identification
 from acquisition.modbus.ring_source import RingSettings
 from acquisition.modbus.transport import ConnectionUse, LinkSettings, SerialTransport, TcpTransport
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 
 
 async def test_every_kind_of_read_brings_what_the_device_has(linked, bench_server, bench):

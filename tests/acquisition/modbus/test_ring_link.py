@@ -7,10 +7,9 @@ from acquisition.delivery.arrival import Arrival
 from acquisition.delivery.clock_estimate import ClockEstimate
 from acquisition.delivery.ring_pace import out_of_step_s
 from acquisition.errors import ConfigError, LinkError
-from acquisition.simulated.devices import faults
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices import ring_faults as faults
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from core.alarms.kinds import drift_reading
 
 

@@ -18,7 +18,7 @@ from acquisition.modbus.register_map import MapValue, RegisterMap
 from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.map_device import MapDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.source import refused_frames_of
 from core.quality import GOOD, Level, Reading, Reason
 from core.samples.blocks import SampleBlock

@@ -6,9 +6,8 @@ from dataclasses import replace
 from acquisition.can.settings import CanLinkSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.devices.can_slcan import SlcanTcpServer
 from acquisition.source import SampleSource
 

@@ -5,7 +5,7 @@ import threading
 
 import can
 
-from acquisition.simulated.devices.can_bus import _message
+from acquisition.simulated.devices.can_server import can_message
 
 VIRTUAL = {"interface": "virtual", "channel": "a test's own bus"}
 
@@ -53,4 +53,4 @@ def can_threads() -> list[str]:
 def send_block(device, fake_bus) -> None:
     device.produce()
     for frame in device.next_frames():
-        fake_bus.messages.put(_message(frame))
+        fake_bus.messages.put(can_message(frame))

@@ -1,16 +1,14 @@
 """Devices that lie: a raw Modbus server and a raw serial line that spoil replies on demand."""
 
 import asyncio
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
 from pymodbus.framer import FramerRTU
 
-from acquisition.simulated.devices.answers import ReadableDevice, answer
-from acquisition.simulated.devices.modbus_server import ModbusDevice
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+from acquisition.simulated.devices.modbus_device import ModbusDevice, answer
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer
 
 _MBAP_HEAD_BYTES = 6
 
@@ -22,7 +20,7 @@ class Liar:
     taken away.
     """
 
-    def __init__(self, device: ReadableDevice) -> None:
+    def __init__(self, device: ModbusDevice) -> None:
         self.lie: Callable | None = None
         self.n_honest = 0
         self.requests: list[bytes] = []
@@ -75,7 +73,7 @@ class LoopbackServer:
 class HostileServer(LoopbackServer, Liar):
     """A Modbus TCP device."""
 
-    def __init__(self, device: ReadableDevice) -> None:
+    def __init__(self, device: ModbusDevice) -> None:
         LoopbackServer.__init__(self)
         Liar.__init__(self, device)
 
@@ -114,7 +112,7 @@ class HostileLine(ModbusRtuServer, Liar):
 
     def write(self, data: bytes) -> None:
         """Send bytes, asked or not."""
-        os.write(self._line[0], data)
+        self._line.write(data)
 
     async def drain(self) -> None:
         pass

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.errors import ConfigError, LinkError
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.devices.ring_device import RingDeviceSettings
 from rigs.hostile_modbus import HostileLine, HostileServer, rtu_frame
 from rigs.modbus import InFlightRig, ModbusRig, ModbusRtuRig
 from rigs.registers import REGISTER_RIGS, ChannelFifoTcpRig, VectorTcpRig

@@ -9,11 +9,10 @@ from acquisition.clock import SystemClock
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
-from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_device import ModbusDevice
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
+from acquisition.simulated.devices.modbus_server import ModbusServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.source import SampleSource
 
 

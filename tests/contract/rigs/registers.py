@@ -17,7 +17,7 @@ from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.source import SampleSource
 from core.spectra.vector_rows import VectorPart, VectorRow
 from rigs.modbus import OnRtu, OnTcp, Rig

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from acquisition.delivery.calibration import SlowCalibration, UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.simulated.devices.map_device import MapDevice
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from service.cli.probe import app
 from service.settings.map_file import load_map_file
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.can.source import CanSource
-from acquisition.simulated.devices.can_dbc import daq_dbc
+from acquisition.simulated.devices.can_shape import daq_dbc
 from service.conversion import calibration_of
 from service.settings.can import CanSettings
 from service.settings.loading import load_plant_file

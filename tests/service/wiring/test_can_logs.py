@@ -11,14 +11,14 @@ import pytest
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
 from acquisition.recordings.reading import reading
-from acquisition.simulated.devices.can_dbc import daq_dbc, daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_frames import WireFrame
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, daq_settings
+from acquisition.simulated.feed import FeedEndedError
 from service.wiring.can_logs import CanLogDecoder
 
 START_S = 1_767_225_600

@@ -1,6 +1,7 @@
 """A unit of a plant file that lives: its past as readings, its present as samples."""
 
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +55,10 @@ def plant_with(life: str, folder: Path) -> PlantFile:
 def test_the_films_of_a_living_unit_are_read_as_its_past_says(
     tmp_path: Path, stepped_clock: Any
 ) -> None:
+    """Five minutes of samples, of films of which one has been damaged two hours ago."""
     now_ns = stepped_clock.now_ns()
-    plant = plant_with(LIFE.split("[[")[0], tmp_path)
+    onset = datetime.fromtimestamp(now_ns // NS_PER_S - 7200, UTC).isoformat()
+    plant = plant_with(LIFE.replace("after_s = 120.0", f"at = {onset}"), tmp_path)
     unit = plant.unit[0]
     feed, calibration = simulated_feed(unit, stepped_clock), calibration_of(unit)
     delivery = Delivery(calibration)
@@ -76,6 +79,9 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(
         assert film.eccentricity_ratio == pytest.approx(past.eccentricity_ratio[-1], abs=0.01)
         assert film.oil_temperature_c == pytest.approx(past.oil_temperature_c[-1], abs=0.2)
         assert film.power_mw == pytest.approx(665.0, abs=10.0)
+        assert film.speed_rpm == pytest.approx(past.speed_rpm[-1], rel=1e-3)
+        shaft_um = [value.shaft_um_pk for value in film.values]
+        assert shaft_um == pytest.approx(past.shaft_um_pk[:, -1].tolist(), rel=0.1)
 
 
 def test_a_unit_with_fixed_films_has_no_past(stepped_clock: Any) -> None:

@@ -22,9 +22,8 @@ from typing import IO
 import uvloop
 
 from acquisition.clock import FastClock, SystemClock
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.feed import Ledger
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.tape import environment, python

@@ -1,6 +1,8 @@
 """A ring behind a recording: gaps, restarts and the end arrive as they were recorded."""
 
 import asyncio
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,15 +10,14 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import RingSettings, RingSource
-from acquisition.simulated.devices.reading_watch import ReadingWatch
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
+from acquisition.simulated.devices.ring_faults import ReadingWatch
+from acquisition.simulated.feed import FeedEndedError
 from core.samples.blocks import SampleBlock
 
 START_NS = 1_767_225_600 * 10**9
@@ -75,15 +76,6 @@ async def replayed(server, calibration: UnitCalibration) -> list[SampleBlock]:
 SETTINGS = RingDeviceSettings(n_slots=8)
 
 
-@pytest.fixture(params=[ModbusTcpServer, ModbusRtuServer], ids=["tcp", "rtu"])
-def serve(request):
-    def server(device: RingDevice):
-        device.on_demand = True
-        return request.param(device)
-
-    return server
-
-
 PIECES = ((1, 0, 130), (1, 275, 1000), (1, 9000, 29_000), (2, 20, 400), (9, 5000, 5300))
 FOUND = {(1, 0): 2, (1, 300): 14, (1, 9000): 400, (2, 50): 7, (9, 5000): 6}
 """First slots and their number: 100 to 130, 275 to 300 and 20 to 50 of epoch 2 fill none."""
@@ -104,10 +96,16 @@ def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]
         assert block.slow["slow0"].value == block.first_index // 50
 
 
-async def test_a_replay_on_demand_loses_nothing_however_small_the_ring(serve, counts_calibration):
+@pytest.mark.parametrize("kind", [ModbusTcpServer, ModbusRtuServer, "patient"])
+async def test_a_replay_loses_nothing_however_small_the_ring_and_fast_the_clock(
+    kind, counts_calibration
+):
     """Gaps are as long behind the wire, and epochs are those of the recording."""
     device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
-    async with serve(device) as server:
+    device.patient = kind == "patient"
+    device.on_demand = not device.patient
+    how = ModbusTcpServer(device, Hurry(), patient=True) if device.patient else kind(device)
+    async with how as server:
         blocks = await replayed(server, counts_calibration())
     assert_recorded(blocks, FOUND)
 
@@ -178,14 +176,6 @@ def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read() -> No
     assert (device.epoch, device.newest) == (8, 0)
 
 
-async def test_a_patient_server_loses_nothing_however_fast_its_clock(counts_calibration):
-    device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
-    device.patient = True
-    async with ModbusTcpServer(device, Hurry(), patient=True) as server:
-        blocks = await replayed(server, counts_calibration())
-    assert_recorded(blocks, FOUND)
-
-
 async def test_a_reader_that_comes_late_gets_what_is_left_and_its_end(counts_calibration):
     device = RingDevice(PiecewiseFeed((1, 0, 20_000)), settings=SETTINGS)
     device.patient = True
@@ -218,22 +208,13 @@ def test_a_feed_without_a_whole_slot_is_refused():
 
 
 def test_a_feed_in_engineering_units_is_refused(counting_feed):
-    feed = counting_feed()
-    in_counts = feed.advance
-
-    def in_units(n_samples: int) -> RawBlock:
-        raw = in_counts(n_samples)
-        return RawBlock(**vars(raw) | {"counts": raw.counts.astype(np.float32)})
-
-    feed.advance = in_units
+    raw = counting_feed().advance(50)
+    feed = SimpleNamespace(advance=lambda _: replace(raw, counts=raw.counts.astype(np.float32)))
     with pytest.raises(ConfigError, match="carries 16-bit counts, and the feed gives float32"):
         RingDevice(feed)
 
 
-N_SLOTS = 8
-
-
-LAYOUT = RingLayout(1, 10, N_SLOTS, 600_000, 0, ring_address=100, slot_stride=40)
+LAYOUT = RingLayout(1, 10, 8, 600_000, 0, ring_address=100, slot_stride=40)
 LOOK = ()
 
 
@@ -259,7 +240,7 @@ def test_a_slot_is_read_when_a_reader_that_was_told_of_it_cannot_come_back_for_i
     watch = ReadingWatch(LAYOUT)
     for done in written_read_or_looked:
         if done is None:
-            watch.begin_anew()
+            watch.clear()
         elif done == LOOK:
             watch.note_look()
         for number in done or ():

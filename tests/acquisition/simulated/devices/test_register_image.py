@@ -130,21 +130,6 @@ def test_a_flag_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:
     assert device.read().states[0] is (ValueState.OK if good else ValueState.FLAGGED)
 
 
-def test_two_flags_of_one_register_do_not_disturb_each_other() -> None:
-    status = Cell(address=9)
-    checks = [FlagCheck(cell=status, mask=1 << n, set_means=Meaning.BAD) for n in range(3)]
-    values = tuple(
-        MapValue(id=f"v{n}", cell=Cell(address=n), flags=(check,)) for n, check in enumerate(checks)
-    )
-    device = Device(*values)
-    for n, check in enumerate(checks):
-        device.image.put_flag(check, n != 1)
-
-    states = device.read().states
-
-    assert [state is ValueState.OK for state in states] == [True, False, True]
-
-
 @pytest.mark.parametrize(
     ("type_", "settings"),
     [
@@ -163,19 +148,21 @@ def test_what_a_device_does_not_know_is_no_value(type_: str, settings) -> None:
     assert device.read().states[0] is ValueState.INVALID
 
 
-def test_bits_are_written_where_they_are_read() -> None:
+def test_bits_are_written_where_they_are_read_and_leave_the_others_of_a_register() -> None:
     cells = [
         Cell(address=3, type=NumberType.BIT, bit=5),
         Cell(address=3, type=NumberType.BIT, bit=13),
+        Cell(address=3, type=NumberType.BIT, bit=0),
         Cell(address=8, function=1, type=NumberType.BIT),
         Cell(address=9, function=2, type=NumberType.BIT),
     ]
     values = tuple(MapValue(id=f"b{n}", cell=cell) for n, cell in enumerate(cells))
     device = Device(*values)
-    for n, value in enumerate(values):
-        device.image.put_value(value, float(n % 2))
+    bits = [1.0, 1.0, 0.0, 0.0, 1.0]
+    for value, bit in zip(values, bits, strict=True):
+        device.image.put_value(value, bit)
 
-    assert device.read().values.tolist() == [0.0, 1.0, 0.0, 1.0]
+    assert device.read().values.tolist() == bits
 
 
 @pytest.mark.parametrize(

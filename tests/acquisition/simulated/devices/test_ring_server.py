@@ -11,12 +11,10 @@ from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import decode_header, decode_slots
 from acquisition.modbus.ring_source import RingSettings, RingSource
-from acquisition.simulated.devices import faults
-from acquisition.simulated.devices.register_memory import RegisterMemory
-from acquisition.simulated.devices.ring_device import RingDevice
-from acquisition.simulated.devices.ring_shape import RingDeviceSettings
-from acquisition.simulated.devices.rtu_server import ModbusRtuServer
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.devices import ring_faults as faults
+from acquisition.simulated.devices.modbus_device import RegisterMemory
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.feed import Ledger
 from core.samples.blocks import Rejection
 from core.samples.device_clock import StampFault
@@ -235,17 +233,12 @@ async def test_a_spoilt_slot_is_refused_and_counted_a_dropped_one_is_a_gap_and_t
     assert block.rejected == ((Rejection(reason, 50),) if reason else ())
 
 
-async def test_a_wrong_stamp_is_flagged(server, device, source):
+async def test_a_wrong_stamp_is_flagged_and_a_reset_begins_a_new_epoch(server, device, source):
     async with source.connect() as stream:
-        await anext(stream)
+        before = await anext(stream)
         server.inject("wrong_time")
         device.produce(1)
         assert (await anext(stream)).stamp_fault is StampFault.JUMPED
-
-
-async def test_a_reset_begins_a_new_epoch(server, source):
-    async with source.connect() as stream:
-        before = await anext(stream)
         server.inject("reset_epoch", 2)
         after = await anext(stream)
     assert (after.epoch, after.first_index) == (before.epoch + 2, 0)

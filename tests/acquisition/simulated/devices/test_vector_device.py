@@ -10,8 +10,8 @@ from acquisition.delivery.raw import RawBlock
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.transport import TcpTransport
-from acquisition.simulated.devices.tcp_server import ModbusTcpServer
-from acquisition.simulated.devices.vector_device import VectorDevice
+from acquisition.simulated.devices.map_device import VectorDevice
+from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from core.machine.unit import Bearing, Channel, Measurand, Unit
 from core.monitor.settings import AnalysisSettings
 from core.monitor.vector_monitor import VectorMonitor

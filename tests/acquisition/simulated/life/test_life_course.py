@@ -5,27 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs.tiers import fast_and_long
 
-from acquisition.delivery.blocks import Delivery
-from acquisition.simulated.life.course import LifeCourse, LifePlan, course_from, history_until
+from acquisition.simulated.life.course import LifeCourse, LifePlan, history_until
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.inputs import LifeInputs, draw_inputs
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.moment import scenario_at
 from acquisition.simulated.life.operation import HeldLoad
-from acquisition.simulated.plant.plant import CHUNK_SAMPLES
 from acquisition.simulated.plant.unit import SimulatedUnit
-from benchmarks.chain_unit import CALIBRATION, SETTINGS, UNIT, UNKNOWN, WINDOW_SAMPLES
-from core.change.film_reading import film_reading
-from core.machine.unit import Estimator
-from core.monitor.assessment import Assessment
-from core.monitor.monitor import UnitMonitor
-from core.units import NS_PER_S, ns_from_s
+from benchmarks.chain_unit import CALIBRATION, UNIT
+from core.units import NS_PER_S
 
 START_NS = 1_735_689_600 * NS_PER_S
 STEP_NS = 600 * NS_PER_S
 SEED, YEARS = 4, 0.3
+NOW_NS = 1_794_657_615 * NS_PER_S
+"""14 November 2026, some time in the morning."""
+PLAN = LifePlan(2, held_load=0.95)
 
 
 @pytest.fixture(scope="module")
@@ -117,11 +113,10 @@ def test_what_cannot_be_is_refused(inputs: LifeInputs) -> None:
     loss = Damage(DamageKind.STIFFNESS_LOSS, "XJB", START_NS, math.nextafter(0.2, 1.0))
     with pytest.raises(ValueError, match="'XJB' is none of"):
         LifeCourse(inputs, (loss,), UNIT, running_ns(inputs))
-
-
-NOW_NS = 1_794_657_615 * NS_PER_S
-"""14 November 2026, some time in the morning."""
-PLAN = LifePlan(2, held_load=0.95)
+    with pytest.raises(ValueError, match="'XJB' is none of"):
+        history_until(LifePlan(2, damage=(loss,)), NOW_NS)
+    with pytest.raises(ValueError, match="years = 2 reach back beyond the life of unit 2"):
+        history_until(PLAN, NOW_NS, years=2.0)
 
 
 def test_readings_reach_until_now_and_a_year_back() -> None:
@@ -139,41 +134,3 @@ def test_a_unit_watched_again_tomorrow_has_the_same_past() -> None:
         assert both.mean() > 0.99
         again = tomorrow.readings[name].eccentricity_ratio[shared]
         assert np.array_equal(again, history.eccentricity_ratio[both])
-
-
-@pytest.mark.parametrize("damage_h", fast_and_long(-1.0, 24.0))
-def test_samples_go_on_where_readings_stop(damage_h: float) -> None:
-    """Five minutes of samples read as the life says, with a film that is damaged, or will be."""
-    onset_ns = NOW_NS + round(damage_h * 3600) * NS_PER_S
-    plan = LifePlan(2, 0.95, (Damage(DamageKind.STIFFNESS_LOSS, "LJB", onset_ns, 0.2),))
-    window_ns = ns_from_s(WINDOW_SAMPLES / UNIT.rate_hz)
-    unit = SimulatedUnit(UNIT, CALIBRATION, course_from(plan, NOW_NS, UNIT), 5, NOW_NS)
-    delivery, monitor = Delivery(CALIBRATION), UnitMonitor(UNIT, SETTINGS)
-    newest: list[Assessment] = []
-    for _ in range(WINDOW_SAMPLES // CHUNK_SAMPLES + 1):
-        for block in delivery.take(unit.advance(CHUNK_SAMPLES)):
-            newest = monitor.ingest(block) or newest
-
-    life = history_until(plan, NOW_NS + window_ns + STEP_NS)
-    middle_ns = NOW_NS + window_ns // 2
-    for assessment in newest:
-        found = film_reading(assessment, UNKNOWN, Estimator.DYNAMIC)
-        history = life.readings[assessment.bearing]
-        row = int(np.argmin(np.abs(history.time_ns - middle_ns)))
-        for axis, value in enumerate(found.values):
-            apart = value.ln_k - history.ln_k[axis, row]
-            # a reading of the life strays by chance; so does the film within half a step
-            assert abs(apart) < 4.0 * np.hypot(value.u_random, history.u_random[axis, row]) + 0.01
-        assert found.eccentricity_ratio == pytest.approx(history.eccentricity_ratio[row], abs=0.01)
-        assert found.oil_temperature_c == pytest.approx(history.oil_temperature_c[row], abs=0.2)
-        assert found.speed_rpm == pytest.approx(history.speed_rpm[row], rel=1e-3)
-        shaft_um = history.shaft_um_pk[:, row]
-        assert [v.shaft_um_pk for v in found.values] == pytest.approx(list(shaft_um), rel=0.1)
-
-
-def test_a_past_beyond_the_life_is_refused() -> None:
-    with pytest.raises(ValueError, match="years = 2 reach back beyond the life of unit 2"):
-        history_until(PLAN, NOW_NS, years=2.0)
-    loss = Damage(DamageKind.STIFFNESS_LOSS, "XJB", NOW_NS, 0.2)
-    with pytest.raises(ValueError, match="'XJB' is none of"):
-        history_until(LifePlan(2, damage=(loss,)), NOW_NS)

@@ -52,7 +52,7 @@ def second_day() -> tuple[dict[str, FloatArray], dict[str, FloatArray], dict[str
 def _position_um(bearing: LifeBearing) -> FloatArray:
     has_shifted = (HOURS >= 6.7) & (bearing.id == "UJB")
     ratio = np.where(has_shifted, 0.32, 0.15)
-    return bearing.told_clearance_um * np.stack([ratio, np.zeros(N_MINUTES)])
+    return bearing.configured_clearance_um * np.stack([ratio, np.zeros(N_MINUTES)])
 
 
 def at(hour: float) -> int:

@@ -7,15 +7,16 @@ import pytest
 import scipy.signal
 
 from acquisition.errors import ConfigError
-from acquisition.simulated.plant.accelerometer_noise import AccelerometerNoise
+from acquisition.simulated.plant.chain import AccelerometerNoise
 from acquisition.simulated.plant.excitation import (
     Excitation,
+    FollowedRotation,
     HydraulicForce,
     RopeForce,
+    Rotation,
     UnbalanceForce,
 )
 from acquisition.simulated.plant.response_filter import ResponseFilter
-from acquisition.simulated.plant.rotation import FollowedRotation, Rotation
 from core.arrays import FloatArray
 from core.machine.response import HighPass, Resonance, Response, ResponseChain, ResponseTable
 
@@ -208,14 +209,6 @@ def test_the_shaft_turns_as_fast_as_its_speed_says_which_wanders_by_what_it_is_t
     assert np.abs(relative - 1.0).max() <= 0.003
     assert np.ptp(relative) > 0.004
     assert relative.mean() == pytest.approx(1.0, abs=1e-4)
-
-
-def test_without_wander_the_turns_are_even() -> None:
-    even = Rotation(np.random.default_rng(1), TURN_HZ, RATE_HZ)
-    index = np.arange(10_000.0)
-
-    assert np.array_equal(even.turns(index), TURN_HZ / RATE_HZ * index)
-    assert np.array_equal(even.relative_speed(index), np.ones(10_000))
 
 
 def test_a_shaft_that_is_followed_turns_by_its_mean_speed_without_a_jump() -> None:

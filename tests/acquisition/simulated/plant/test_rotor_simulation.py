@@ -12,7 +12,7 @@ from acquisition.simulated.plant.rotor import (
     relative_motion,
     rotor_matrices,
 )
-from acquisition.simulated.plant.rotor_steps import DiscreteRotor, Hold, discretize, lift, simulate
+from acquisition.simulated.plant.rotor_steps import DiscreteRotor, discretize, lift, simulate
 from core.arrays import FloatArray
 
 PARAMETERS = RotorParameters()
@@ -26,11 +26,11 @@ PLANES = tuple(ForcePlane)
 RATE_HZ = 600.0
 
 
-def discrete_rotor(hold: Hold = Hold.ZERO) -> DiscreteRotor:
+def discrete_rotor() -> DiscreteRotor:
     forces = np.hstack([force_map(PARAMETERS, plane) for plane in PLANES])
     displacement = np.vstack([relative_motion(PARAMETERS), bracket_motion(PARAMETERS)])
     outputs = np.hstack([displacement, np.zeros_like(displacement)])
-    return discretize(MATRICES, forces, outputs, RATE_HZ, hold)
+    return discretize(MATRICES, forces, outputs, RATE_HZ)
 
 
 def step_by_step(
@@ -43,10 +43,9 @@ def step_by_step(
     return outputs, state
 
 
-@pytest.mark.parametrize("hold", Hold)
 @pytest.mark.parametrize("n_steps", [1, 2, 32, 64])
-def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps: int, hold: Hold) -> None:
-    rotor = discrete_rotor(hold)
+def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps: int) -> None:
+    rotor = discrete_rotor()
     forces = 1.0e4 * np.random.default_rng(1).standard_normal((6, 1280))
     state = np.random.default_rng(2).standard_normal(20) * 1.0e-5
 
@@ -85,20 +84,15 @@ def test_a_held_force_settles_where_the_springs_balance_it() -> None:
     assert outputs[:, -1] == pytest.approx(static, rel=1e-9, abs=1e-15)
 
 
-@pytest.mark.parametrize("hold", Hold)
 @pytest.mark.parametrize("plane", PLANES)
-def test_steady_state_under_a_rotating_force_is_the_frequency_response(
-    plane: ForcePlane, hold: Hold
-) -> None:
+def test_steady_state_under_a_rotating_force_is_the_frequency_response(plane: ForcePlane) -> None:
     frequency_hz = 92.3 / 60.0
-    # A force held for a step acts half a step late.
-    acting_s = (np.arange(600 * 60) + (0.5 if hold is Hold.ZERO else 0.0)) / RATE_HZ
-    angle = 2.0 * np.pi * frequency_hz * acting_s
-    forces = np.zeros((6, acting_s.size))
+    angle = 2.0 * np.pi * frequency_hz * np.arange(600 * 60) / RATE_HZ
+    forces = np.zeros((6, angle.size))
     row = 2 * PLANES.index(plane)
     forces[row : row + 2] = 75.6e3 * np.array([np.cos(angle), np.sin(angle)])
 
-    outputs, _ = simulate(lift(discrete_rotor(hold), 32), np.zeros(20), forces)
+    outputs, _ = simulate(lift(discrete_rotor(), 32), np.zeros(20), forces)
 
     force = forward_force(PARAMETERS, plane, 75.6e3)
     response = bearing_response(PARAMETERS, MATRICES, frequency_hz, force)
@@ -107,7 +101,7 @@ def test_steady_state_under_a_rotating_force_is_the_frequency_response(
         phasor = response[bracket.bearing][:, np.newaxis]
         expected = (phasor * np.exp(2j * np.pi * frequency_hz * end_s)).real
         rows = [2 * index, 2 * index + 1, 6 + 2 * index, 7 + 2 * index]
-        # What a force in steps of 1/600 s loses: (π f / rate)² / 6 = 1.1e-5, twice that in ramps
+        # Loss of a force in ramps over 1/600 s: (π f / rate)² / 3 = 2.2e-5
         assert np.abs(outputs[rows][:, 600 * 50 :] - expected).max() <= 3e-5 * np.abs(phasor).max()
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE, UnitCalibration
 from acquisition.errors import ConfigError
-from acquisition.simulated.plant.converter import to_counts
+from acquisition.simulated.plant.chain import KeyPhasePulses
+from acquisition.simulated.plant.faults import to_counts
 from acquisition.simulated.plant.films import Film
-from acquisition.simulated.plant.key_phase import KeyPhasePulses
 from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario, TransducerNoise
 from core.arrays import FloatArray

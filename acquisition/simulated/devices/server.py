@@ -1,0 +1,195 @@
+"""`DaqServer`: common part of all simulated DAQs; `PseudoTerminal`: serial line of some."""
+
+import asyncio
+import os
+import tty
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from acquisition.errors import ConfigError, LinkError
+
+_TERMINALS = "/dev/pts/"
+_READ_BYTES = 4096
+
+
+class DaqServer(ABC):
+    """Simulated device on a real link; entering plugs it in, leaving pulls it out, repeatedly.
+
+    Raises
+    ------
+    LinkError, ConfigError
+        On entering, if the link cannot be made.
+    """
+
+    def __init__(self) -> None:
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @property
+    @abstractmethod
+    def endpoint(self) -> Mapping[str, str | int]:
+        """Settings by which a source finds the device, by key; known once entered."""
+
+    @abstractmethod
+    async def run(self) -> None:
+        """Serve until cancelled; return at the end of the device's feed."""
+
+    def inject(self, fault: str, count: int = 1) -> None:
+        """Cause a fault of the device or its link, `count` times.
+
+        Raises
+        ------
+        LookupError
+            If the fault is unknown; the message lists the known ones.
+        """
+        known = self._faults_by_name()
+        if fault not in known:
+            raise LookupError(f"no fault is called {fault}; known are {', '.join(sorted(known))}")
+        known[fault](count)
+
+    async def __aenter__(self) -> Self:
+        await self._plug_in()
+        self._tasks = [asyncio.create_task(job, name="simulated daq") for job in self._jobs()]
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for task in self._tasks:
+            task.cancel()
+        if self._tasks:
+            await asyncio.wait(self._tasks)
+        await self._pull_out()
+
+    @abstractmethod
+    def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
+        """Faults that can be injected; each takes a count."""
+
+    @abstractmethod
+    def _jobs(self) -> list[Coroutine[Any, Any, None]]:
+        """Coroutines that run while the server is plugged in."""
+
+    @abstractmethod
+    async def _plug_in(self) -> None:
+        """Begin to serve the link."""
+
+    @abstractmethod
+    async def _pull_out(self) -> None:
+        """Close the link."""
+
+
+class PseudoTerminal:
+    """Serial line between this process and one reader. It has no bit rate and no parity.
+
+    Parameters
+    ----------
+    link
+        Symbolic link to the terminal while it is open. Without it the terminal has only the name
+        that the system gives it, which changes with each opening.
+    received
+        Called with the bytes that the reader sends.
+    """
+
+    def __init__(self, link: Path | None, received: Callable[[bytes], None]) -> None:
+        self._link = link
+        self._received = received
+        self._path = ""
+        self._ends: tuple[int, int] | None = None
+        self._writable = asyncio.Event()
+
+    @property
+    def name(self) -> str:
+        """Path that a reader opens."""
+        return str(self._link or self._path)
+
+    def open(self) -> None:
+        """Open a terminal and set the link, in place of an older link to a terminal.
+
+        Raises
+        ------
+        ConfigError
+            If the path of the link is taken by anything else, such as the port of a real device.
+        LinkError
+            If terminal or link cannot be made.
+        """
+        try:
+            self._ends = ours, theirs = os.openpty()
+        except OSError as exc:
+            raise LinkError(f"cannot make a pseudo-terminal: {exc.strerror}") from exc
+        self._path = os.ttyname(theirs)
+        tty.setraw(theirs)
+        os.set_blocking(ours, False)
+        asyncio.get_running_loop().add_reader(ours, self._read)
+        if self._link is not None:
+            try:
+                _set_link(self._link, self._path)
+            except (ConfigError, LinkError):
+                self.close()
+                raise
+
+    def close(self) -> None:
+        """Close the terminal and remove the link; a closed one stays closed."""
+        if self._ends is None:
+            return
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(self._ends[0])
+        loop.remove_writer(self._ends[0])
+        for end in self._ends:
+            os.close(end)
+        self._ends = None
+        self._writable.set()
+        if self._link is not None:
+            _remove_link(self._link)
+
+    def write(self, data: bytes) -> bytes:
+        """Write as much as the line takes at once; return the rest."""
+        if self._ends is not None:
+            with suppress(BlockingIOError):
+                return data[os.write(self._ends[0], data) :]
+        return data
+
+    async def writable(self) -> None:
+        """Wait until the line takes more, or is closed."""
+        if self._ends is None:
+            return
+        loop, ends = asyncio.get_running_loop(), self._ends
+        self._writable.clear()
+        loop.add_writer(ends[0], self._writable.set)
+        try:
+            await self._writable.wait()
+        finally:
+            if ends is self._ends:
+                loop.remove_writer(ends[0])
+
+    def _read(self) -> None:
+        if self._ends is not None:
+            with suppress(BlockingIOError):
+                self._received(os.read(self._ends[0], _READ_BYTES))
+
+
+def _set_link(link: Path, terminal: str) -> None:
+    try:
+        if os.path.lexists(link) and not _leads_to_terminal(link):
+            raise ConfigError(
+                f"{link}: something else is there; a simulated DAQ makes a link of its own, which"
+                ' needs a free name such as "/tmp/line7", or "pty" for none'
+            )
+        _remove_link(link)
+        link.symlink_to(terminal)
+    except OSError as exc:
+        raise LinkError(f"{link}: cannot be made: {exc.strerror}") from exc
+
+
+def _remove_link(link: Path) -> None:
+    if _leads_to_terminal(link):
+        link.unlink(missing_ok=True)
+
+
+def _leads_to_terminal(link: Path) -> bool:
+    return link.is_symlink() and str(link.readlink()).startswith(_TERMINALS)
