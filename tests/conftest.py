@@ -27,7 +27,7 @@ from scipy.signal import lfilter
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from core.arrays import FloatArray
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory
 from core.monitor.assessment import Assessment
 
 NS_PER_S = 1_000_000_000

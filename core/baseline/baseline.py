@@ -1,24 +1,15 @@
 """`BearingBaseline`: a learned baseline as a value, with who made it, when and why."""
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.cell_table import NODES, CellTable
-from core.baseline.stiffness_history import DIRECTIONS
+from core.baseline.history import DIRECTIONS, Watched
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid, FilmConditions
-
-
-class Watched(StrEnum):
-    """What has a baseline: stiffness, and the two 1× amplitudes that tell what changed it."""
-
-    STIFFNESS = "stiffness"
-    SHAFT = "shaft"
-    BEARING = "bearing"
 
 
 @dataclass(frozen=True)
@@ -66,10 +57,12 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Readings compared with their baseline; where `place` is -1 there is nothing to compare.
+    """Readings compared with their baseline; nothing is compared where `place` is -1.
 
     Parameters
     ----------
+    is_known : (n,)
+        Whether the condition of a reading has everything that the baseline depends on.
     place : (n,)
         Cell in the table.
     deviation : (n,)
@@ -81,6 +74,7 @@ class Deviations:
     surface_std : (n,)
     """
 
+    is_known: npt.NDArray[np.bool_]
     place: npt.NDArray[np.int64]
     deviation: FloatArray
     weight: FloatArray
@@ -156,10 +150,11 @@ class QuantityBaseline:
         value, u_random : (n,)
             ln of the quantity and its random standard uncertainty.
         """
+        is_known = self.is_known(conditions)
         place = self.table.find(self.grid.cells(conditions))
-        place = np.where(self.is_known(conditions) & np.isfinite(value), place, -1)
+        place = np.where(is_known & np.isfinite(value), place, -1)
         n = place.size
-        found = Deviations(place, np.full(n, np.nan), *np.zeros((4, n)))
+        found = Deviations(is_known, place, np.full(n, np.nan), *np.zeros((4, n)))
         rows = np.flatnonzero(place >= 0)
         if rows.size:
             cell = place[rows]
@@ -174,11 +169,8 @@ class QuantityBaseline:
         return found
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
-        """(n,) whether readings have everything that this depends on."""
-        known = self.grid.is_known(conditions)
-        if not self.surface.shape.has_attitude:
-            return known
-        return known & np.isfinite(conditions.attitude_deg)
+        """(n,) whether readings have everything that the baseline depends on."""
+        return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 
     def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
         """(n,) rise of ln of the quantity with ln of the eccentricity ratio; NaN if not known."""

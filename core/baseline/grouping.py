@@ -110,35 +110,11 @@ def absolute_quantile_std(deviation: FloatArray) -> float:
 
 
 MEDIAN_READINGS = 5
-"""Number of newest deviations whose median counts, so that single spikes do not."""
-
-
-def forgetting(time_scale_h: float, reading_h: float) -> float:
-    """Weight λ of the newest reading in the mean over a time scale."""
-    return -math.expm1(-reading_h / time_scale_h)
-
-
-@dataclass(frozen=True)
-class Newest:
-    """The newest deviations, oldest first, and their median."""
-
-    deviations: tuple[float, ...] = ()
-
-    def step(self, deviation: float) -> "Newest":
-        """Take in one more."""
-        return Newest((*self.deviations, deviation)[-MEDIAN_READINGS:])
-
-    @property
-    def median(self) -> float:
-        """Median of the newest; until there are enough, of all."""
-        return float(np.median(self.deviations))
-
-
-NOTHING_NEW = Newest()
+"""Number of newest deviations whose median is averaged, so that single spikes do not count."""
 
 
 def running_median(deviation: FloatArray) -> FloatArray:
-    """(n,) what `Newest.median` gives step by step."""
+    """(n,) median of the newest `MEDIAN_READINGS`; until there are enough, of all."""
     n = deviation.size
     if n < MEDIAN_READINGS:
         return np.array([np.median(deviation[: i + 1]) for i in range(n)], np.float64)
@@ -147,13 +123,18 @@ def running_median(deviation: FloatArray) -> FloatArray:
     return np.concatenate([start, np.median(windows, axis=1)])
 
 
-def forgetting_sum(x: FloatArray, forgotten: float) -> FloatArray:
-    """(n,) sums in which the newest of x has weight `forgotten`."""
-    from scipy.signal import lfilter  # slow to load, and not needed to begin
-
-    return np.asarray(lfilter([forgotten], [1.0, forgotten - 1.0], x))
+def ewma_weight(time_scale_h: float, reading_h: float) -> float:
+    """Weight α of the newest reading in an exponentially weighted mean over a time scale."""
+    return -math.expm1(-reading_h / time_scale_h)
 
 
-def forgetting_step(total: float, x: float, forgotten: float) -> float:
-    """Next value of `forgetting_sum`, in the order of its arithmetic."""
-    return total * (1.0 - forgotten) + forgotten * x
+def ewma(x: FloatArray, alpha: float) -> FloatArray:
+    """(n,) exponentially weighted sums; `ewma_step` for all of x, with the same arithmetic."""
+    from scipy.signal import lfilter  # slow to import, and not needed at start
+
+    return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))
+
+
+def ewma_step(total: float, x: float, alpha: float) -> float:
+    """Exponentially weighted sum after one more value."""
+    return total * (1.0 - alpha) + alpha * x

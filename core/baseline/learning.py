@@ -4,15 +4,14 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import DAY_NS, Groups, group_readings
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
 from core.baseline.surface_fit import LEAST_SCATTER, Fit, fit_surface, refit, surface_shape
 from core.baseline.tabulate import tabulate
-from core.baseline.watched import watched_values
 from core.condition.cells import FilmConditions
 
 FOLDS = 5

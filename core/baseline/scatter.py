@@ -11,8 +11,8 @@ from core.baseline.cell_table import CellTable
 from core.baseline.grouping import (
     STD_PER_MAD,
     absolute_quantile_std,
-    forgetting,
-    forgetting_sum,
+    ewma,
+    ewma_weight,
     group_medians,
     running_median,
 )
@@ -107,12 +107,10 @@ def time_scatter(
         if spans < LEAST_SPANS:
             break
         forgotten, first = (
-            forgetting(scale_h, settings.reading_h),
+            ewma_weight(scale_h, settings.reading_h),
             int(scale_h / settings.reading_h),
         )
-        total, mean, stray, stays = (
-            forgetting_sum(weight * column, forgotten)[first:] for column in columns
-        )
+        total, mean, stray, stays = (ewma(weight * column, forgotten)[first:] for column in columns)
         share = _share(mean / total, stray / total, stays / total)
         # two time constants are one independent mean; few of them know their own scatter badly
         share *= 1.0 + 2.0 / spans

@@ -80,8 +80,7 @@ class BaselineSettings:
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """(n,) whether readings have everything that a baseline depends on."""
-        known = self.grid.is_known(conditions)
-        return known & np.isfinite(conditions.attitude_deg) if self.uses_attitude else known
+        return conditions.is_known(self.has_attitude)
 
 
 POSITIVE = (

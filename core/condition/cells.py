@@ -41,6 +41,11 @@ class FilmConditions:
             self.attitude_deg[wanted],
         )
 
+    def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
+        """(n,) whether eccentricity, oil temperature and, if needed, attitude are numbers."""
+        known = np.isfinite(self.eccentricity_ratio) & np.isfinite(self.oil_temperature_c)
+        return known & np.isfinite(self.attitude_deg) if needs_attitude else known
+
 
 Cell: TypeAlias = tuple[int, ...]
 """Bin numbers of eccentricity ratio, oil temperature and, where it counts, attitude angle."""
@@ -101,9 +106,7 @@ class CellGrid:
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """(n,) whether a reading has everything that its cell depends on."""
-        known = np.isfinite(conditions.eccentricity_ratio)
-        known &= np.isfinite(conditions.oil_temperature_c)
-        return known & np.isfinite(conditions.attitude_deg) if self.has_attitude else known
+        return conditions.is_known(self.has_attitude)
 
     def centre(self, cell: Cell) -> tuple[float, ...]:
         """Eccentricity ratio, oil temperature and attitude angle in the middle of a cell."""

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.baseline.history_rows.names import Names
 from core.baseline.history_rows.problems import RowProblems
-from core.baseline.stiffness_history import DIRECTIONS, Evidence
 from core.condition.operating_state import OperatingState
 from core.quality import Reason
 
@@ -34,12 +34,12 @@ REQUIRED = ("time_ns", *NAMES, *STIFFNESS, "eccentricity_ratio", "oil_temperatur
 
 KNOWN = frozenset({*REQUIRED, *NUMBERS, *OPTIONAL_NAMES})
 
-SILENT = Evidence.INSUFFICIENT_EXCITATION.name.lower()
+SILENT = ReadingOutcome.INSUFFICIENT_EXCITATION.name.lower()
 QUALITIES = {
-    "good": Evidence.MEASURED,
-    "uncertain": Evidence.BAD_QUALITY,
-    "bad": Evidence.BAD_QUALITY,
-    SILENT: Evidence.INSUFFICIENT_EXCITATION,
+    "good": ReadingOutcome.MEASURED,
+    "uncertain": ReadingOutcome.BAD_QUALITY,
+    "bad": ReadingOutcome.BAD_QUALITY,
+    SILENT: ReadingOutcome.INSUFFICIENT_EXCITATION,
 }
 """What a reading's quality makes of it: what is uncertain is neither learned nor judged."""
 
@@ -96,12 +96,14 @@ class Rows:
         )
 
     def evidence(self) -> FloatArray:
-        """(n,) members of `Evidence`, as numbers that can be NaN."""
-        found = self.names["quality"].mapped(QUALITIES, Evidence.BAD_QUALITY).astype(np.float64)
+        """(n,) members of `ReadingOutcome`, as numbers that can be NaN."""
+        found = (
+            self.names["quality"].mapped(QUALITIES, ReadingOutcome.BAD_QUALITY).astype(np.float64)
+        )
         if "reason" in self.names:
             is_silent = self.names["quality"].is_one_of(["bad"])
             is_silent &= self.names["reason"].is_one_of([SILENT])
-            found[is_silent] = Evidence.INSUFFICIENT_EXCITATION
+            found[is_silent] = ReadingOutcome.INSUFFICIENT_EXCITATION
         return found
 
     def states(self) -> FloatArray:

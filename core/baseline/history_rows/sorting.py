@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
+from core.baseline.history import DIRECTIONS, CodeArray, ReadingOutcome, StiffnessHistory
 from core.baseline.history_rows.columns import (
     AMPLITUDES,
     PER_BEARING,
@@ -16,7 +17,6 @@ from core.baseline.history_rows.columns import (
     Rows,
 )
 from core.baseline.history_rows.problems import RowProblems
-from core.baseline.stiffness_history import DIRECTIONS, CodeArray, Evidence, StiffnessHistory
 
 _Ints = npt.NDArray[np.int64]
 
@@ -119,15 +119,15 @@ class _Merge:
         numbers = self._rows.numbers
         k_n_per_m, u_random = (self._both(numbers[key]) for key in STIFFNESS)
         shaft, bearing = (self._both(numbers[key]) for key in AMPLITUDES)
-        evidence = np.nan_to_num(self._both(self._rows.evidence()), nan=Evidence.BAD_QUALITY)
-        is_measured = evidence == Evidence.MEASURED
+        evidence = np.nan_to_num(self._both(self._rows.evidence()), nan=ReadingOutcome.BAD_QUALITY)
+        is_measured = evidence == ReadingOutcome.MEASURED
         history = StiffnessHistory(
             time_ns=self._time_ns,
             ln_k=np.log(np.where(is_measured, k_n_per_m, np.nan)),
             u_random=np.where(is_measured, u_random, np.nan),
             shaft_um_pk=shaft,
             bearing_um_pk=bearing,
-            evidence=evidence.astype(np.int8),
+            outcome=evidence.astype(np.int8),
             **{key: self._either(numbers[key]) for key in PER_BEARING},
         )
         has_state = "state" in self._rows.names

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from core.baseline.history import ReadingOutcome, StiffnessHistory
 from core.baseline.history_rows import histories_from_columns
-from core.baseline.stiffness_history import Evidence, StiffnessHistory
-from core.change.operation_history import operation_history, operation_of_states
+from core.change.backtest import operation_history, operation_of_states
 from core.condition.operating_state import OperatingLimits, OperatingState
 
 STEP_NS = 600_000_000_000
@@ -43,7 +43,7 @@ def test_every_row_finds_its_place_and_a_direction_without_a_row_has_no_number()
     rows = {key: column[:-1] for key, column in columns().items()}
     history = histories_from_columns(rows)["U2", "UJB"].history
     assert np.isnan(history.ln_k[1, -1])
-    assert history.evidence[:, -1].tolist() == [Evidence.MEASURED, Evidence.BAD_QUALITY]
+    assert history.outcome[:, -1].tolist() == [ReadingOutcome.MEASURED, ReadingOutcome.BAD_QUALITY]
 
 
 def test_a_reading_that_is_not_good_has_no_number_but_its_reason() -> None:
@@ -51,9 +51,9 @@ def test_a_reading_that_is_not_good_has_no_number_but_its_reason() -> None:
     rows["quality"][0:2] = ["bad", "insufficient_excitation"]
     rows["k_n_per_m"][1] = float("nan")
     history = histories_from_columns(rows)["U1", "LJB"].history
-    assert history.evidence[:, 0].tolist() == [
-        Evidence.BAD_QUALITY,
-        Evidence.INSUFFICIENT_EXCITATION,
+    assert history.outcome[:, 0].tolist() == [
+        ReadingOutcome.BAD_QUALITY,
+        ReadingOutcome.INSUFFICIENT_EXCITATION,
     ]
     assert np.isnan(history.ln_k[:, 0]).all()
 
@@ -128,8 +128,14 @@ def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why() -> Non
     ln_k = history().ln_k.copy()
     ln_k[1, 2] = np.nan
     columns = {**vars(whole), "ln_k": ln_k}
-    del columns["evidence"]
-    assert StiffnessHistory(**columns).evidence[1].tolist() == [0, 0, Evidence.BAD_QUALITY, 0, 0]
+    del columns["outcome"]
+    assert StiffnessHistory(**columns).outcome[1].tolist() == [
+        0,
+        0,
+        ReadingOutcome.BAD_QUALITY,
+        0,
+        0,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -137,8 +143,8 @@ def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why() -> Non
     [
         ("time_ns", 2, 1, "time_ns: row 2 is not after row 1"),
         ("oil_temperature_c", 3, np.inf, "oil_temperature_c: row 3 is infinite"),
-        ("ln_k", (0, 4), np.nan, "evidence: row 4 contradicts ln_k"),
-        ("evidence", (0, 4), Evidence.BAD_QUALITY, "evidence: row 4 contradicts ln_k"),
+        ("ln_k", (0, 4), np.nan, "outcome: row 4 contradicts ln_k"),
+        ("outcome", (0, 4), ReadingOutcome.BAD_QUALITY, "outcome: row 4 contradicts ln_k"),
         ("u_random", (1, 0), 0.0, "u_random: row 0 must be above 0"),
     ],
 )

@@ -135,7 +135,7 @@ def test_a_reason_says_why_a_reading_is_bad(written: Written) -> None:
     quality = ["bad", "bad", "uncertain", *["good"] * 17]
     reason = ["insufficient_excitation", "clipped", "few_segments", *["ok"] * 17]
     found = read_histories(written(quality=quality, reason=reason))[UJB].history
-    assert found.evidence[0, :4].tolist() == [1, 2, 2, 0]
+    assert found.outcome[0, :4].tolist() == [1, 2, 2, 0]
     with pytest.raises(ReadingsError, match="row 1: quality good for the reason 'clipped'"):
         read_histories(written(reason=["clipped"] * N_ROWS))
 

@@ -17,15 +17,15 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.grouping import bisquare, robust_std
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 
-Place: TypeAlias = tuple[str, str]
+FilmDirection: TypeAlias = tuple[str, str]
 """Bearing and direction."""
 
 MEAN_READINGS = 24
 """Readings that are averaged before a response is judged: four hours."""
 
-LEAST_MEANS = 50
+MIN_MEANS = 50
 """Averages that must be there to learn from."""
 
 PARTS = 6
@@ -33,7 +33,7 @@ PARTS = 6
 
 ROUNDS = 6
 RIDGE = 1e-6
-LEAST_STD = 1e-4
+MIN_STD = 1e-4
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class ShaftResponse:
         learned.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[FilmDirection, ...]
     centre: tuple[float, ...]
     coefficients: tuple[tuple[float, ...], ...]
     std: tuple[float, ...]
@@ -102,7 +102,7 @@ def learn_response(
     places = tuple((bearing, direction) for bearing in histories for direction in DIRECTIONS)
     ln_k, ln_shaft = place_columns(histories)
     usable = is_settled & np.all(np.isfinite(ln_k) & np.isfinite(ln_shaft), axis=0)
-    if np.sum(usable) < LEAST_MEANS * MEAN_READINGS:
+    if np.sum(usable) < MIN_MEANS * MEAN_READINGS:
         return None
     ln_k, ln_shaft = ln_k[:, usable], ln_shaft[:, usable]
     centre = np.median(ln_k, axis=1)
@@ -112,7 +112,7 @@ def learn_response(
         places,
         tuple(centre.tolist()),
         tuple(tuple(_fit(terms, share).tolist()) for share in shares),
-        tuple(max(_mean_std(row), LEAST_STD) for row in _held_out(terms, shares)),
+        tuple(max(_mean_std(row), MIN_STD) for row in _held_out(terms, shares)),
     )
 
 
@@ -151,7 +151,7 @@ def _fit(terms: FloatArray, share: FloatArray) -> FloatArray:
         normal = weighted @ terms.T + RIDGE * share.size * np.eye(terms.shape[0])
         coefficients = np.asarray(np.linalg.solve(normal, weighted @ share), np.float64)
         residual = share - coefficients @ terms
-        weight = bisquare(residual / max(robust_std(residual), LEAST_STD))
+        weight = bisquare(residual / max(robust_std(residual), MIN_STD))
     return coefficients
 
 
