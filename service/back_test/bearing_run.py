@@ -9,7 +9,6 @@ import numpy.typing as npt
 from core.baseline.agreement import far_readings
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
-from core.baseline.history_rows import BearingRows, Place
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import (
@@ -23,6 +22,7 @@ from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
 from core.condition.operating_state import OperatingLimits
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import Learning, MachineEvent, Period, periods_of
 from service.films.learning import drifted
 

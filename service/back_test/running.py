@@ -8,12 +8,12 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline
 from core.baseline.history import ReadingOutcome, StiffnessHistory
-from core.baseline.history_rows import BearingRows, Place
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import STEADY
 from service.back_test.bearing_run import BackTestRules, BearingRun, run_bearing
 from service.back_test.causes import UnitCauses
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import DAY_NS
 from service.back_test.report import AlarmReport, FilmReport, RateReport
 from service.back_test.unit_report import alarm_reports, film_reports

@@ -10,10 +10,10 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
 from core.baseline.history import DIRECTIONS, ReadingOutcome
-from core.baseline.history_rows import Place
-from core.baseline.history_rows.columns import AMPLITUDES, PER_BEARING, SILENT
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
+from service.back_test.file_columns import AMPLITUDES, PER_BEARING, SILENT
+from service.back_test.histories import Place
 from service.back_test.periods import DAY_NS
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 

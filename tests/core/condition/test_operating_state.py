@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.change.backtest import operation_history
+from core.change.backtest import operation_history, operation_of_states
 from core.condition.cells import CellGrid, FilmConditions
 from core.condition.operating_state import (
     NOT_AT_SPEED,
@@ -116,6 +116,19 @@ def test_a_history_has_the_states_that_its_readings_have_one_by_one(seed: int) -
     assert found.state.tolist() == states
     assert found.is_settled.tolist() == settled
     assert len(set(states)) >= len(OperatingState) - 1
+
+
+def test_states_that_are_told_settle_as_those_that_are_followed() -> None:
+    n = 300
+    power_mw = np.where(np.arange(n) % 120 < 90, 200.0, 320.0)
+    speed_rpm = np.where(np.arange(n) > 200, np.where(np.arange(n) > 210, 92.3, 0.0), 92.3)
+    time_ns = 10 * MINUTE_NS * np.arange(n)
+    limits = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
+    followed = operation_history(time_ns, speed_rpm, power_mw, limits)
+    told = operation_of_states(time_ns, followed.state, limits)
+    assert told.is_settled.tolist() == followed.is_settled.tolist()
+    assert 0 < np.sum(told.is_settled) < n
+    assert set(followed.state.tolist()) > {OperatingState.PART_LOAD, OperatingState.STANDSTILL}
 
 
 def one(grid: CellGrid, e: float, t: float, attitude_deg: float = 0.0) -> tuple[int, ...]:

@@ -11,7 +11,6 @@ import pytest
 from acquisition.simulated.life.truth import UnitLife
 from core.baseline.baseline import Origin
 from core.baseline.history import DIRECTIONS, Watched, watched_values
-from core.baseline.history_rows import BearingRows, Place
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import decide_all, operation_history
@@ -24,6 +23,7 @@ from service.api.times import rfc3339
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import DAY_NS, Learning, MachineEvent
 from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
