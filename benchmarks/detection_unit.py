@@ -21,7 +21,7 @@ from core.change.backtest import DecisionHistory, decide_all, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
 from core.change.decision import JUDGED, WatchedReadings
 from core.change.settings import ChangeLimits
-from core.change.shaft_response import MEAN_READINGS, FilmDirection, learn_response, place_columns
+from core.change.shaft_response import MEAN_READINGS, FilmDirection, film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 
 DAY_NS = 86_400 * 10**9
@@ -105,7 +105,7 @@ class LearnedUnit:
         places = [(later.histories[b], self.stiffness(b, d)) for b, d in self.places()]
         rises = [film.eccentricity_rise(history.conditions) for history, film in places]
         return UnitReadings(
-            *place_columns(later.histories),
+            *film_columns(later.histories),
             np.stack([self._deviation(later, *place) for place in self.places()]),
             np.stack(rises),
             np.stack([history.attitude_deg for history, _ in places]),

@@ -42,12 +42,12 @@ def mean_difference(
 
 
 SPELL_DAYS = 8
-"""Longer than what makes healthy days alike."""
+"""Longer than healthy days are correlated."""
 
 MIN_SPELLS = 3
 
 OUTLIER_STDS = 4.0
-"""Standard deviations beyond which a day counts no further."""
+"""Standard deviations at which days are clipped."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Drift:
 def learning_drift(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
 ) -> Drift | None:
-    """How much the readings that a baseline was learned from have drifted.
+    """Drift of the readings that a baseline was learned from.
 
     Returns
     -------
-    None if too few conditions were met again in other spells.
+    None if too few conditions recur in other spells.
     """
     conditions = history.conditions
     value, _ = watched_values(history, baseline.quantity, baseline.direction)

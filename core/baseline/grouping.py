@@ -1,4 +1,4 @@
-"""Readings of one day and condition as one point; robust scales, medians, means that forget."""
+"""Grouping of readings by day and condition; robust scales, medians and weighted means."""
 
 import math
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ class Groups:
     value : (n,)
         Median of the readings.
     n_readings, day : (n,)
-        How many there are, and days since 1970.
+        Number of readings, and days since 1970.
     """
 
     conditions: FilmConditions
@@ -43,10 +43,10 @@ class Groups:
 def group_readings(
     time_ns: TimeArray, conditions: FilmConditions, value: FloatArray, grid: CellGrid
 ) -> Groups:
-    """Draw together what lies in one quarter of a cell on one day.
+    """Group the readings of one day in one quarter of a cell.
 
-    A day is the unit that repeats: readings within it see the same water, weather and warm-up. A
-    quarter, because ln k changes by a tenth and more across a cell.
+    Readings within a day share water, weather and warm-up. Quarters are used because ln k changes
+    by a tenth and more across a cell.
     """
     halves = replace(
         grid,
@@ -67,7 +67,7 @@ def group_readings(
 
 
 def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    """Median of x in every group; groups are numbered from zero without holes."""
+    """Median of x in every group; groups are numbered from zero without gaps."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)
     start = np.cumsum(count) - count
@@ -82,8 +82,8 @@ STD_PER_MAD = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
 BISQUARE_LIMIT = 4.685
-"""Standard deviations beyond which Tukey's bisquare counts a value as nothing; 95 % efficient where
-all are normal (Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
+"""Standard deviations beyond which Tukey's bisquare is zero; 95 % efficient for normal values
+(Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
 
 
 def robust_std(deviation: FloatArray) -> float:
@@ -100,9 +100,7 @@ def bisquare(standardised: FloatArray) -> FloatArray:
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Standard deviation about zero of values that need not be normal: the larger of what the
-    middle half and the middle three quarters say.
-    """  # noqa: D205
+    """Standard deviation about zero: the larger estimate of middle half and three quarters."""
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))

@@ -89,7 +89,7 @@ class StiffnessHistory:
 
     @property
     def conditions(self) -> FilmConditions:
-        """What all readings are compared under."""
+        """Conditions of all readings."""
         return FilmConditions(self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
@@ -139,8 +139,8 @@ def watched_values(
     Returns
     -------
     (n,), (n,)
-        NaN where there is no number. The uncertainty of amplitudes is not known and given as zero:
-        it is part of the scatter that is learned.
+        NaN where there is no number. The uncertainty of amplitudes is unknown and given as zero: it
+        is part of the learned scatter.
     """
     row = DIRECTIONS.index(direction)
     if quantity is Watched.STIFFNESS:

@@ -1,9 +1,10 @@
 """Operation and decisions over stored readings: the steps of a running unit, folded."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import repeat
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -56,8 +57,8 @@ def operation_history(
     oil_temperature_c : (n,), optional
         Of the bearing; without it a film warms up for the longest time.
     """
-    steps = _followed(time_ns, speed_rpm, power_mw, limits)
-    return _history(_with_oil(steps, oil_temperature_c, limits), limits)
+    rows = zip(time_ns.tolist(), speed_rpm.tolist(), power_mw.tolist(), strict=True)
+    return _history(_folded(step_operation, rows, oil_temperature_c, limits), limits)
 
 
 def operation_of_states(
@@ -75,11 +76,8 @@ def operation_of_states(
     oil_temperature_c : (n,), optional
         Of the bearing; without it a film warms up for the longest time.
     """
-    operation, steps = UNKNOWN_OPERATION, []
-    for now_ns, code in zip(time_ns.tolist(), state.tolist(), strict=True):
-        operation = step_given_state(operation, now_ns, OperatingState(code), limits)
-        steps.append(operation)
-    return _history(_with_oil(iter(steps), oil_temperature_c, limits), limits)
+    rows = zip(time_ns.tolist(), map(OperatingState, state.tolist()), strict=True)
+    return _history(_folded(step_given_state, rows, oil_temperature_c, limits), limits)
 
 
 def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
@@ -88,26 +86,24 @@ def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operati
     if len(history):
         # readings keep their distances, though time may be made to pass faster from now on
         time_ns = time_ns + (rules.lapsed_ns(int(time_ns[-1])) - int(time_ns[-1]))
-    steps = _followed(time_ns, history.speed_rpm, history.power_mw, rules.operating)
-    found = deque(_with_oil(steps, history.oil_temperature_c, rules.operating), maxlen=1)
+    columns = (time_ns, history.speed_rpm, history.power_mw)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    steps = _folded(step_operation, rows, history.oil_temperature_c, rules.operating)
+    found = deque(steps, maxlen=1)
     return found[0] if found else (UNKNOWN_OPERATION, NOT_AT_SPEED)
 
 
-def _followed(
-    time_ns: TimeArray, speed_rpm: FloatArray, power_mw: FloatArray, limits: OperatingLimits
-) -> Iterator[Operation]:
-    operation = UNKNOWN_OPERATION
-    for row in zip(time_ns.tolist(), speed_rpm.tolist(), power_mw.tolist(), strict=True):
-        operation = step_operation(operation, *row, limits)
-        yield operation
-
-
-def _with_oil(
-    operations: Iterator[Operation], oil_temperature_c: FloatArray | None, limits: OperatingLimits
+def _folded(
+    step: Callable[..., Operation],
+    rows: Iterable[tuple[Any, ...]],
+    oil_temperature_c: FloatArray | None,
+    limits: OperatingLimits,
 ) -> Iterator[tuple[Operation, OilSettling]]:
+    """Operation and oil after each row; `step` takes the operation, the row and the limits."""
     temperatures = repeat(np.nan) if oil_temperature_c is None else oil_temperature_c.tolist()
-    oil = NOT_AT_SPEED
-    for operation, oil_c in zip(operations, temperatures, strict=False):
+    operation, oil = UNKNOWN_OPERATION, NOT_AT_SPEED
+    for row, oil_c in zip(rows, temperatures, strict=False):
+        operation = step(operation, *row, limits)
         oil = oil.step(operation, oil_c, limits)
         yield operation, oil
 

@@ -95,7 +95,10 @@ def good_or_nan(reading: Reading) -> float:
 
 def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str) -> FilmValue:
     stiffness = readings[STIFFNESS_OF[estimator].format(axes=direction * 2)]
-    outcome, reason = _outcome(stiffness, _condition_quality(readings))
+    outcome, reason = _outcome(
+        stiffness,
+        worst(readings[key].quality for key in ("eccentricity_ratio", "oil_temperature_c")),
+    )
     is_measured = outcome is ReadingOutcome.MEASURED
     k_n_per_m = good_or_nan(stiffness)
     return FilmValue(
@@ -106,10 +109,6 @@ def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str
         outcome=outcome,
         reason=reason,
     )
-
-
-def _condition_quality(readings: Mapping[str, Reading]) -> Quality:
-    return worst(readings[name].quality for name in ("eccentricity_ratio", "oil_temperature_c"))
 
 
 def _outcome(stiffness: Reading, condition: Quality) -> tuple[ReadingOutcome, Reason]:

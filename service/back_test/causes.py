@@ -9,7 +9,7 @@ import numpy.typing as npt
 from core.arrays import FloatArray, TimeArray
 from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
-from core.change.shaft_response import MEAN_READINGS, ShaftResponse, learn_response, place_columns
+from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 from service.back_test.bearing_run import BackTestRules, BearingRun
 from service.back_test.periods import Period, periods_of
 
@@ -85,7 +85,7 @@ class UnitCauses:
             ]
             deviation, rise = (np.stack(columns) for columns in zip(*compared, strict=True))
             attitude = [h.attitude_deg for h in self._histories.values() for _ in DIRECTIONS]
-            columns = (*place_columns(self._histories), deviation, rise, np.stack(attitude))
+            columns = (*film_columns(self._histories), deviation, rise, np.stack(attitude))
             self._columns = UnitReadings(*columns)
         return self._columns
 

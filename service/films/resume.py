@@ -116,7 +116,7 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
 
 
 def _recent(found: Mapping[str, FilmHistory], bearings: Mapping[str, InForce]) -> list[FloatArray]:
-    """Newest settled readings at the same times, (5, n_places) each."""
+    """Newest settled readings at the same times, (5, n_films) each."""
     common = common_times([history.history.time_ns for history in found.values()])
     columns, settled = [], np.ones(common.size, np.bool_)
     for bearing, film in found.items():

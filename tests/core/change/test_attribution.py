@@ -7,7 +7,7 @@ import pytest
 
 from core.baseline.history import StiffnessHistory
 from core.change.cause import PROBE_REASON, Attribution, Cause, UnitReadings, attribute
-from core.change.shaft_response import MEAN_READINGS, ShaftResponse, learn_response, place_columns
+from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 
 BEARINGS = ("UJB", "LJB", "TJB")
 PLACES = tuple((bearing, direction) for bearing in BEARINGS for direction in "xy")
@@ -84,7 +84,7 @@ def put_down(
     rise
         Of the baseline with ln of the eccentricity, which a probe that reads more seems to raise.
     """
-    healthy, changed = place_columns(machine(seed)), place_columns(machine(seed, **changes))
+    healthy, changed = film_columns(machine(seed)), film_columns(machine(seed, **changes))
     further = np.zeros(6)
     for probe, gain in changes.get("probe", {}).items():
         further[probe - probe % 2 : probe - probe % 2 + 2] += 0.5 * np.log(gain)  # at 45 degrees

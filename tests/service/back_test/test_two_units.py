@@ -17,7 +17,7 @@ from core.change.backtest import decide_all, operation_history
 from core.change.cause import UnitReadings, attribute
 from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
-from core.change.shaft_response import learn_response, place_columns
+from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 from service.api.times import rfc3339
 from service.back_test.bearing_run import BackTestRules
@@ -153,7 +153,7 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
     begins = [rfc3339(int(t)) == alarm.begin for t in life.operation.time_ns]
     known = np.isfinite(deviation[places.index(("LJB", "x"))])
     newest = np.flatnonzero(known[: int(np.flatnonzero(begins)[0]) + 1])[-24:]
-    columns = (*place_columns(histories), deviation, np.stack(rise), np.stack(attitude))
+    columns = (*film_columns(histories), deviation, np.stack(rise), np.stack(attitude))
     brackets = np.repeat([BRACKETS["U2", bearing] for bearing in histories], 2)
     readings = UnitReadings(*columns).columns(newest)
     expected = attribute(("LJB", "x"), response, readings, brackets)
