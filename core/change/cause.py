@@ -13,9 +13,6 @@ shaft moves for any stiffness of its films (`core.change.shaft_response`):
 A cause is named only if the motion agrees with it and with no other.
 """
 
-import math
-from collections import deque
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
@@ -24,8 +21,6 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.history import DIRECTIONS
-from core.change.film_reading import FilmReading
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 
 
@@ -287,76 +282,3 @@ def _cause(seen: _Residuals, bracket_n_per_m: FloatArray | None) -> tuple[Cause,
     if agreeing and not is_film:
         return Cause.BRACKET_OR_TRANSDUCER, min(agreeing, key=misfits.__getitem__)
     return Cause.UNKNOWN, AMBIGUOUS_REASON if is_film else NO_FIT_REASON
-
-
-KEPT = 4 * MEAN_READINGS
-"""Readings that are kept: some have no number for a film."""
-
-
-class RecentReadings:
-    """The newest settled readings of all films of a unit at the same times.
-
-    Parameters
-    ----------
-    brackets_n_per_m
-        Stiffness of the bracket of each watched bearing.
-    """
-
-    def __init__(self, brackets_n_per_m: Mapping[str, float]) -> None:
-        self._films = tuple(
-            (bearing, direction) for bearing in brackets_n_per_m for direction in DIRECTIONS
-        )
-        self._brackets = np.repeat(list(brackets_n_per_m.values()), 2)
-        self._columns: deque[FloatArray] = deque(maxlen=KEPT)
-
-    def add(
-        self,
-        readings: Sequence[FilmReading],
-        deviations: Mapping[FilmDirection, float | None],
-        rises: Mapping[FilmDirection, float],
-    ) -> None:
-        """Add the readings of one moment if they are of every bearing and settled.
-
-        Parameters
-        ----------
-        deviations, rises
-            By film, as in `UnitReadings`, where they are known.
-        """
-        values = {
-            (reading.bearing, direction): (value, reading.attitude_deg)
-            for reading in readings
-            for direction, value in zip(DIRECTIONS, reading.values, strict=True)
-            if reading.condition.is_settled
-        }
-        if set(values) != set(self._films):
-            return
-        rows = [
-            (
-                *(value.ln_k, ln_or_nan(value.shaft_um_pk), _or_nan(deviations.get(film))),
-                *(rises.get(film, np.nan), attitude_deg),
-            )
-            for film in self._films
-            for value, attitude_deg in [values[film]]
-        ]
-        self.append(np.array(rows).T)
-
-    def append(self, column: FloatArray) -> None:
-        """Add one moment: (5, n_films), the fields of `UnitReadings`."""
-        self._columns.append(column)
-
-    def attribution(self, film: FilmDirection, response: ShaftResponse | None) -> Attribution:
-        """Cause of a change of a film, from the newest readings."""
-        row = self._films.index(film)
-        newest = [column for column in self._columns if np.isfinite(column[2, row])]
-        columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]
-        readings = UnitReadings(*np.stack(columns, axis=-1))
-        return attribute(film, response, readings, self._brackets)
-
-
-def ln_or_nan(amplitude: float) -> float:
-    """Logarithm of an amplitude; NaN unless it is above zero."""
-    return math.log(amplitude) if amplitude > 0.0 else math.nan
-
-
-def _or_nan(value: float | None) -> float:
-    return np.nan if value is None else value

@@ -1,17 +1,20 @@
 """`FilmJudge`: compares the readings of a unit's films with their baselines."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.baseline.baseline import BearingBaseline
+from core.arrays import FloatArray
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS, Watched
-from core.change.cause import Attribution, Cause, RecentReadings
+from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, WatchedReadings, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules
-from core.change.shaft_response import FilmDirection, ShaftResponse
+from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 from core.condition.cells import FilmConditions
 from core.condition.operating_state import OilSettling, Operation
 from core.limits import AlarmLevel, Condition, unknown
@@ -119,6 +122,10 @@ class FilmNews:
     decisions: tuple[Decision, Decision]
 
 
+MAX_RECENT = 4 * MEAN_READINGS
+"""Moments whose readings are kept to find causes: some lack the deviation of a film."""
+
+
 class FilmJudge:
     """Active baselines and decisions so far of one unit.
 
@@ -133,7 +140,9 @@ class FilmJudge:
         self._baselines: dict[str, BearingBaseline] = {}
         self._decisions: dict[FilmDirection, Decision] = {}
         self._response: ShaftResponse | None = None
-        self._recent = RecentReadings({id_: brackets_n_per_m[id_] for id_ in rules.estimators})
+        self._films = [(bearing, d) for bearing in rules.estimators for d in DIRECTIONS]
+        self._brackets = np.array([brackets_n_per_m[bearing] for bearing, _ in self._films])
+        self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
 
     def baseline(self, bearing: str) -> BearingBaseline | None:
         """Active baseline of a bearing."""
@@ -187,10 +196,12 @@ class FilmJudge:
         for film, decision in self._decisions.items():
             self._decisions[film] = replace(decision, last_ns=None, last_counted_ns=None)
 
-    @property
-    def recent(self) -> RecentReadings:
-        """Newest readings of all films, which causes are found with."""
-        return self._recent
+    def add_recent(self, columns: Iterable[FloatArray]) -> None:
+        """Add settled readings of earlier moments, (5, n_films) each, the fields of `UnitReadings`.
+
+        Causes are found with the newest of them.
+        """
+        self._recent.extend(columns)
 
     def judge(self, readings: Sequence[FilmReading]) -> list[FilmNews]:
         """Judge the readings of all bearings at one moment, and update the decisions."""
@@ -199,29 +210,50 @@ class FilmJudge:
             for reading in readings
             for direction in DIRECTIONS
         }
-        deviations = {film: finding.deviation for film, finding in found.items()}
-        self._recent.add(readings, deviations, dict(self._rises(readings)))
+        self._remember(readings, found)
         return [self._news(reading, found) for reading in readings]
 
-    def _rises(self, readings: Sequence[FilmReading]) -> Iterator[tuple[FilmDirection, float]]:
-        """Rise of each film's baseline with eccentricity."""
-        for reading in readings:
-            baseline = self._baselines.get(reading.bearing)
-            for learned in baseline.quantities if baseline else ():
-                if learned.quantity is Watched.STIFFNESS:
-                    rise = float(learned.eccentricity_rise(_conditions(reading))[0])
-                    yield (reading.bearing, learned.direction), rise
+    def _remember(
+        self, readings: Sequence[FilmReading], found: Mapping[FilmDirection, FilmFinding]
+    ) -> None:
+        """Keep the readings of one moment if they are of every bearing and settled."""
+        rows: dict[FilmDirection, tuple[float, ...]] = {}
+        for reading in readings if all(r.condition.is_settled for r in readings) else ():
+            for direction, value in zip(DIRECTIONS, reading.values, strict=True):
+                film = (reading.bearing, direction)
+                learned, deviation = self._learned(*film), found[film].deviation
+                rows[film] = (
+                    value.ln_k,
+                    math.log(value.shaft_um_pk) if value.shaft_um_pk > 0.0 else np.nan,
+                    np.nan if deviation is None else deviation,
+                    learned.eccentricity_rise(_conditions(reading))[0] if learned else np.nan,
+                    reading.attitude_deg,
+                )
+        if set(rows) == set(self._films):
+            self._recent.append(np.array([rows[film] for film in self._films]).T)
 
     def _news(self, reading: FilmReading, found: Mapping[FilmDirection, FilmFinding]) -> FilmNews:
         films = [(reading.bearing, direction) for direction in DIRECTIONS]
-        x, y = (self._attributed(film, found[film]) for film in films)
+        x, y = (
+            replace(found[film], attribution=self._attribution(film))
+            if found[film].level is not None
+            else found[film]
+            for film in films
+        )
         decision_x, decision_y = (self._decisions[film] for film in films)
         return FilmNews(reading, (x, y), (decision_x, decision_y))
 
-    def _attributed(self, film: FilmDirection, finding: FilmFinding) -> FilmFinding:
-        if finding.level is None:
-            return finding
-        return replace(finding, attribution=self._recent.attribution(film, self._response))
+    def _attribution(self, film: FilmDirection) -> Attribution:
+        """Cause of a change of a film, from the newest readings that have its deviation."""
+        row = self._films.index(film)
+        newest = [column for column in self._recent if np.isfinite(column[2, row])]
+        columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]
+        readings = UnitReadings(*np.stack(columns, axis=-1))
+        return attribute(film, self._response, readings, self._brackets)
+
+    def _learned(self, bearing: str, direction: str) -> QuantityBaseline | None:
+        baseline = self._baselines.get(bearing)
+        return baseline.of(Watched.STIFFNESS, direction) if baseline else None
 
     def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
         film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
@@ -233,14 +265,13 @@ class FilmJudge:
             np.array([value.u_random]),
             np.array([value.outcome]),
         )
-        baseline = self._baselines.get(reading.bearing)
-        learned = baseline.of(Watched.STIFFNESS, direction) if baseline else None
+        learned = self._learned(*film)
         decision = self._decisions.get(film, INITIAL_DECISION)
         for time_ns, outcome in watched.compared(learned):
             decision = step(decision, time_ns, outcome, learned, self._rules.change)
         self._decisions[film] = decision
         is_compared = decision.last_counted_ns == decision.last_ns
-        return film_finding(decision, is_compared, baseline.origin.version if baseline else None)
+        return film_finding(decision, is_compared, self._version(reading.bearing))
 
 
 def _conditions(reading: FilmReading) -> FilmConditions:

@@ -225,6 +225,5 @@ def _restore(watch: FilmWatch, found: UnitStart) -> None:
     watch.restore_operation(found.operation, found.oil)
     for bearing, its in found.bearings.items():
         watch.judge.activate_baseline(bearing, its.baseline, its.decisions)
-    for column in found.recent:
-        watch.judge.recent.append(column)
+    watch.judge.add_recent(found.recent)
     watch.judge.set_response(found.response)

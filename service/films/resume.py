@@ -9,8 +9,8 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
 from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
 from core.change.backtest import last_decision, last_operation
-from core.change.cause import KEPT
 from core.change.decision import INITIAL_DECISION, Decision
+from core.change.film_judge import MAX_RECENT
 from core.change.settings import FilmRules
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import OilSettling, Operation
@@ -77,7 +77,7 @@ class UnitStart:
     oil, bearings
         By bearing.
     recent
-        Newest readings, as :meth:`RecentReadings.append` takes them.
+        Newest readings, as `FilmJudge.add_recent` takes them.
     """
 
     operation: Operation
@@ -128,7 +128,7 @@ def _recent(found: Mapping[str, FilmHistory], bearings: Mapping[str, InForce]) -
         rows_of = (history.ln_k, np.log(shaft), film.deviation[:, rows])
         columns.append(np.stack([*rows_of, _rises(history, baseline), attitude]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
-    return [whole[:, :, i] for i in range(max(0, whole.shape[2] - KEPT), whole.shape[2])]
+    return [whole[:, :, i] for i in range(max(0, whole.shape[2] - MAX_RECENT), whole.shape[2])]
 
 
 def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:
