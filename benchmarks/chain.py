@@ -23,11 +23,11 @@ from benchmarks.chain_story import ROWS_PER_H, Story, Watch, from_readings, sile
 from benchmarks.chain_unit import readings
 from benchmarks.detection_unit import LearnedUnit
 from core.arrays import FloatArray
-from core.baseline.response import Place
-from core.baseline.stiffness_history import DIRECTIONS
+from core.baseline.history import DIRECTIONS
+from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmNews
 from core.change.film_reading import FilmReading
-from core.change.verdict import JUDGED, Verdict
+from core.change.shaft_response import FilmDirection
 
 STORY = Story(seed=2002, day=141.0)
 SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -58,23 +58,23 @@ class Depths:
 class Verdicts:
     """What is said at one depth, (n,) by place."""
 
-    said: dict[Place, list[Verdict]]
-    cause: dict[Place, str]
+    said: dict[FilmDirection, list[Verdict]]
+    cause: dict[FilmDirection, str]
 
-    def first_alarm(self, place: Place) -> int | None:
+    def first_alarm(self, place: FilmDirection) -> int | None:
         """Number of the reading with which an alarm begins."""
         alarmed = [n for n, verdict in enumerate(self.said[place]) if verdict in LEVELS]
         return alarmed[0] if alarmed else None
 
-    def highest(self, place: Place) -> str:
+    def highest(self, place: FilmDirection) -> str:
         reached = [v for v in self.said[place] if v in LEVELS]
         return max(reached).name.lower() if reached else "none"
 
 
 def judged(watch: Watch, moments: Sequence[Sequence[FilmReading]]) -> Verdicts:
     """Lead the decision on through all readings."""
-    said: dict[Place, list[Verdict]] = {}
-    cause: dict[Place, str] = {}
+    said: dict[FilmDirection, list[Verdict]] = {}
+    cause: dict[FilmDirection, str] = {}
     for moment in moments:
         for place, finding in _findings(watch.judge(moment)):
             said.setdefault(place, []).append(finding[0])
@@ -83,7 +83,7 @@ def judged(watch: Watch, moments: Sequence[Sequence[FilmReading]]) -> Verdicts:
     return Verdicts(said, cause)
 
 
-def _findings(news: Sequence[FilmNews]) -> Iterator[tuple[Place, tuple[Verdict, str]]]:
+def _findings(news: Sequence[FilmNews]) -> Iterator[tuple[FilmDirection, tuple[Verdict, str]]]:
     for one in news:
         for direction, finding in zip(DIRECTIONS, one.findings, strict=True):
             cause = finding.attribution.cause.value if finding.attribution else ""
@@ -128,7 +128,7 @@ def without_scatter(life: UnitLife, rows: list[int]) -> FloatArray:
     return np.array(found)
 
 
-def compare(depths: Depths, places: list[Place]) -> bool:
+def compare(depths: Depths, places: list[FilmDirection]) -> bool:
     """Print how far the depths differ, reading by reading; False if one is biased."""
     given, sampled = columns(depths, "ln_k")
     u_given, u_sampled = columns(depths, "u_random")
@@ -179,7 +179,7 @@ def agree(story: Story, given: Verdicts, sampled: Verdicts) -> bool:
     return is_same
 
 
-def _is_same(story: Story, place: Place, given: int | None, sampled: int | None) -> bool:
+def _is_same(story: Story, place: FilmDirection, given: int | None, sampled: int | None) -> bool:
     if given is None or sampled is None:
         return given is sampled
     is_early = min(given, sampled) < story.damage_h * ROWS_PER_H
@@ -187,7 +187,7 @@ def _is_same(story: Story, place: Place, given: int | None, sampled: int | None)
     return is_there and not is_early and abs(given - sampled) <= MOST_DELAY_H * ROWS_PER_H
 
 
-def _words(story: Story, depth: Verdicts, place: Place) -> str:
+def _words(story: Story, depth: Verdicts, place: FilmDirection) -> str:
     first = depth.first_alarm(place)
     if first is None:
         share = np.mean([verdict in JUDGED for verdict in depth.said[place]])

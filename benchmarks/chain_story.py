@@ -21,17 +21,16 @@ from benchmarks.detection_unit import (
     YEARS,
     LearnedUnit,
 )
-from core.baseline.stiffness_history import Evidence
+from core.baseline.history import ReadingOutcome
 from core.change.film_judge import FilmJudge, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import (
-    NEVER_SEEN,
+    UNKNOWN_OPERATION,
     OperatingLimits,
-    OperatingReading,
     Operation,
-    advance,
+    step_operation,
 )
 from core.machine.unit import Estimator
 from core.quality import Reason
@@ -43,9 +42,9 @@ WARM_UP_H = 12
 """Of operation before the stretch, from which it is known whether the unit has settled."""
 
 REASONS = {
-    Evidence.MEASURED: Reason.OK,
-    Evidence.INSUFFICIENT_EXCITATION: Reason.INSUFFICIENT_EXCITATION,
-    Evidence.BAD_QUALITY: Reason.SENSOR_FAILURE,
+    ReadingOutcome.MEASURED: Reason.OK,
+    ReadingOutcome.INSUFFICIENT_EXCITATION: Reason.INSUFFICIENT_EXCITATION,
+    ReadingOutcome.BAD_QUALITY: Reason.SENSOR_FAILURE,
 }
 
 
@@ -115,14 +114,14 @@ def _from_readings(life: UnitLife, bearing: str, row: int) -> FilmReading:
             float(history.u_random[axis, row]),
             float(history.shaft_um_pk[axis, row]),
             float(history.bearing_um_pk[axis, row]),
-            evidence := Evidence(int(history.evidence[axis, row])),
-            REASONS[evidence],
+            outcome := ReadingOutcome(int(history.outcome[axis, row])),
+            REASONS[outcome],
         )
         for axis in range(2)
     )
     return FilmReading(
         *(UNIT.id, bearing, Estimator.DYNAMIC, int(history.time_ns[row])),
-        BearingCondition(NEVER_SEEN.state, False, None),
+        BearingCondition(UNKNOWN_OPERATION.state, False, None),
         float(history.speed_rpm[row]),
         float(history.power_mw[row]),
         float(history.eccentricity_ratio[row]),
@@ -142,12 +141,12 @@ def silenced(measured: Sequence[FilmReading], life: UnitLife, row: int) -> list[
 
 
 def _silenced(reading: FilmReading, life: UnitLife, row: int) -> Iterator[FilmValue]:
-    evidence = life.readings[reading.bearing].evidence[:, row]
-    for value, said in zip(reading.values, evidence.tolist(), strict=True):
-        if said == Evidence.MEASURED:
+    outcome = life.readings[reading.bearing].outcome[:, row]
+    for value, said in zip(reading.values, outcome.tolist(), strict=True):
+        if said == ReadingOutcome.MEASURED:
             yield value
         else:
-            nan, why = float("nan"), Evidence(said)
+            nan, why = float("nan"), ReadingOutcome(said)
             yield FilmValue(nan, nan, value.shaft_um_pk, value.bearing_um_pk, why, REASONS[why])
 
 
@@ -172,9 +171,9 @@ class Watch:
         )
         self._judge = FilmJudge(rules, BRACKETS_N_PER_M)
         for bearing, baseline in learned.baselines.items():
-            self._judge.put_in_force(bearing, baseline)
-        self._judge.answer_by(learned.response)
-        self._operation = NEVER_SEEN
+            self._judge.activate_baseline(bearing, baseline)
+        self._judge.set_response(learned.response)
+        self._operation = UNKNOWN_OPERATION
         for row in range(max(first - WARM_UP_H * ROWS_PER_H, 0), first):
             self._operate(
                 int(operation.time_ns[row]),
@@ -194,5 +193,6 @@ class Watch:
         return self._operation
 
     def _operate(self, time_ns: int, speed_rpm: float, power_mw: float) -> None:
-        reading = OperatingReading(time_ns, speed_rpm, power_mw)
-        self._operation = advance(self._operation, reading, self._limits)
+        self._operation = step_operation(
+            self._operation, time_ns, speed_rpm, power_mw, self._limits
+        )

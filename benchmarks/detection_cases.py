@@ -7,9 +7,9 @@ import numpy as np
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.shaft import cooling_failure, four_fold
 from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit
-from core.baseline.stiffness_history import DIRECTIONS
-from core.change.attribution import Cause
-from core.change.verdict import Verdict
+from core.baseline.history import DIRECTIONS
+from core.change.cause import Cause
+from core.change.decision import Verdict
 
 ROWS_PER_H = 6
 MARGIN_DAYS = 100

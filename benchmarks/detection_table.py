@@ -8,7 +8,7 @@ import numpy as np
 
 from acquisition.simulated.life.damage import DamageKind
 from benchmarks.detection_cases import DAMAGE_CASES, Changed, DamageCase, Found, Outside
-from core.change.attribution import Cause
+from core.change.cause import Cause
 
 MOST_FALSE_ALARMS = 0.1
 """Per unit-year, all bearings and directions counted."""

@@ -13,17 +13,15 @@ from acquisition.simulated.life.truth import UnitLife
 from acquisition.simulated.plant.rotor import RotorParameters
 from benchmarks.detection_fixed import BANDS, FixedThreshold
 from core.arrays import FloatArray
-from core.baseline.baseline import Origin, QuantityBaseline, Watched
+from core.baseline.baseline import Origin, QuantityBaseline
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
 from core.baseline.learning import learn
-from core.baseline.response import MEAN_READINGS, Place, learn_response, place_columns
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.baseline.watched import watched_values
-from core.change.attribution import Attribution, PlaceReadings, attribute
-from core.change.back_test import DecisionHistory, back_test
-from core.change.operation_history import operation_history
+from core.change.backtest import DecisionHistory, decide_all, operation_history
+from core.change.cause import Attribution, UnitReadings, attribute
+from core.change.decision import JUDGED, WatchedReadings
 from core.change.settings import ChangeLimits
-from core.change.verdict import JUDGED
+from core.change.shaft_response import MEAN_READINGS, FilmDirection, film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 
 DAY_NS = 86_400 * 10**9
@@ -77,7 +75,8 @@ class LearnedUnit:
 
     def decide(self, later: Later, bearing: str, direction: str) -> DecisionHistory:
         found = self.stiffness(bearing, direction)
-        return back_test(later.histories[bearing], later.is_settled, found, LIMITS)
+        readings = WatchedReadings.of(later.histories[bearing], later.is_settled, direction)
+        return decide_all(readings, found, LIMITS)
 
     def stiffness(self, bearing: str, direction: str) -> QuantityBaseline:
         found = self.baselines[bearing].of(Watched.STIFFNESS, direction)
@@ -85,7 +84,7 @@ class LearnedUnit:
             raise RuntimeError(f"unit {self.seed} has learned nothing of {bearing} {direction}")
         return found
 
-    def places(self) -> list[Place]:
+    def places(self) -> list[FilmDirection]:
         return [(bearing, direction) for bearing in self.baselines for direction in DIRECTIONS]
 
     def judged_rows(self, bearing: str) -> npt.NDArray[np.int64]:
@@ -93,7 +92,7 @@ class LearnedUnit:
         verdicts = [self.decide(self.healthy, bearing, d).verdict for d in DIRECTIONS]
         return np.flatnonzero(np.all(np.isin(verdicts, [int(v) for v in JUDGED]), axis=0))
 
-    def attribution(self, later: Later, place: Place, row: int) -> Attribution:
+    def attribution(self, later: Later, place: FilmDirection, row: int) -> Attribution:
         """What a change at a place is put down to after a row."""
         readings = self.place_readings(later)
         known = np.isfinite(readings.deviation[self.places().index(place), : row + 1])
@@ -101,12 +100,12 @@ class LearnedUnit:
         brackets = np.array([BRACKETS_N_PER_M[bearing] for bearing, _ in self.places()])
         return attribute(place, self.response, newest, brackets)
 
-    def place_readings(self, later: Later) -> PlaceReadings:
+    def place_readings(self, later: Later) -> UnitReadings:
         """All of a unit's settled readings."""
         places = [(later.histories[b], self.stiffness(b, d)) for b, d in self.places()]
         rises = [film.eccentricity_rise(history.conditions) for history, film in places]
-        return PlaceReadings(
-            *place_columns(later.histories),
+        return UnitReadings(
+            *film_columns(later.histories),
             np.stack([self._deviation(later, *place) for place in self.places()]),
             np.stack(rises),
             np.stack([history.attitude_deg for history, _ in places]),
@@ -134,7 +133,9 @@ def fixed_false_alarms(seed: int) -> tuple[float, list[int]]:
     ]
 
 
-def _fixed(life: UnitLife, settled: npt.NDArray[np.bool_], n: int) -> dict[Place, FixedThreshold]:
+def _fixed(
+    life: UnitLife, settled: npt.NDArray[np.bool_], n: int
+) -> dict[FilmDirection, FixedThreshold]:
     return {
         (bearing, direction): FixedThreshold.learned(history.ln_k[row, :n][settled[:n]])
         for bearing, history in life.readings.items()

@@ -13,7 +13,7 @@ import numpy as np
 
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.truth import UnitLife
-from core.baseline.stiffness_history import Evidence
+from core.baseline.history import ReadingOutcome
 from core.units import NS_PER_S
 
 START_NS = 1_735_689_600 * NS_PER_S
@@ -41,7 +41,7 @@ def row(life: UnitLife, bearing: str) -> list[float]:
         *np.percentile(readings.oil_temperature_c, [5.0, 95.0]),
         float(np.nanmedian(readings.shaft_um_pk)),
         float(np.nanmedian(readings.bearing_um_pk)),
-        100.0 * float(np.mean(readings.evidence == Evidence.MEASURED)),
+        100.0 * float(np.mean(readings.outcome == ReadingOutcome.MEASURED)),
     ]
 
 

@@ -240,26 +240,43 @@ class ZoneLimits(Limits):
 
 @dataclass(frozen=True)
 class DelayTimer:
-    """Whether a level counts, and for how long the condition has said otherwise.
+    """On-delay and off-delay of a level.
 
     Parameters
     ----------
+    is_on
+        Whether the level counts.
     opposed_ns
-        Known time for which it has; what passes unseen does not count.
+        Known time for which the condition has contradicted `is_on` without interruption.
     last_ns
-        When it last did; None if nothing was known since.
+        Time of the newest contradiction; None if nothing was known since.
     """
 
     is_on: bool = False
     opposed_ns: int = 0
     last_ns: int | None = None
 
-    def step(self, wanted: bool, now_ns: int, on_delay_ns: int, off_delay_ns: int) -> "DelayTimer":
-        """Take in what the condition says now; a clock that was put back adds nothing."""
+    def step(
+        self,
+        wanted: bool,
+        now_ns: int,
+        on_delay_ns: int,
+        off_delay_ns: int,
+        elapsed_ns: int | None = None,
+    ) -> "DelayTimer":
+        """Update with the condition of now.
+
+        Parameters
+        ----------
+        elapsed_ns
+            Known time that a contradiction stands for. By default the time since the one before;
+            a clock that was put back adds nothing.
+        """
         if wanted == self.is_on:
             return ON if wanted else RESTED
-        since_ns = now_ns if self.last_ns is None else self.last_ns
-        opposed_ns = self.opposed_ns + max(0, now_ns - since_ns)
+        if elapsed_ns is None:
+            elapsed_ns = 0 if self.last_ns is None else max(0, now_ns - self.last_ns)
+        opposed_ns = self.opposed_ns + elapsed_ns
         if opposed_ns >= (on_delay_ns if wanted else off_delay_ns):
             return ON if wanted else RESTED
         return DelayTimer(self.is_on, opposed_ns, now_ns)
@@ -273,43 +290,3 @@ RESTED = DelayTimer()
 
 
 ON = DelayTimer(is_on=True)
-
-
-@dataclass(frozen=True)
-class LevelTimer:
-    """Whether a level counts, and for how many readings in a row something spoke for or against.
-
-    Only readings that were judged are counted: nothing that is unknown speaks for or against.
-    """
-
-    is_active: bool = False
-    n_passed: int = 0
-    n_below: int = 0
-
-    def step(
-        self, is_passed: bool, is_held: bool, n_on: int, n_off: int, is_latching: bool
-    ) -> "LevelTimer":
-        """Take in one judged reading.
-
-        Parameters
-        ----------
-        is_passed, is_held
-            Whether the limit is passed, and whether it still is with its deadband.
-        n_on, n_off
-            Readings in a row that switch the level on, or off.
-        """
-        n_passed = self.n_passed + 1 if is_passed else 0
-        n_below = 0 if is_held else self.n_below + 1
-        is_active = self.is_active
-        if n_passed >= n_on:
-            is_active = True
-        elif n_below >= n_off and not is_latching:
-            is_active = False
-        return LevelTimer(is_active, n_passed, n_below)
-
-    def released(self, n_off: int) -> "LevelTimer":
-        """Without its latch, if nothing has held it for the off-delay."""
-        return replace(self, is_active=False) if self.n_below >= n_off else self
-
-
-REST = LevelTimer()

@@ -28,7 +28,7 @@ from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory
 from core.monitor.assessment import Assessment
 
 NS_PER_S = 1_000_000_000

@@ -1,5 +1,6 @@
-"""Whether two baselines agree, and whether stiffness drifted while one was learned."""
+"""Checks of a learned baseline: agreement with another, drift while learned, far readings."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,21 +10,19 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import Support
 from core.baseline.grouping import group_readings, robust_std
-from core.baseline.stiffness_history import StiffnessHistory
-from core.baseline.watched import watched_values
-
-Place = tuple[str, str]
+from core.baseline.history import StiffnessHistory, watched_values
 
 
-def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[Place, float]:
+def mean_difference(
+    first: BearingBaseline, second: BearingBaseline
+) -> dict[tuple[str, str], float]:
     """Mean difference of ln, second less first, in the cells that both support by themselves.
 
     Returns
     -------
-    By quantity and direction; weighted by readings of the first. One without a common cell is left
-    out: nothing is known of how it differs.
+    By quantity and direction, weighted by readings of the first; only those with common cells.
     """
-    found: dict[Place, float] = {}
+    found: dict[tuple[str, str], float] = {}
     for one in first.quantities:
         other = second.of(one.quantity, one.direction)
         if other is None or other.grid != one.grid:
@@ -43,12 +42,12 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[Pla
 
 
 SPELL_DAYS = 8
-"""Longer than what makes healthy days alike."""
+"""Longer than healthy days are correlated."""
 
-LEAST_SPELLS = 3
+MIN_SPELLS = 3
 
-FAR = 4.0
-"""Standard deviations beyond which a day counts no further."""
+OUTLIER_STDS = 4.0
+"""Standard deviations at which days are clipped."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +61,11 @@ class Drift:
 def learning_drift(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
 ) -> Drift | None:
-    """How much the readings that a baseline was learned from have drifted.
+    """Drift of the readings that a baseline was learned from.
 
     Returns
     -------
-    None if too few conditions were met again in other spells.
+    None if too few conditions recur in other spells.
     """
     conditions = history.conditions
     value, _ = watched_values(history, baseline.quantity, baseline.direction)
@@ -87,11 +86,11 @@ def drift_within(
     since = (day - day.min()) / max(int(np.ptp(day)), 1)
     time, value = _within(since, cell), _within(value, cell)
     spell = (day - day.min()) // SPELL_DAYS
-    if np.unique(spell[np.abs(time) > 0.0]).size < LEAST_SPELLS:
+    if np.unique(spell[np.abs(time) > 0.0]).size < MIN_SPELLS:
         return None
     slope = _slope(time, value)
     left = value - slope * time
-    limit = FAR * max(robust_std(left), 1e-9)
+    limit = OUTLIER_STDS * max(robust_std(left), 1e-9)
     slope += _slope(time, np.clip(left, -limit, limit))
     left = np.clip(value - slope * time, -limit, limit)
     scores = np.bincount(spell, weights=time * left)
@@ -107,3 +106,33 @@ def _within(x: FloatArray, cell: npt.NDArray[np.int64]) -> FloatArray:
 
 def _slope(time: FloatArray, value: FloatArray) -> float:
     return float(np.sum(time * value) / np.sum(time**2))
+
+
+FAR_DEVIATION = math.log(2.0)
+"""A film is never twice as stiff as on another day under the same condition: published stiffness
+of warm films at one eccentricity and oil temperature differs by a few per cent (Brito et al.,
+Tables 8 and 9)."""
+
+
+def far_readings(
+    history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: BearingBaseline
+) -> str | None:
+    """Warning about readings at least twice or at most half of what was learned; None if none.
+
+    A robust fit gives such readings no weight, so that the baseline does not show them.
+
+    Parameters
+    ----------
+    is_settled : (n,)
+        Whether the unit had settled in a steady state.
+    """
+    conditions, counts = history.conditions, []
+    for learned in baseline.quantities:
+        values = watched_values(history, learned.quantity, learned.direction)
+        found = learned.compare(conditions, *values)
+        deviation = found.deviation[is_settled & (found.place >= 0)]
+        if n := int(np.sum(np.abs(deviation) >= FAR_DEVIATION)):
+            counts.append(f"{n} of {deviation.size} readings in {learned.direction}")
+    if not counts:
+        return None
+    return f"{' and '.join(counts)} are at least twice or at most half of the others; a wrong unit?"

@@ -1,34 +1,25 @@
-"""`BearingBaseline`: a learned baseline as a value, with who made it, when and why."""
+"""`BearingBaseline`: the learned stiffness of a bearing, with author, time and event."""
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.cell_table import NODES, CellTable
-from core.baseline.stiffness_history import DIRECTIONS
+from core.baseline.history import DIRECTIONS, Watched
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid, FilmConditions
 
 
-class Watched(StrEnum):
-    """What has a baseline: stiffness, and the two 1× amplitudes that tell what changed it."""
-
-    STIFFNESS = "stiffness"
-    SHAFT = "shaft"
-    BEARING = "bearing"
-
-
 @dataclass(frozen=True)
 class TimeScatter:
-    """Scatter of the mean deviation over a time scale, with all that makes readings alike.
+    """Scatter of the mean deviation over a time scale, correlation of readings included.
 
     Parameters
     ----------
     share
-        Its standard deviation over that of the single readings: 1 if they are all alike.
+        Standard deviation of the mean over that of single readings; 1 if they are fully correlated.
     """
 
     time_scale_h: float
@@ -41,18 +32,18 @@ class TimeScatter:
 
 @dataclass(frozen=True)
 class Origin:
-    """Of what a baseline is, and where it comes from.
+    """Subject and origin of a baseline.
 
     Parameters
     ----------
     estimator
-        Which estimator's stiffness was learned.
+        Estimator whose stiffness was learned.
     version
-        Counts the baselines of a bearing, from 1.
+        Number of the baseline among those of its bearing, from 1.
     created_ns
-        When it was learned, host time.
+        Host time of learning.
     event
-        What happened to the machine that made it necessary.
+        Event at the machine that made a new baseline necessary.
     """
 
     unit: str
@@ -66,21 +57,25 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Readings compared with their baseline; where `place` is -1 there is nothing to compare.
+    """Readings compared with their baseline; nothing is compared where `place` is -1.
 
     Parameters
     ----------
+    is_known : (n,)
+        Whether the condition of a reading has everything that the baseline depends on.
     place : (n,)
         Cell in the table.
     deviation : (n,)
-        ln of what was measured over what was learned.
+        ln of measured over learned.
     weight : (n,)
-        1 for a typical reading, less for one that scatters more.
+        1 for a typical reading, less for a noisier one.
     scatter, lasting : (n,)
-        Scatter of readings in the cell: what averaging takes away, and what it does not.
+        Scatter of readings in the cell: the part that averaging takes away, and the rest.
     surface_std : (n,)
+        Standard uncertainty of the surface.
     """
 
+    is_known: npt.NDArray[np.bool_]
     place: npt.NDArray[np.int64]
     deviation: FloatArray
     weight: FloatArray
@@ -90,32 +85,32 @@ class Deviations:
 
     @property
     def offset_std(self) -> FloatArray:
-        """(n,) uncertainty that stays, however long one averages."""
+        """(n,) standard uncertainty that averaging does not take away."""
         return np.asarray(np.sqrt(self.surface_std**2 + self.lasting**2))
 
 
 @dataclass(frozen=True)
 class QuantityBaseline:
-    """What was learned of one quantity in one direction.
+    """Learned values of one quantity in one direction.
 
     Parameters
     ----------
     direction
         "x" or "y".
     attitude_covariance
-        Of the surface's terms of the attitude angle; empty if it has none.
+        Covariance of the surface's attitude terms; empty if it has none.
     max_surface_std
         Uncertainty of the surface above which nothing is compared.
     scatter
-        Of single readings about the surface, over all cells.
+        Scatter of single readings about the surface, over all cells.
     u_random
-        Random uncertainty that readings typically had; it is part of their scatter.
+        Typical random uncertainty of readings; it is part of their scatter.
     reading_h
         Running hours that a reading stands for.
     time_scatter
         Shortest time scale first.
     rejected_share
-        Share of the learning groups that fitted so badly that they counted as nothing.
+        Fraction of the learning groups that the robust fit rejected.
     """
 
     quantity: Watched
@@ -149,17 +144,18 @@ class QuantityBaseline:
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray
     ) -> Deviations:
-        """Compare readings with what was learned under their conditions.
+        """Compare readings with the learned values under their conditions.
 
         Parameters
         ----------
         value, u_random : (n,)
             ln of the quantity and its random standard uncertainty.
         """
+        is_known = self.is_known(conditions)
         place = self.table.find(self.grid.cells(conditions))
-        place = np.where(self.is_known(conditions) & np.isfinite(value), place, -1)
+        place = np.where(is_known & np.isfinite(value), place, -1)
         n = place.size
-        found = Deviations(place, np.full(n, np.nan), *np.zeros((4, n)))
+        found = Deviations(is_known, place, np.full(n, np.nan), *np.zeros((4, n)))
         rows = np.flatnonzero(place >= 0)
         if rows.size:
             cell = place[rows]
@@ -174,14 +170,11 @@ class QuantityBaseline:
         return found
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
-        """(n,) whether readings have everything that this depends on."""
-        known = self.grid.is_known(conditions)
-        if not self.surface.shape.has_attitude:
-            return known
-        return known & np.isfinite(conditions.attitude_deg)
+        """(n,) whether readings have everything that the baseline depends on."""
+        return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 
     def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
-        """(n,) rise of ln of the quantity with ln of the eccentricity ratio; NaN if not known."""
+        """(n,) rise of ln of the quantity with ln of the eccentricity ratio; NaN if unknown."""
         known = self.is_known(conditions)
         rise = np.full(known.size, np.nan)
         here = conditions.rows(known)
@@ -189,7 +182,7 @@ class QuantityBaseline:
         return rise
 
     def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
-        """(n,) between the nodes of the cell; more where the shaft has turned away meanwhile."""
+        """(n,) interpolated in the cell; larger where the attitude differs from the cell's."""
         std = self._between_nodes(conditions, cell)
         if not self.surface.shape.has_attitude:
             return std
@@ -211,7 +204,7 @@ class QuantityBaseline:
 
 
 def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Node of its cell below each x, and the way from there to the next."""
+    """Node of the cell below each x, and the fraction of the step to the next node."""
     steps = x / width % 1.0 * (NODES - 1)
     node = np.minimum(np.floor(steps), NODES - 2)
     return node.astype(np.int64), steps - node
@@ -219,14 +212,14 @@ def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArr
 
 @dataclass(frozen=True)
 class BearingBaseline:
-    """All that was learned of one bearing, frozen.
+    """Learned baselines of one bearing.
 
     Parameters
     ----------
     learned_from_ns, learned_until_ns
         First and last reading of the learning period.
     quantities
-        At most one for each quantity and direction; one that is not there had too few readings.
+        At most one for each quantity and direction; those with too few readings are missing.
     """
 
     origin: Origin
@@ -235,6 +228,6 @@ class BearingBaseline:
     quantities: tuple[QuantityBaseline, ...]
 
     def of(self, quantity: Watched, direction: str) -> QuantityBaseline | None:
-        """What was learned of a quantity in a direction, if anything."""
+        """Baseline of a quantity in a direction, if it was learned."""
         found = [q for q in self.quantities if (q.quantity, q.direction) == (quantity, direction)]
         return found[0] if found else None

@@ -1,4 +1,4 @@
-"""What a baseline knows of every cell that it has seen."""
+"""Table of cells: scatter, uncertainty and support of a baseline in each."""
 
 import itertools
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from core.arrays import FloatArray
 from core.condition.cells import Cell, CellArray, FilmConditions
 
 NODES = 3
-"""Along each axis of a cell, from edge to edge."""
+"""Nodes along each axis of a cell, edges included."""
 
 
 class Support(StrEnum):
@@ -35,16 +35,15 @@ class CellStatistics:
         Robust standard deviation of readings about the surface; drawn towards that of all cells
         where there are few days.
     lasting
-        Part of the scatter that averaging does not take away: what an error of the shaft's
-        position, which stays for weeks, makes of stiffness where it rises steeply.
+        Part of the scatter that averaging does not take away: the effect of an error of the
+        shaft's position, which lasts for weeks, where stiffness rises steeply.
     surface_std
-        Standard uncertainty of the surface in the middle of what the cell has seen.
+        Standard uncertainty of the surface at the median condition of the cell's readings.
     node_std
-        The same at its corners, in the middle of its sides and of itself, `NODES` by `NODES`:
-        temperatures of the low eccentricity first. Where a cell has been seen on one side only,
-        little is known of the other.
+        The same at `NODES` by `NODES` nodes, temperatures of the lowest eccentricity first. A cell
+        with readings on one side only is uncertain on the other.
     eccentricity_ratio, oil_temperature_c, attitude_deg
-        That middle; an attitude of zero where it is not known.
+        Median condition; an attitude of zero where it is unknown.
     """
 
     cell: Cell
@@ -82,12 +81,12 @@ class CellTable:
     def __post_init__(self) -> None:
         names = [cell.cell for cell in self.cells]
         if len(set(names)) < len(names):
-            raise ValueError("cells: one of them is there twice")
+            raise ValueError("cells: one of them is repeated")
         if len({len(name) for name in names}) > 1:
             raise ValueError("cells: not all have as many axes")
 
     def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
-        """(n,) place of each cell in the table; -1 if it has not been seen, or has no support."""
+        """(n,) row of each cell in the table; -1 if it is missing, or has no support."""
         if not self.cells:
             return np.full(cells.shape[1], -1)
         low, places = self._places
@@ -109,7 +108,7 @@ class CellTable:
 
     @cached_property
     def passing(self) -> FloatArray:
-        """(n_cells,) the part of the scatter that averaging takes away."""
+        """(n_cells,) part of the scatter that averaging takes away."""
         return np.asarray(np.sqrt(self.scatter**2 - self.lasting**2))
 
     @cached_property
@@ -120,13 +119,13 @@ class CellTable:
 
     @cached_property
     def middle(self) -> FilmConditions:
-        """The middle of what each cell has seen, (n_cells,)."""
+        """Median condition of each cell, (n_cells,)."""
         rows = [(c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in self.cells]
         return FilmConditions(*np.array(rows, np.float64).reshape(-1, 3).T)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Lowest bins, and place by bins counted from there."""
+        """Lowest bins, and row by bins counted from there."""
         bins = np.array([cell.cell for cell in self.cells])
         low = bins.min(axis=0)
         places = np.full(tuple(bins.max(axis=0) - low + 1), -1)
@@ -137,12 +136,12 @@ class CellTable:
 
 
 def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
-    """Cells that have own ones on both sides along some axis, and are none themselves.
+    """Cells between two cells of own support along some axis.
 
     Parameters
     ----------
     reach
-        Cells that may be missing between the two.
+        Largest number of cells between the two.
     """
     found: set[Cell] = set()
     for cell in own:

@@ -1,4 +1,4 @@
-"""Readings of one day and condition as one point; robust scales, medians, means that forget."""
+"""Grouping of readings by day and condition; robust scales, medians and weighted means."""
 
 import math
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ class Groups:
     value : (n,)
         Median of the readings.
     n_readings, day : (n,)
-        How many there are, and days since 1970.
+        Number of readings, and days since 1970.
     """
 
     conditions: FilmConditions
@@ -43,10 +43,10 @@ class Groups:
 def group_readings(
     time_ns: TimeArray, conditions: FilmConditions, value: FloatArray, grid: CellGrid
 ) -> Groups:
-    """Draw together what lies in one quarter of a cell on one day.
+    """Group the readings of one day in one quarter of a cell.
 
-    A day is the unit that repeats: readings within it see the same water, weather and warm-up. A
-    quarter, because ln k changes by a tenth and more across a cell.
+    Readings within a day share water, weather and warm-up. Quarters are used because ln k changes
+    by a tenth and more across a cell.
     """
     halves = replace(
         grid,
@@ -67,7 +67,7 @@ def group_readings(
 
 
 def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    """Median of x in every group; groups are numbered from zero without holes."""
+    """Median of x in every group; groups are numbered from zero without gaps."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)
     start = np.cumsum(count) - count
@@ -82,8 +82,8 @@ STD_PER_MAD = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
 BISQUARE_LIMIT = 4.685
-"""Standard deviations beyond which Tukey's bisquare counts a value as nothing; 95 % efficient where
-all are normal (Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
+"""Standard deviations beyond which Tukey's bisquare is zero; 95 % efficient for normal values
+(Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
 
 
 def robust_std(deviation: FloatArray) -> float:
@@ -100,9 +100,7 @@ def bisquare(standardised: FloatArray) -> FloatArray:
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Standard deviation about zero of values that need not be normal: the larger of what the
-    middle half and the middle three quarters say.
-    """  # noqa: D205
+    """Standard deviation about zero: the larger estimate of middle half and three quarters."""
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))
@@ -110,35 +108,11 @@ def absolute_quantile_std(deviation: FloatArray) -> float:
 
 
 MEDIAN_READINGS = 5
-"""Number of newest deviations whose median counts, so that single spikes do not."""
-
-
-def forgetting(time_scale_h: float, reading_h: float) -> float:
-    """Weight λ of the newest reading in the mean over a time scale."""
-    return -math.expm1(-reading_h / time_scale_h)
-
-
-@dataclass(frozen=True)
-class Newest:
-    """The newest deviations, oldest first, and their median."""
-
-    deviations: tuple[float, ...] = ()
-
-    def step(self, deviation: float) -> "Newest":
-        """Take in one more."""
-        return Newest((*self.deviations, deviation)[-MEDIAN_READINGS:])
-
-    @property
-    def median(self) -> float:
-        """Median of the newest; until there are enough, of all."""
-        return float(np.median(self.deviations))
-
-
-NOTHING_NEW = Newest()
+"""Number of newest deviations whose median is averaged, so that single spikes do not count."""
 
 
 def running_median(deviation: FloatArray) -> FloatArray:
-    """(n,) what `Newest.median` gives step by step."""
+    """(n,) median of the newest `MEDIAN_READINGS`; until there are enough, of all."""
     n = deviation.size
     if n < MEDIAN_READINGS:
         return np.array([np.median(deviation[: i + 1]) for i in range(n)], np.float64)
@@ -147,13 +121,18 @@ def running_median(deviation: FloatArray) -> FloatArray:
     return np.concatenate([start, np.median(windows, axis=1)])
 
 
-def forgetting_sum(x: FloatArray, forgotten: float) -> FloatArray:
-    """(n,) sums in which the newest of x has weight `forgotten`."""
-    from scipy.signal import lfilter  # slow to load, and not needed to begin
-
-    return np.asarray(lfilter([forgotten], [1.0, forgotten - 1.0], x))
+def ewma_weight(time_scale_h: float, reading_h: float) -> float:
+    """Weight α of the newest reading in an exponentially weighted mean over a time scale."""
+    return -math.expm1(-reading_h / time_scale_h)
 
 
-def forgetting_step(total: float, x: float, forgotten: float) -> float:
-    """Next value of `forgetting_sum`, in the order of its arithmetic."""
-    return total * (1.0 - forgotten) + forgotten * x
+def ewma(x: FloatArray, alpha: float) -> FloatArray:
+    """(n,) exponentially weighted sums; `ewma_step` for all of x, with the same arithmetic."""
+    from scipy.signal import lfilter  # slow to import, and not needed at start
+
+    return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))
+
+
+def ewma_step(total: float, x: float, alpha: float) -> float:
+    """Exponentially weighted sum after one more value."""
+    return total * (1.0 - alpha) + alpha * x

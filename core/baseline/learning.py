@@ -1,18 +1,17 @@
-"""From the readings of a healthy bearing to its baseline."""
+"""Learning a baseline from the readings of a healthy bearing."""
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import DAY_NS, Groups, group_readings
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.baseline.surface_fit import LEAST_SCATTER, Fit, fit_surface, refit, surface_shape
+from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit, surface_shape
 from core.baseline.tabulate import tabulate
-from core.baseline.watched import watched_values
 from core.condition.cells import FilmConditions
 
 FOLDS = 5
@@ -28,11 +27,11 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Compare each learning reading with a surface that has not seen its spell.
+    """Cross-validated deviations: each reading against a surface fitted without its spell of days.
 
     Returns
     -------
-    (n,) NaN where there is no support without the spell.
+    (n,) NaN where the cell has no support without the spell.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -59,7 +58,7 @@ def _is_known_without(
     table: CellTable,
     place: npt.NDArray[np.int64],
 ) -> npt.NDArray[np.bool_]:
-    """Whether half the days that a cell needs are there without the spell."""
+    """Whether cells have half of `min_days` without the spell."""
     group_place = table.find(settings.grid.cells(groups.conditions))
     counted = (group_fold != left_out) & (group_place >= 0)
     days = np.unique(np.vstack([group_place[counted], groups.day[counted]]), axis=1)[0]
@@ -78,12 +77,12 @@ def learn(
     settings: BaselineSettings,
     watched: tuple[Watched, ...] = (Watched.STIFFNESS,),
 ) -> BearingBaseline:
-    """Learn what a bearing is like under each condition.
+    """Learn the baseline of a bearing.
 
     Parameters
     ----------
     history
-        Readings of the learning period, believed to be healthy for the most part.
+        Readings of the learning period, for the most part of a healthy machine.
     is_settled : (n,)
         Whether the unit had settled in a steady state.
     watched
@@ -157,7 +156,7 @@ def _fitted(
         attitude_covariance=fit.attitude_covariance,
         table=table,
         max_surface_std=settings.max_surface_std,
-        scatter=float(np.median(scatter)) if scatter.size else LEAST_SCATTER,
+        scatter=float(np.median(scatter)) if scatter.size else MIN_SCATTER,
         u_random=float(np.median(u_random)),
         reading_h=settings.reading_h,
         time_scatter=time_scatter(deviation, place, table, settings),

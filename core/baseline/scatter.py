@@ -1,4 +1,4 @@
-"""How far healthy means stray: by cell and day, and over each time scale."""
+"""Scatter of healthy mean deviations: by cell and day, and over each time scale."""
 
 from dataclasses import replace
 
@@ -11,19 +11,19 @@ from core.baseline.cell_table import CellTable
 from core.baseline.grouping import (
     STD_PER_MAD,
     absolute_quantile_std,
-    forgetting,
-    forgetting_sum,
+    ewma,
+    ewma_weight,
     group_medians,
     running_median,
 )
 from core.baseline.settings import BaselineSettings
-from core.baseline.surface_fit import LEAST_SCATTER, slope_scatter
+from core.baseline.surface_fit import MIN_SCATTER, slope_scatter
 
 PRIOR_DAYS = 20.0
-"""Days that the slope's word counts for. What strays, strays for days: twenty are few."""
+"""Weight of the slope model, in days. Deviations last for days, so that twenty days are few."""
 
-MOST_LASTING = 0.95
-"""Share of the scatter: something always averages out."""
+MAX_LASTING = 0.95
+"""Largest lasting part of the scatter: some of it always averages out."""
 
 
 def with_scatter(
@@ -33,14 +33,14 @@ def with_scatter(
     day: npt.NDArray[np.int64],
     deviation: FloatArray,
 ) -> CellTable:
-    """The table with the scatter of every cell.
+    """Table with the scatter of every cell.
 
     Parameters
     ----------
     slope : (n_cells,)
-        Of the surface with eccentricity, in the middle of each cell.
+        Slope of the surface with eccentricity, at the median condition of each cell.
     place, day, deviation : (n,)
-        Of readings: cell in the table, day and deviation.
+        Row of the cell, day and deviation of each reading.
     """
     if place.size == 0:
         return table
@@ -49,8 +49,8 @@ def with_scatter(
     expected = model.variance(slope)
     own, n_days = _own(place, mean, slope.size)
     variance = (n_days * own**2 + PRIOR_DAYS * expected) / (n_days + PRIOR_DAYS)
-    scatter = np.maximum(np.sqrt(variance), LEAST_SCATTER)
-    lasting = scatter * np.minimum(np.sqrt(model.lasting(slope) / expected), MOST_LASTING)
+    scatter = np.maximum(np.sqrt(variance), MIN_SCATTER)
+    lasting = scatter * np.minimum(np.sqrt(model.lasting(slope) / expected), MAX_LASTING)
     return CellTable(
         tuple(
             replace(cell, scatter=one, lasting=part)
@@ -62,7 +62,7 @@ def with_scatter(
 def _own(
     place: npt.NDArray[np.int64], mean: FloatArray, n_cells: int
 ) -> tuple[FloatArray, FloatArray]:
-    """(n_cells,) scatter of a cell's own days, and how many there are."""
+    """(n_cells,) scatter of the daily means of each cell, and number of days."""
     own, n_days = np.zeros(n_cells), np.zeros(n_cells)
     seen, numbered = np.unique(place, return_inverse=True)
     own[seen] = STD_PER_MAD * group_medians(np.abs(mean), numbered)
@@ -73,16 +73,16 @@ def _own(
 def _daily(
     place: npt.NDArray[np.int64], day: npt.NDArray[np.int64], deviation: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Cell and mean deviation of each day in each cell: what averaging leaves."""
+    """Cell and mean deviation of each day in each cell."""
     keys, group = np.unique(np.vstack([place, day]), axis=1, return_inverse=True)
     group = group.reshape(-1)
     return keys[0], np.asarray(np.bincount(group, deviation) / np.bincount(group))
 
 
-LEAST_SPANS = 4.0
-"""Time scales that the learning period must hold for one to be used."""
+MIN_SPANS = 4.0
+"""Length of the learning period, in time scales, that a time scale requires."""
 
-LEAST_SHARE, MOST_SHARE = 1e-3, 4.0
+MIN_SHARE, MAX_SHARE = 1e-3, 4.0
 HALVINGS = 24
 
 
@@ -92,31 +92,29 @@ def time_scatter(
     table: CellTable,
     settings: BaselineSettings,
 ) -> tuple[TimeScatter, ...]:
-    """Scatter on each time scale that the learning period is long enough for.
+    """Scatter over each time scale that the learning period is long enough for.
 
     Parameters
     ----------
     deviation, place : (n,)
-        Readings from a surface that has not seen them, oldest first, and their cells.
+        Cross-validated deviations, oldest first, and rows of their cells.
     """
     smooth, weight = running_median(deviation), _weight(table.scatter[place])
     columns = (np.ones(weight.size), smooth, table.passing[place], table.lasting[place])
     found: list[TimeScatter] = []
     for scale_h in settings.time_scales_h:
         spans = deviation.size * settings.reading_h / scale_h
-        if spans < LEAST_SPANS:
+        if spans < MIN_SPANS:
             break
         forgotten, first = (
-            forgetting(scale_h, settings.reading_h),
+            ewma_weight(scale_h, settings.reading_h),
             int(scale_h / settings.reading_h),
         )
-        total, mean, stray, stays = (
-            forgetting_sum(weight * column, forgotten)[first:] for column in columns
-        )
+        total, mean, stray, stays = (ewma(weight * column, forgotten)[first:] for column in columns)
         share = _share(mean / total, stray / total, stays / total)
-        # two time constants are one independent mean; few of them know their own scatter badly
+        # two time constants make one independent mean; the scatter of few means is uncertain
         share *= 1.0 + 2.0 / spans
-        if found:  # readings that are alike cannot average out faster than independent ones
+        if found:  # correlated readings cannot average out faster than independent ones
             last = found[-1]
             share = max(share, last.share * (last.time_scale_h / scale_h) ** 0.5)
         found.append(TimeScatter(scale_h, share))
@@ -124,14 +122,14 @@ def time_scatter(
 
 
 def _weight(scatter: FloatArray) -> FloatArray:
-    """As `QuantityBaseline.compare` weighs typical readings."""
+    """Weights of typical readings in `QuantityBaseline.compare`."""
     typical = float(np.median(scatter)) if scatter.size else 1.0
     return np.minimum(1.0, (typical / scatter) ** 2)
 
 
 def _share(mean: FloatArray, stray: FloatArray, stays: FloatArray) -> float:
-    """Share of `stray` with which, beside what stays, means stray as far as they do."""
-    least, most = LEAST_SHARE, MOST_SHARE
+    """Share of `stray` that, together with what stays, explains the scatter of the means."""
+    least, most = MIN_SHARE, MAX_SHARE
     for _ in range(HALVINGS):
         middle = (least * most) ** 0.5
         is_too_small = absolute_quantile_std(mean / np.hypot(middle * stray, stays)) > 1.0

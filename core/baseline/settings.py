@@ -11,7 +11,7 @@ from core.condition.cells import CellGrid, FilmConditions
 
 @dataclass(frozen=True)
 class BaselineSettings:
-    """What a baseline needs, and how stiff its surface is.
+    """Requirements of a baseline, and smoothness of its surface.
 
     Parameters
     ----------
@@ -21,13 +21,12 @@ class BaselineSettings:
         Whether the surface depends on the attitude angle too: pads are not set evenly, and x is not
         y. The grid decides whether cells do.
     min_readings, min_days
-        Readings, and days with readings, below which a cell knows nothing by itself.
+        Readings, and days with readings, that give a cell support of its own.
     borrowing_readings
-        Readings in a cell from which on it may borrow, if it and those that touch it have seen
-        `min_days` in all.
+        Readings that let a cell borrow support, if it and its neighbours have `min_days` in all.
     borrowing_reach
-        Cells that may be missing between two of their own support: they borrow from these through
-        the surface.
+        Largest number of cells between two of own support that borrow from these through the
+        surface.
     max_surface_std
         Uncertainty of the surface, in ln, above which a cell is not supported after all.
     min_learning_days
@@ -35,13 +34,12 @@ class BaselineSettings:
     knot_cells
         Cells from one knot of the surface to the next.
     bend_std
-        How much the slope of ln k is expected to change from knot to knot (prior standard
-        deviation).
+        Prior standard deviation of the change of slope of ln k from knot to knot.
     time_scales_h
-        Running hours over which deviations are averaged, shortest first: a large loss is found on
-        the short ones, a small one on the long ones.
+        Running hours over which deviations are averaged, shortest first: large losses show on the
+        short time scales, small ones on the long ones.
     reading_h
-        Running hours that one reading stands for: how often readings are taken in.
+        Running hours from one reading to the next.
 
     Raises
     ------
@@ -75,13 +73,12 @@ class BaselineSettings:
 
     @property
     def has_attitude(self) -> bool:
-        """Whether the attitude angle counts at all."""
+        """Whether surface or cells depend on the attitude angle."""
         return self.uses_attitude or self.grid.has_attitude
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
-        """(n,) whether readings have everything that a baseline depends on."""
-        known = self.grid.is_known(conditions)
-        return known & np.isfinite(conditions.attitude_deg) if self.uses_attitude else known
+        """(n,) whether readings have everything that the baseline depends on."""
+        return conditions.is_known(self.has_attitude)
 
 
 POSITIVE = (

@@ -10,7 +10,7 @@ from core.arrays import FloatArray
 from core.condition.cells import FilmConditions
 
 ATTITUDE_TERMS = 4
-"""Shaft position along x and y, and twice its angle: what a bearing that is not round does."""
+"""Shaft position along x and y, and at twice its angle: effect of a bearing that is not round."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class KnotAxis:
     def splines(self, x: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
         """First spline that is not zero at each x, and the values of the four that are not.
 
-        Beyond the ends the outermost cubic goes on.
+        Beyond the ends the outermost cubic is continued.
 
         Returns
         -------
@@ -56,7 +56,7 @@ class KnotAxis:
 
 @dataclass(frozen=True)
 class SurfaceShape:
-    """Where the knots of a surface are, and whether the attitude angle counts."""
+    """Knots of a surface, and whether it depends on the attitude angle."""
 
     eccentricity: KnotAxis
     temperature: KnotAxis
@@ -69,7 +69,7 @@ class SurfaceShape:
         return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
 
     def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Which of the tensor products are not zero, and their values.
+        """Tensor products that are not zero, and their values.
 
         Returns
         -------

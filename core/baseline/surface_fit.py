@@ -1,4 +1,4 @@
-"""The robust fit of the surface, and what errors of position add where it is steep."""
+"""Robust fit of the surface, and scatter from errors of position where it is steep."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from core.arrays import FloatArray
 from core.baseline.grouping import Groups, bisquare, robust_std
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
 
-MOST_STDS = 3.0
-"""Deviations beyond this are taken for this, that wrong ones decide nothing."""
+MAX_STDS = 3.0
+"""Standard deviations at which deviations are clipped."""
 
 FLAT_SHARE = 0.25
-"""Share of the deviations that count as those of a flat surface."""
+"""Fraction of the deviations that count as those of a flat surface."""
 
 ROUNDS = 8
-LEAST_SCATTER = 1e-6
+MIN_SCATTER = 1e-6
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class SlopeScatter:
     Parameters
     ----------
     flat
-        Where the surface is as flat as in `flat_square`, a squared slope, or flatter.
+        Variance where the squared slope is at most `flat_square`.
     per_slope
-        What a squared slope adds beyond that.
+        Variance per squared slope beyond `flat_square`.
     """
 
     flat: float
@@ -37,7 +37,7 @@ class SlopeScatter:
     flat_square: float
 
     def lasting(self, slope: FloatArray) -> FloatArray:
-        """Variance that errors of position make at each slope."""
+        """Variance from errors of position at each slope."""
         return self.per_slope * np.maximum(slope**2 - self.flat_square, 0.0)
 
     def variance(self, slope: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ class SlopeScatter:
 
 
 def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
-    """Fit variance to squared deviations, each by what is expected of it.
+    """Fit variance to squared deviations, each weighted by its expected value.
 
     Parameters
     ----------
@@ -57,47 +57,47 @@ def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
     flat_square = float(np.quantile(slope**2, FLAT_SHARE))
     steep = np.maximum(slope**2 - flat_square, 0.0)
     terms = np.stack([np.ones(slope.size), steep], axis=1)
-    expected = np.full(slope.size, max(robust_std(deviation), LEAST_SCATTER) ** 2)
-    flat, per_slope = LEAST_SCATTER**2, 0.0
+    expected = np.full(slope.size, max(robust_std(deviation), MIN_SCATTER) ** 2)
+    flat, per_slope = MIN_SCATTER**2, 0.0
     for _ in range(ROUNDS):
-        square = np.minimum(deviation**2, MOST_STDS**2 * expected)
+        square = np.minimum(deviation**2, MAX_STDS**2 * expected)
         (flat, per_slope), _ = nnls(terms / expected[:, np.newaxis], square / expected)
-        expected = np.maximum(terms @ (flat, per_slope), LEAST_SCATTER**2)
-    return SlopeScatter(max(float(flat), LEAST_SCATTER**2), float(per_slope), flat_square)
+        expected = np.maximum(terms @ (flat, per_slope), MIN_SCATTER**2)
+    return SlopeScatter(max(float(flat), MIN_SCATTER**2), float(per_slope), flat_square)
 
 
 HUBER_LIMIT = 1.345
 HUBER_ROUNDS, BISQUARE_ROUNDS, SLOPE_ROUNDS = 6, 8, 4
 
 SLOPE_STD = 2.0
-"""Prior standard deviation of the change of ln k from knot to knot: so wide that it only decides
+"""Prior standard deviation of the change of ln k from knot to knot: so wide that it matters only
 where all readings lie on a line."""
 
 ATTITUDE_STD = 1.0
-LEAST_STD = 1e-4
-"""Groups are not believed to be better than this, in ln."""
+MIN_STD = 1e-4
+"""Smallest scatter of groups, in ln."""
 
 FEW_READINGS = 2.0
-"""A group of as many readings counts half."""
+"""Number of readings of a group that has half weight."""
 
 SPANS_DAYS = (1, 10)
-"""Over which residuals may be alike."""
+"""Spans over which residuals may be correlated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A surface, how well it is known, and what it was fitted to.
+    """Fitted surface with its uncertainty.
 
     Parameters
     ----------
     covariance
         (n_coefficients, n_coefficients)
     robust_weight : (n_groups,)
-        1 for a group that fits, 0 for one that counts as nothing.
+        1 for a group that fits, 0 for one that is rejected.
     group_std : (n_groups,)
         Scatter of groups about the surface.
     clustering
-        Groups that know as much as one, because they are alike.
+        Number of correlated groups that are worth one independent group.
     """
 
     surface: Surface
@@ -108,7 +108,7 @@ class Fit:
 
     @property
     def attitude_covariance(self) -> tuple[tuple[float, ...], ...]:
-        """Of the terms of the attitude; empty if there are none."""
+        """Covariance of the attitude terms; empty if there are none."""
         if not self.surface.shape.has_attitude:
             return ()
         part = self.covariance[-ATTITUDE_TERMS:, -ATTITUDE_TERMS:]
@@ -121,7 +121,7 @@ class Fit:
 
 
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
-    """Fit a surface, and find out how much groups scatter and are alike."""
+    """Fit a surface, and estimate scatter and correlation of the groups."""
     offset = float(np.median(groups.value))
     points = _Points(
         shape.design(groups.conditions), groups.value - offset, _trust(groups), groups.day
@@ -142,7 +142,7 @@ def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Groups as rows of a regression; a group of few readings is trusted less."""
+    """Groups as rows of a regression, weighted by their number of readings."""
 
     design: FloatArray
     y: FloatArray
@@ -150,7 +150,7 @@ class _Points:
     day: npt.NDArray[np.int64]
 
     def left(self, coefficients: FloatArray) -> FloatArray:
-        """(n,) what a surface leaves over, alike in scatter whatever the trust."""
+        """(n,) residuals of a surface, scaled to the same scatter."""
         return np.asarray((self.y - self.design @ coefficients) * np.sqrt(self.trust))
 
     def solve(self, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -162,11 +162,11 @@ class _Points:
 
 def _resisting(points: _Points, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Coefficients and robust weights, with one scatter for all groups."""
-    robust, std = np.ones(points.y.size), max(robust_std(points.y), LEAST_STD)
+    robust, std = np.ones(points.y.size), max(robust_std(points.y), MIN_STD)
     for round_ in range(HUBER_ROUNDS + BISQUARE_ROUNDS):
         coefficients, _ = points.solve(robust / std**2, prior)
         left = points.left(coefficients)
-        std = max(robust_std(left), LEAST_STD)
+        std = max(robust_std(left), MIN_STD)
         if round_ < HUBER_ROUNDS - 1:
             robust = np.minimum(1.0, HUBER_LIMIT * std / np.maximum(np.abs(left), 1e-12))
         else:
@@ -180,11 +180,11 @@ def _std(
     """(n,) scatter of groups where the surface has a slope, from those that fit."""
     fits = robust > 0.0
     model = slope_scatter(slope[fits], points.left(coefficients)[fits])
-    return np.maximum(np.sqrt(model.variance(slope)), LEAST_STD)
+    return np.maximum(np.sqrt(model.variance(slope)), MIN_STD)
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """The surface without some of the groups, all else as found with them."""
+    """Surface fitted to some of the groups, with the weights of the whole fit."""
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points(
         shape.design(groups.conditions), groups.value - offset, _trust(groups), groups.day
@@ -216,7 +216,7 @@ def _trust(groups: Groups) -> FloatArray:
 def _clustering(
     points: _Points, coefficients: FloatArray, robust: FloatArray, std: FloatArray
 ) -> float:
-    """How much the means over days, or over ten, scatter beyond what independent groups would."""
+    """Variance of the means over some days relative to that of independent groups; at least 1."""
     standardised = (points.y - points.design @ coefficients) / std
     weight, found = points.trust * robust, [1.0]
     for span in SPANS_DAYS:
@@ -231,7 +231,7 @@ def _clustering(
 def surface_shape(
     groups: Groups, knot_e: float, knot_t_c: float, has_attitude: bool
 ) -> SurfaceShape:
-    """Knots that cover all groups."""
+    """Surface with knots that cover all groups."""
     return SurfaceShape(
         _axis(groups.conditions.eccentricity_ratio, knot_e),
         _axis(groups.conditions.oil_temperature_c, knot_t_c),

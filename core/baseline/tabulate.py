@@ -1,4 +1,4 @@
-"""Filling the table of cells: what each has seen, and whether that is enough."""
+"""Filling the table of cells: statistics and support of each."""
 
 import itertools
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ from core.baseline.cell_table import (
 from core.baseline.grouping import Groups, group_medians
 from core.baseline.settings import BaselineSettings
 from core.baseline.surface import Surface
-from core.baseline.surface_fit import LEAST_SCATTER, Fit
+from core.baseline.surface_fit import MIN_SCATTER, Fit
 from core.condition.cells import Cell, CellArray, CellGrid, FilmConditions
 
 BELIEVED = 0.1
-"""Robust weight from which on a group counts as support."""
+"""Robust weight above which a group counts as support."""
 
 
 @dataclass(frozen=True)
 class _Contents:
-    """What a cell has seen, and the middle of it."""
+    """Readings of a cell: numbers, median of ln and median condition."""
 
     n_readings: int
     n_days: int
@@ -49,7 +49,7 @@ def tabulate(
     Parameters
     ----------
     value : (n,)
-        Of the readings.
+        ln of the readings.
     """
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
@@ -69,7 +69,7 @@ def tabulate(
                 n_readings=content.n_readings,
                 n_days=content.n_days,
                 location=content.location,
-                scatter=max(float(np.median(fit.group_std)), LEAST_SCATTER),  # until it is known
+                scatter=max(float(np.median(fit.group_std)), MIN_SCATTER),  # until it is known
                 lasting=0.0,
                 surface_std=float(std[row]),
                 node_std=nodes[row],
@@ -124,7 +124,7 @@ def _unseen(
     surface: Surface,
     grid: CellGrid,
 ) -> _Contents:
-    """A cell between others: as its middle, with the attitude of the nearest."""
+    """Contents of a cell without readings: its centre, with the attitude of the nearest cell."""
     nearest = min(
         sorted(enough), key=lambda other: sum(abs(a - b) for a, b in zip(cell, other, strict=True))
     )
@@ -135,7 +135,7 @@ def _unseen(
 
 
 def _surface_std(contents: dict[Cell, _Contents], fit: Fit) -> FloatArray:
-    """(n_cells,) in the middle of what each has seen."""
+    """(n_cells,) at the median condition of each cell."""
     columns = [
         (c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents.values()
     ]
@@ -162,7 +162,7 @@ def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list
 def _support_counts(
     groups: Groups, fit: Fit, grid: CellGrid, cells: CellArray
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n_cells,) readings and days of each cell, without what the fit has rejected."""
+    """(n_cells,) readings and days of each cell, without groups that the fit rejected."""
     believed = groups.rows(fit.robust_weight >= BELIEVED)
     place = _find_columns(grid.cells(believed.conditions), cells)
     days = np.unique(np.vstack([place, believed.day]), axis=1)[0]

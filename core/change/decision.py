@@ -1,32 +1,113 @@
-"""Whether a film has changed: one decision, led on reading by reading."""
+"""Decision whether a film has changed: verdict, alert and danger, stepped reading by reading."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
+from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
-from core.change.evidence import NOTHING_GATHERED, Counted, Finding, GatheredEvidence
-from core.change.reading import WatchedReading
-from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits, sure_size
-from core.change.verdict import OF_EVIDENCE, Verdict, counted_verdict
+from core.baseline.history import DIRECTIONS, CodeArray, ReadingOutcome, StiffnessHistory
+from core.change.evidence import NO_EVIDENCE, Comparison, Finding, GatheredEvidence
+from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits
 from core.condition.cells import FilmConditions
-from core.limits import REST, AlarmLevel, LevelTimer
+from core.limits import RESTED, AlarmLevel, DelayTimer
 from core.units import NS_PER_S
 
 
-@dataclass(frozen=True)
+class Verdict(IntEnum):
+    """Verdict on a reading; all but the first three say why the film could not be judged."""
+
+    NORMAL = 0
+    ALERT = 1
+    DANGER = 2
+    GATHERING_EVIDENCE = 3
+    NO_BASELINE = 4
+    INSUFFICIENT_EXCITATION = 5
+    BAD_QUALITY = 6
+    TRANSIENT = 7
+
+
+JUDGED = (Verdict.NORMAL, Verdict.ALERT, Verdict.DANGER)
+"""Verdicts of a film that could be judged."""
+
+WITHOUT_NUMBER = {
+    ReadingOutcome.INSUFFICIENT_EXCITATION: Verdict.INSUFFICIENT_EXCITATION,
+    ReadingOutcome.BAD_QUALITY: Verdict.BAD_QUALITY,
+}
+"""Verdicts on readings without a number."""
+
+
+Outcome: TypeAlias = Comparison | Verdict
+"""Comparison of a reading with its baseline, or the verdict that says why there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedReadings:
+    """Readings of one film in one direction as columns (n,); NaN where there is no number.
+
+    Parameters
+    ----------
+    is_settled
+        Whether the unit had settled in a steady state.
+    value, u_random
+        ln of the stiffness and its random standard uncertainty.
+    outcome
+        Members of `ReadingOutcome`.
+    """
+
+    time_ns: TimeArray
+    is_settled: npt.NDArray[np.bool_]
+    conditions: FilmConditions
+    value: FloatArray
+    u_random: FloatArray
+    outcome: CodeArray
+
+    @classmethod
+    def of(
+        cls, history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], direction: str
+    ) -> "WatchedReadings":
+        """Readings of a history in one direction."""
+        row = DIRECTIONS.index(direction)
+        columns = (history.ln_k[row], history.u_random[row], history.outcome[row])
+        return cls(history.time_ns, is_settled, history.conditions, *columns)
+
+    def compared(self, baseline: QuantityBaseline | None) -> Iterator[tuple[int, Outcome]]:
+        """Time of each reading, and its comparison with a baseline or why there is none."""
+        unusable = np.full(self.time_ns.size, -1)
+        columns: tuple[FloatArray, ...] = (np.zeros(self.time_ns.size),) * 4
+        if baseline is None:
+            unusable[:] = Verdict.NO_BASELINE
+        else:
+            found = baseline.compare(self.conditions, self.value, self.u_random)
+            unusable[found.place < 0] = Verdict.NO_BASELINE
+            unusable[~found.is_known] = Verdict.BAD_QUALITY
+            columns = (found.deviation, found.weight, found.scatter, found.offset_std)
+        unusable[np.isnan(self.value)] = Verdict.BAD_QUALITY
+        for outcome, verdict in WITHOUT_NUMBER.items():
+            unusable[self.outcome == outcome] = verdict
+        unusable[~self.is_settled] = Verdict.TRANSIENT
+        rows = zip(*(column.tolist() for column in (*columns, self.u_random)), strict=True)
+        for time_ns, why, row in zip(self.time_ns.tolist(), unusable.tolist(), rows, strict=True):
+            yield time_ns, Comparison(*row) if why < 0 else Verdict(why)
+
+
+@dataclass(frozen=True, slots=True)
 class Decision:
-    """What is known of one quantity in one direction.
+    """State of the decision on one quantity in one direction.
 
     Parameters
     ----------
     verdict
-        What the newest reading says.
+        Verdict on the newest reading.
     finding
         The most significant mean deviation, as of the newest reading that counted.
     deviation, deviation_std
-        Of the newest reading that counted, single: ln over the baseline, and what it may stray by.
+        Deviation of the newest reading that counted, in ln, and its standard uncertainty.
     alert, danger
         Levels with their delays.
     last_ns, last_counted_ns
@@ -37,158 +118,123 @@ class Decision:
     finding: Finding | None = None
     deviation: float | None = None
     deviation_std: float | None = None
-    evidence: GatheredEvidence = NOTHING_GATHERED
-    alert: LevelTimer = REST
-    danger: LevelTimer = REST
+    evidence: GatheredEvidence = NO_EVIDENCE
+    alert: DelayTimer = RESTED
+    danger: DelayTimer = RESTED
     last_ns: int | None = None
     last_counted_ns: int | None = None
 
     @property
     def level(self) -> AlarmLevel | None:
         """Level that is held, whether or not the newest reading could be judged."""
-        if self.danger.is_active:
+        if self.danger.is_on:
             return AlarmLevel.DANGER
-        return AlarmLevel.ALERT if self.alert.is_active else None
+        return AlarmLevel.ALERT if self.alert.is_on else None
 
 
-UNDECIDED = Decision()
-"""Where a film begins, and begins again with another baseline."""
+INITIAL_DECISION = Decision()
+"""Decision before the first reading, and after a change of baseline."""
 
 
-def advance(
+def step(
     decision: Decision,
-    reading: WatchedReading,
+    time_ns: int,
+    outcome: Outcome,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
 ) -> Decision:
-    """Take in one reading.
+    """Update a decision with one reading.
 
-    Readings that come sooner after the last one that counted than half of what a reading stands for
-    are not counted: they are much the same samples.
+    A reading does not count if it follows the last one that counted by less than half of the time
+    that a reading stands for: the two share most of their samples.
 
     Raises
     ------
     ValueError
         If the reading is not later than the one before.
     """
-    if decision.last_ns is not None and reading.time_ns <= decision.last_ns:
-        raise ValueError(f"reading at {reading.time_ns} ns is not after {decision.last_ns} ns")
-    decision = replace(decision, last_ns=reading.time_ns)
-    unusable = _unusable(reading)
-    if unusable is not None:
-        return replace(decision, verdict=unusable)
-    if baseline is None:
-        return replace(decision, verdict=Verdict.NO_BASELINE)
-    condition = FilmConditions.one(
-        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
-    )
-    if not baseline.is_known(condition)[0]:
-        return replace(decision, verdict=Verdict.BAD_QUALITY)
-    return _compared(decision, reading, condition, baseline, limits)
-
-
-def release(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Decision:
-    """Release latches whose condition has gone for the off-delay."""
-    n_off = readings_of(limits.off_delay_h, baseline.reading_h)
-    return replace(
-        decision, alert=decision.alert.released(n_off), danger=decision.danger.released(n_off)
-    )
-
-
-def readings_of(duration_h: float, reading_h: float) -> int:
-    """Readings that stand for running hours: at least one."""
-    return max(1, math.ceil(duration_h / reading_h - 1e-9))
-
-
-def least_step_ns(baseline: QuantityBaseline) -> int:
-    """Time after one reading before the next one counts."""
-    return round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
-
-
-def _unusable(reading: WatchedReading) -> Verdict | None:
-    if not reading.is_settled:
-        return Verdict.TRANSIENT
-    if reading.evidence in OF_EVIDENCE:
-        return OF_EVIDENCE[reading.evidence]
-    return Verdict.BAD_QUALITY if math.isnan(reading.value) else None
-
-
-def _compared(
-    decision: Decision,
-    reading: WatchedReading,
-    condition: FilmConditions,
-    baseline: QuantityBaseline,
-    limits: ChangeLimits,
-) -> Decision:
-    found = baseline.compare(condition, np.array([reading.value]), np.array([reading.u_random]))
-    if found.place[0] < 0:
-        return replace(decision, verdict=Verdict.NO_BASELINE)
+    if decision.last_ns is not None and time_ns <= decision.last_ns:
+        raise ValueError(f"reading at {time_ns} ns is not after {decision.last_ns} ns")
+    if baseline is None or isinstance(outcome, Verdict):
+        verdict = outcome if isinstance(outcome, Verdict) else Verdict.NO_BASELINE
+        return replace(decision, verdict=verdict, last_ns=time_ns)
     last_ns = decision.last_counted_ns
-    if last_ns is not None and reading.time_ns - last_ns < least_step_ns(baseline):
-        return replace(decision, verdict=_verdict(decision, baseline, limits))
-    counted = Counted(
-        *(
-            float(column[0])
-            for column in (found.deviation, found.weight, found.scatter, found.offset_std)
-        )
-    )
-    evidence = decision.evidence.step(counted, baseline)
-    decision = replace(
-        decision,
-        deviation=counted.deviation,
-        deviation_std=_deviation_std(counted, reading, baseline),
-        evidence=evidence,
-        last_counted_ns=reading.time_ns,
-    )
-    return _judged(decision, evidence.findings(baseline), baseline, limits)
-
-
-def _deviation_std(counted: Counted, reading: WatchedReading, baseline: QuantityBaseline) -> float:
-    excess = max(reading.u_random**2 - baseline.u_random**2, 0.0)
-    return math.sqrt(counted.scatter**2 + excess + counted.offset_std**2)
-
-
-def _judged(
-    decision: Decision,
-    findings: tuple[Finding, ...],
-    baseline: QuantityBaseline,
-    limits: ChangeLimits,
-) -> Decision:
-    n_on = readings_of(limits.on_delay_h, baseline.reading_h)
-    n_off = readings_of(limits.off_delay_h, baseline.reading_h)
+    if last_ns is not None and time_ns - last_ns < _min_step_ns(baseline):
+        return replace(decision, verdict=_verdict(decision, baseline, limits), last_ns=time_ns)
+    evidence = decision.evidence.step(outcome, baseline)
+    findings = evidence.findings(baseline)
     alert, danger = (
-        timer.step(
-            any(_is_passed(finding, change, margin, limits) for finding in findings),
-            any(_is_held(finding, change, limits) for finding in findings),
-            n_on,
-            n_off,
-            limits.is_latching,
-        )
+        _level_step(timer, time_ns, findings, change, margin, baseline, limits)
         for timer, change, margin in (
             (decision.alert, limits.alert_change, ALERT_MARGIN),
             (decision.danger, limits.danger_change, DANGER_MARGIN),
         )
     )
-    strongest = max(findings, key=lambda finding: finding.significance, default=None)
-    decision = replace(decision, finding=strongest, alert=alert, danger=danger)
+    decision = Decision(
+        finding=max(findings, key=lambda finding: finding.significance, default=None),
+        deviation=outcome.deviation,
+        deviation_std=_deviation_std(outcome, baseline),
+        evidence=evidence,
+        alert=alert,
+        danger=danger,
+        last_ns=time_ns,
+        last_counted_ns=time_ns,
+    )
     return replace(decision, verdict=_verdict(decision, baseline, limits))
 
 
-def _is_passed(finding: Finding, limit: float, margin: float, limits: ChangeLimits) -> bool:
-    """Whether a change is sure, and surely beyond the limit."""
-    significance, sure = finding.significance, limits.sure_from(finding.time_scale_h)
-    is_beyond = sure_size(finding.change, significance, margin) >= limit
-    return significance >= sure and bool(is_beyond)
+def _min_step_ns(baseline: QuantityBaseline) -> int:
+    """Time after one reading before the next one counts."""
+    return round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
+
+
+def _deviation_std(compared: Comparison, baseline: QuantityBaseline) -> float:
+    excess = max(compared.u_random**2 - baseline.u_random**2, 0.0)
+    return math.sqrt(compared.scatter**2 + excess + compared.offset_std**2)
+
+
+def _level_step(
+    timer: DelayTimer,
+    time_ns: int,
+    findings: list[Finding],
+    limit: float,
+    margin: float,
+    baseline: QuantityBaseline,
+    limits: ChangeLimits,
+) -> DelayTimer:
+    """Step of one level; delays are whole numbers of readings, at least one."""
+    if timer.is_on:
+        wanted = any(_is_held(finding, limit, limits) for finding in findings)
+    else:
+        wanted = any(_is_exceeded(finding, limit, margin, limits) for finding in findings)
+    reading_ns = round(baseline.reading_h * 3600.0 * NS_PER_S)
+    on_delay_ns, off_delay_ns = (
+        max(1, math.ceil(delay_h / baseline.reading_h - 1e-9)) * reading_ns
+        for delay_h in (limits.on_delay_h, limits.off_delay_h)
+    )
+    return timer.step(wanted, time_ns, on_delay_ns, off_delay_ns, reading_ns)
+
+
+def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLimits) -> bool:
+    """Whether a change is significant, and exceeds the limit by its margin."""
+    significance = finding.significance
+    threshold = limits.significance_threshold(finding.time_scale_h)
+    size = abs(finding.change) * (1.0 - margin / max(significance, 1e-9))
+    return significance >= threshold and size >= limit
 
 
 def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
-    """Whether it still is, with the deadband."""
-    sure = limits.sure_from(finding.time_scale_h) * limits.holding_share
-    return finding.significance > sure and abs(finding.change) > limit - limits.deadband
+    """Whether a change still exceeds its limit less the deadband."""
+    threshold = limits.significance_threshold(finding.time_scale_h) * limits.holding_share
+    return finding.significance > threshold and abs(finding.change) > limit - limits.deadband
 
 
 def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:
+    """Verdict on a reading that was compared with its baseline."""
+    if decision.level is not None:
+        return Verdict(int(decision.level))
     counted_h = decision.evidence.n_counted * baseline.reading_h
     is_enough = decision.finding is not None and counted_h >= limits.min_evidence_h
-    # what is beyond its limit, though not for long enough, is not normal either
-    return counted_verdict(decision.level, is_enough and not decision.alert.n_passed)
+    # a change beyond its limit is not normal even before its delay has passed
+    is_normal = is_enough and decision.alert.opposed_ns == 0
+    return Verdict.NORMAL if is_normal else Verdict.GATHERING_EVIDENCE

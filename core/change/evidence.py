@@ -1,32 +1,40 @@
-"""`GatheredEvidence`: what the mean deviation over each time scale says, reading by reading."""
+"""Evidence of a change: the mean deviation over each time scale, reading by reading."""
 
 import math
 from dataclasses import dataclass
+from statistics import median
 
 from core.baseline.baseline import QuantityBaseline, TimeScatter
-from core.baseline.grouping import NOTHING_NEW, Newest, forgetting, forgetting_step
+from core.baseline.grouping import MEDIAN_READINGS, ewma_step, ewma_weight
 
 
-@dataclass(frozen=True)
-class Counted:
-    """A reading that counts: the numbers of `Deviations`."""
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One reading compared with its baseline: a row of `Deviations`, and the reading's `u_random`.
+
+    Parameters
+    ----------
+    offset_std
+        Standard uncertainty that averaging does not take away.
+    """
 
     deviation: float
     weight: float
     scatter: float
     offset_std: float
+    u_random: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ScaleSums:
-    """Forgetting sums over one time scale.
+    """Exponentially weighted sums over one time scale.
 
     Parameters
     ----------
     fill
-        Of ones: how much of the time scale has been seen.
+        Of ones: the part of the time scale that has been seen.
     weight, deviation, scatter, offset
-        Of weights; weighted, of deviations, scatters of their cells, uncertainties that stay.
+        Of weights, and weighted sums of deviations, cell scatters and lasting uncertainties.
     """
 
     fill: float = 0.0
@@ -35,25 +43,34 @@ class ScaleSums:
     scatter: float = 0.0
     offset: float = 0.0
 
-    def step(self, counted: Counted, middle: float, forgotten: float) -> "ScaleSums":
-        """Take in one reading."""
+    def step(self, compared: Comparison, middle: float, alpha: float) -> "ScaleSums":
+        """Add one reading; `middle` is the running median of the deviations."""
+        weight = compared.weight
         return ScaleSums(
-            forgetting_step(self.fill, 1.0, forgotten),
-            forgetting_step(self.weight, counted.weight, forgotten),
-            forgetting_step(self.deviation, counted.weight * middle, forgotten),
-            forgetting_step(self.scatter, counted.weight * counted.scatter, forgotten),
-            forgetting_step(self.offset, counted.weight * counted.offset_std, forgotten),
+            ewma_step(self.fill, 1.0, alpha),
+            ewma_step(self.weight, weight, alpha),
+            ewma_step(self.deviation, weight * middle, alpha),
+            ewma_step(self.scatter, weight * compared.scatter, alpha),
+            ewma_step(self.offset, weight * compared.offset_std, alpha),
         )
 
+    def finding(self, time: TimeScatter) -> "Finding":
+        """Mean deviation over the time scale with its uncertainty."""
+        offset = self.offset / self.weight
+        # means over a half-filled time scale scatter further
+        own = time.share * (self.scatter / self.weight) / self.fill
+        std = math.sqrt(own * own + offset * offset)
+        return Finding(time.time_scale_h, self.deviation / self.weight, std)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Finding:
-    """A mean deviation.
+    """Mean deviation over a time scale.
 
     Parameters
     ----------
     change
-        ln of what is measured over what was learned.
+        ln of measured over learned.
     std
         Standard uncertainty of a healthy film's mean deviation.
     """
@@ -64,28 +81,31 @@ class Finding:
 
     @property
     def significance(self) -> float:
-        """Standard uncertainties away from no change."""
+        """Distance from no change, in standard uncertainties."""
         return abs(self.change) / self.std
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class GatheredEvidence:
-    """Deviations that have been counted so far.
+    """Deviations counted so far.
 
     Parameters
     ----------
     n_counted
-        How many.
+        Number of readings.
+    newest
+        The newest deviations, oldest first. Their median is averaged, so that single spikes do not
+        count.
     scales
         Sums over the time scales of the baseline.
     """
 
     n_counted: int = 0
-    newest: Newest = NOTHING_NEW
+    newest: tuple[float, ...] = ()
     scales: tuple[ScaleSums, ...] = ()
 
-    def step(self, counted: Counted, baseline: QuantityBaseline) -> "GatheredEvidence":
-        """Count one more deviation.
+    def step(self, compared: Comparison, baseline: QuantityBaseline) -> "GatheredEvidence":
+        """Add one reading.
 
         Raises
         ------
@@ -96,36 +116,24 @@ class GatheredEvidence:
         scales = self.scales or (ScaleSums(),) * len(times)
         if len(scales) != len(times):
             raise ValueError(f"evidence on {len(scales)} time scales, baseline on {len(times)}")
-        newest = self.newest.step(counted.deviation)
-        middle = newest.median
+        newest = (*self.newest, compared.deviation)[-MEDIAN_READINGS:]
+        middle = median(newest)
         return GatheredEvidence(
             self.n_counted + 1,
             newest,
             tuple(
-                sums.step(counted, middle, _forgotten(time, baseline))
+                sums.step(compared, middle, ewma_weight(time.time_scale_h, baseline.reading_h))
                 for sums, time in zip(scales, times, strict=True)
             ),
         )
 
-    def findings(self, baseline: QuantityBaseline) -> tuple[Finding, ...]:
-        """What the time scales say that have been seen in full."""
-        return tuple(
-            _finding(sums, time)
+    def findings(self, baseline: QuantityBaseline) -> list[Finding]:
+        """Mean deviations over the time scales that have been seen in full."""
+        return [
+            sums.finding(time)
             for sums, time in zip(self.scales, baseline.time_scatter, strict=True)
             if self.n_counted * baseline.reading_h >= time.time_scale_h
-        )
+        ]
 
 
-def _forgotten(time: TimeScatter, baseline: QuantityBaseline) -> float:
-    return forgetting(time.time_scale_h, baseline.reading_h)
-
-
-def _finding(sums: ScaleSums, time: TimeScatter) -> Finding:
-    offset = sums.offset / sums.weight
-    # half-filled means stray further
-    own = time.share * (sums.scatter / sums.weight) / sums.fill
-    std = math.sqrt(own * own + offset * offset)
-    return Finding(time.time_scale_h, sums.deviation / sums.weight, std)
-
-
-NOTHING_GATHERED = GatheredEvidence()
+NO_EVIDENCE = GatheredEvidence()

@@ -1,32 +1,133 @@
-"""`FilmJudge`: what the readings of a unit's films say, compared with their baselines."""
+"""`FilmJudge`: compares the readings of a unit's films with their baselines."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from core.baseline.baseline import BearingBaseline, Watched
-from core.baseline.response import Place, ShaftResponse
-from core.baseline.stiffness_history import DIRECTIONS
-from core.change.decision import UNDECIDED, Decision, advance
-from core.change.film_finding import FilmFinding, film_finding
-from core.change.film_memory import PlaceDecision
+import numpy as np
+
+from core.arrays import FloatArray
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
+from core.baseline.history import DIRECTIONS, Watched
+from core.change.cause import Attribution, Cause, UnitReadings, attribute
+from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, WatchedReadings, step
 from core.change.film_reading import FilmReading
-from core.change.film_rules import FilmRules
-from core.change.reading import WatchedReading
-from core.change.recent_readings import RecentReadings
+from core.change.settings import ChangeLimits, FilmRules
+from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 from core.condition.cells import FilmConditions
+from core.condition.operating_state import OilSettling, Operation
+from core.limits import AlarmLevel, Condition, unknown
+
+
+@dataclass(frozen=True)
+class FilmFinding:
+    """Verdict on a film in one direction after a reading, with its numbers; None where missing.
+
+    Parameters
+    ----------
+    level
+        Level that is held, whether or not this reading could be judged.
+    change, change_std, time_scale_h
+        Most significant mean deviation from the baseline, in ln; its standard uncertainty; running
+        hours that it is averaged over.
+    deviation, deviation_std
+        Deviation of this reading alone; None unless it was compared.
+    baseline_version
+        Version of the baseline.
+    attribution
+        Cause of the change, while a level is held.
+    """
+
+    verdict: Verdict
+    level: AlarmLevel | None = None
+    change: float | None = None
+    change_std: float | None = None
+    time_scale_h: float | None = None
+    deviation: float | None = None
+    deviation_std: float | None = None
+    baseline_version: int | None = None
+    attribution: Attribution | None = None
+
+
+ALARM_REASONS = {
+    Cause.FILM: "film_changed",
+    Cause.OIL: "all_films_changed",
+    Cause.BRACKET_OR_TRANSDUCER: "bracket_or_transducer_changed",
+    Cause.UNKNOWN: "changed_cause_unknown",
+}
+"""Reason of an alarm by cause."""
+
+
+def film_finding(decision: Decision, is_compared: bool, version: int | None) -> FilmFinding:
+    """Finding of a decision; `is_compared` if its newest reading was compared."""
+    finding = decision.finding
+    return FilmFinding(
+        verdict=decision.verdict,
+        level=decision.level,
+        change=finding.change if finding else None,
+        change_std=finding.std if finding else None,
+        time_scale_h=finding.time_scale_h if finding else None,
+        deviation=decision.deviation if is_compared else None,
+        deviation_std=decision.deviation_std if is_compared else None,
+        baseline_version=version,
+    )
+
+
+def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Condition:
+    """Condition of the film's alarm: a film that could not be judged has not returned to normal."""
+    if finding.verdict not in JUDGED:
+        return unknown(finding.verdict.name.lower())
+    limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
+    reason = "ok"
+    if finding.level is not None:
+        reason = ALARM_REASONS[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
+    return Condition(finding.level, value=finding.change, limit=limit, reason=reason)
+
+
+@dataclass(frozen=True)
+class FilmDecision:
+    """Decision on a bearing in a direction, with the version of its baseline."""
+
+    bearing: str
+    direction: str
+    version: int | None
+    decision: Decision
+
+
+@dataclass(frozen=True)
+class FilmMemory:
+    """State of `FilmWatch` that stored readings do not hold.
+
+    Parameters
+    ----------
+    oil
+        By bearing.
+    slot
+        Number of the newest interval that had its reading.
+    """
+
+    operation: Operation
+    oil: Mapping[str, OilSettling]
+    slot: int | None
+    decided: tuple[FilmDecision, ...]
 
 
 @dataclass(frozen=True)
 class FilmNews:
-    """A reading, what is said of it in each direction, and from where decisions go on."""
+    """A reading with its findings and decisions in x and y."""
 
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
     decisions: tuple[Decision, Decision]
 
 
+MAX_RECENT = 4 * MEAN_READINGS
+"""Moments whose readings are kept to find causes: some lack the deviation of a film."""
+
+
 class FilmJudge:
-    """Holds the baselines in force and the decisions so far.
+    """Active baselines and decisions so far of one unit.
 
     Parameters
     ----------
@@ -37,43 +138,47 @@ class FilmJudge:
     def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float]) -> None:
         self._rules = rules
         self._baselines: dict[str, BearingBaseline] = {}
-        self._decisions: dict[Place, Decision] = {}
+        self._decisions: dict[FilmDirection, Decision] = {}
         self._response: ShaftResponse | None = None
-        self._recent = RecentReadings({id_: brackets_n_per_m[id_] for id_ in rules.estimators})
+        self._films = [(bearing, d) for bearing in rules.estimators for d in DIRECTIONS]
+        self._brackets = np.array([brackets_n_per_m[bearing] for bearing, _ in self._films])
+        self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
 
     def baseline(self, bearing: str) -> BearingBaseline | None:
-        """What a bearing is compared with now."""
+        """Active baseline of a bearing."""
         return self._baselines.get(bearing)
 
-    def put_in_force(
+    def activate_baseline(
         self, bearing: str, baseline: BearingBaseline | None, decisions: Sequence[Decision] = ()
     ) -> None:
-        """Compare a bearing with another baseline from its next reading on.
+        """Compare a bearing with a baseline, or with none, from its next reading on.
 
         Parameters
         ----------
         decisions
-            Where its decisions go on, x and y; without them they begin again.
+            Decisions in x and y to continue from; by default the initial ones.
         """
         if baseline is None:
             self._baselines.pop(bearing, None)
         else:
             self._baselines[bearing] = baseline
-        for direction, decision in zip(DIRECTIONS, decisions or (UNDECIDED,) * 2, strict=True):
-            # of another clock, or of readings that were taken in before
+        for direction, decision in zip(
+            DIRECTIONS, decisions or (INITIAL_DECISION,) * 2, strict=True
+        ):
+            # they may come from another clock
             timeless = replace(decision, last_ns=None, last_counted_ns=None)
             self._decisions[bearing, direction] = timeless
 
     @property
-    def decided(self) -> tuple[PlaceDecision, ...]:
-        """All decisions so far, with what they were taken by."""
+    def decided(self) -> tuple[FilmDecision, ...]:
+        """All decisions with the versions of their baselines."""
         return tuple(
-            PlaceDecision(bearing, direction, self._version(bearing), decision)
+            FilmDecision(bearing, direction, self._version(bearing), decision)
             for (bearing, direction), decision in self._decisions.items()
         )
 
-    def resume(self, decided: Sequence[PlaceDecision]) -> None:
-        """Take decisions over that were taken by the same baselines."""
+    def restore(self, decided: Sequence[FilmDecision]) -> None:
+        """Continue from decisions of the baselines that are active."""
         for found in decided:
             if found.version == self._version(found.bearing):
                 self._decisions[found.bearing, found.direction] = found.decision
@@ -82,71 +187,94 @@ class FilmJudge:
         baseline = self._baselines.get(bearing)
         return baseline.origin.version if baseline else None
 
-    def answer_by(self, response: ShaftResponse | None) -> None:
-        """Put changes down to film or transducer by this response of the shaft."""
+    def set_response(self, response: ShaftResponse | None) -> None:
+        """Set the shaft response that causes are found with."""
         self._response = response
 
     def forget_times(self) -> None:
-        """Let what has been decided stand, and readings follow at any time."""
-        for place, decision in self._decisions.items():
-            self._decisions[place] = replace(decision, last_ns=None, last_counted_ns=None)
+        """Keep the decisions, and accept readings of any later time."""
+        for film, decision in self._decisions.items():
+            self._decisions[film] = replace(decision, last_ns=None, last_counted_ns=None)
 
-    @property
-    def recent(self) -> RecentReadings:
-        """The newest readings of all places, which tell what changed a film."""
-        return self._recent
+    def add_recent(self, columns: Iterable[FloatArray]) -> None:
+        """Add settled readings of earlier moments, (5, n_films) each, the fields of `UnitReadings`.
+
+        Causes are found with the newest of them.
+        """
+        self._recent.extend(columns)
 
     def judge(self, readings: Sequence[FilmReading]) -> list[FilmNews]:
-        """Say what readings of one moment mean, those of all bearings together."""
+        """Judge the readings of all bearings at one moment, and update the decisions."""
         found = {
             (reading.bearing, direction): self._decide(reading, direction)
             for reading in readings
             for direction in DIRECTIONS
         }
-        deviations = {place: finding.deviation for place, finding in found.items()}
-        self._recent.add(readings, deviations, dict(self._rises(readings)))
+        self._remember(readings, found)
         return [self._news(reading, found) for reading in readings]
 
-    def _rises(self, readings: Sequence[FilmReading]) -> Iterator[tuple[Place, float]]:
-        """Rise of the baseline with eccentricity at each place that has one."""
-        for reading in readings:
-            baseline = self._baselines.get(reading.bearing)
-            here = FilmConditions.one(
-                reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
-            )
-            for learned in baseline.quantities if baseline else ():
-                if learned.quantity is Watched.STIFFNESS:
-                    rise = float(learned.eccentricity_rise(here)[0])
-                    yield (reading.bearing, learned.direction), rise
+    def _remember(
+        self, readings: Sequence[FilmReading], found: Mapping[FilmDirection, FilmFinding]
+    ) -> None:
+        """Keep the readings of one moment if they are of every bearing and settled."""
+        rows: dict[FilmDirection, tuple[float, ...]] = {}
+        for reading in readings if all(r.condition.is_settled for r in readings) else ():
+            for direction, value in zip(DIRECTIONS, reading.values, strict=True):
+                film = (reading.bearing, direction)
+                learned, deviation = self._learned(*film), found[film].deviation
+                rows[film] = (
+                    value.ln_k,
+                    math.log(value.shaft_um_pk) if value.shaft_um_pk > 0.0 else np.nan,
+                    np.nan if deviation is None else deviation,
+                    learned.eccentricity_rise(_conditions(reading))[0] if learned else np.nan,
+                    reading.attitude_deg,
+                )
+        if set(rows) == set(self._films):
+            self._recent.append(np.array([rows[film] for film in self._films]).T)
 
-    def _news(self, reading: FilmReading, found: Mapping[Place, FilmFinding]) -> FilmNews:
-        places = [(reading.bearing, direction) for direction in DIRECTIONS]
-        x, y = (self._attributed(place, found[place]) for place in places)
-        decision_x, decision_y = (self._decisions[place] for place in places)
+    def _news(self, reading: FilmReading, found: Mapping[FilmDirection, FilmFinding]) -> FilmNews:
+        films = [(reading.bearing, direction) for direction in DIRECTIONS]
+        x, y = (
+            replace(found[film], attribution=self._attribution(film))
+            if found[film].level is not None
+            else found[film]
+            for film in films
+        )
+        decision_x, decision_y = (self._decisions[film] for film in films)
         return FilmNews(reading, (x, y), (decision_x, decision_y))
 
-    def _attributed(self, place: Place, finding: FilmFinding) -> FilmFinding:
-        if finding.level is None:
-            return finding
-        return replace(finding, attribution=self._recent.attribution(place, self._response))
+    def _attribution(self, film: FilmDirection) -> Attribution:
+        """Cause of a change of a film, from the newest readings that have its deviation."""
+        row = self._films.index(film)
+        newest = [column for column in self._recent if np.isfinite(column[2, row])]
+        columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]
+        readings = UnitReadings(*np.stack(columns, axis=-1))
+        return attribute(film, self._response, readings, self._brackets)
+
+    def _learned(self, bearing: str, direction: str) -> QuantityBaseline | None:
+        baseline = self._baselines.get(bearing)
+        return baseline.of(Watched.STIFFNESS, direction) if baseline else None
 
     def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
-        place = (reading.bearing, direction)
-        value = reading.values[DIRECTIONS.index(direction)]
-        watched = WatchedReading(
-            self._rules.lapsed_ns(reading.time_ns),
-            reading.condition.is_settled,
-            reading.eccentricity_ratio,
-            reading.oil_temperature_c,
-            reading.attitude_deg,
-            value.ln_k,
-            value.u_random,
-            value.evidence,
+        film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
+        watched = WatchedReadings(
+            np.array([self._rules.lapsed_ns(reading.time_ns)]),
+            np.array([reading.condition.is_settled]),
+            _conditions(reading),
+            np.array([value.ln_k]),
+            np.array([value.u_random]),
+            np.array([value.outcome]),
         )
-        baseline = self._baselines.get(reading.bearing)
-        learned = baseline.of(Watched.STIFFNESS, direction) if baseline else None
-        before = self._decisions.get(place, UNDECIDED)
-        decision = advance(before, watched, learned, self._rules.change)
-        self._decisions[place] = decision
-        is_compared = decision.last_counted_ns == watched.time_ns
-        return film_finding(decision, is_compared, baseline.origin.version if baseline else None)
+        learned = self._learned(*film)
+        decision = self._decisions.get(film, INITIAL_DECISION)
+        for time_ns, outcome in watched.compared(learned):
+            decision = step(decision, time_ns, outcome, learned, self._rules.change)
+        self._decisions[film] = decision
+        is_compared = decision.last_counted_ns == decision.last_ns
+        return film_finding(decision, is_compared, self._version(reading.bearing))
+
+
+def _conditions(reading: FilmReading) -> FilmConditions:
+    return FilmConditions.one(
+        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
+    )

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from core.baseline.stiffness_history import DIRECTIONS, Evidence
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
@@ -14,7 +14,7 @@ from core.stiffness.estimators import STIFFNESS_OF
 
 @dataclass(frozen=True)
 class FilmValue:
-    """What was read of a film in one direction; NaN where there is no number.
+    """Reading of a film in one direction; NaN where there is no number.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class FilmValue:
         Natural logarithm of the stiffness in N/m, and its random standard uncertainty.
     shaft_um_pk, bearing_um_pk
         1× amplitudes of shaft relative to bearing, and of bearing.
-    evidence, reason
+    outcome, reason
         Whether stiffness and condition were measured, and if not, why.
     """
 
@@ -30,7 +30,7 @@ class FilmValue:
     u_random: float
     shaft_um_pk: float
     bearing_um_pk: float
-    evidence: Evidence
+    outcome: ReadingOutcome
     reason: Reason
 
 
@@ -41,9 +41,9 @@ class FilmReading:
     Parameters
     ----------
     estimator
-        Where the stiffness comes from.
+        Estimator of the stiffness.
     values
-        In x and in y.
+        Readings in x and y.
     """
 
     unit: str
@@ -63,7 +63,7 @@ class FilmReading:
 def film_reading(
     assessment: Assessment, condition: BearingCondition, estimator: Estimator
 ) -> FilmReading:
-    """Read a film off an assessment; only numbers without any doubt are taken as numbers."""
+    """Film reading of an assessment; only readings of good quality become numbers."""
     readings = assessment.readings
     eccentricity = readings["eccentricity_ratio"]
     x, y = (_value(readings, estimator, direction) for direction in DIRECTIONS)
@@ -73,53 +73,52 @@ def film_reading(
         estimator=estimator,
         time_ns=assessment.time_ns,
         condition=condition,
-        speed_rpm=shown(readings["speed_rpm"]),
-        power_mw=shown(readings["power_mw"]),
-        eccentricity_ratio=sure(eccentricity),
+        speed_rpm=value_or_nan(readings["speed_rpm"]),
+        power_mw=value_or_nan(readings["power_mw"]),
+        eccentricity_ratio=good_or_nan(eccentricity),
         u_eccentricity=math.hypot(eccentricity.u_random or 0.0, eccentricity.u_systematic or 0.0),
-        attitude_deg=sure(readings["attitude_angle_deg"]),
-        oil_temperature_c=sure(readings["oil_temperature_c"]),
+        attitude_deg=good_or_nan(readings["attitude_angle_deg"]),
+        oil_temperature_c=good_or_nan(readings["oil_temperature_c"]),
         values=(x, y),
     )
 
 
-def shown(reading: Reading) -> float:
-    """Number of a reading, doubted or not."""
+def value_or_nan(reading: Reading) -> float:
+    """Value of a reading of any quality; NaN if missing."""
     return math.nan if reading.value is None else reading.value
 
 
-def sure(reading: Reading) -> float:
-    """Number of a reading that nothing casts doubt on."""
-    return shown(reading) if reading.quality.level is Level.GOOD else math.nan
+def good_or_nan(reading: Reading) -> float:
+    """Value of a reading of good quality; otherwise NaN."""
+    return value_or_nan(reading) if reading.quality.level is Level.GOOD else math.nan
 
 
 def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str) -> FilmValue:
     stiffness = readings[STIFFNESS_OF[estimator].format(axes=direction * 2)]
-    evidence, reason = _judged(stiffness, _condition_quality(readings))
-    is_measured = evidence is Evidence.MEASURED
-    k_n_per_m = sure(stiffness)
+    outcome, reason = _outcome(
+        stiffness,
+        worst(readings[key].quality for key in ("eccentricity_ratio", "oil_temperature_c")),
+    )
+    is_measured = outcome is ReadingOutcome.MEASURED
+    k_n_per_m = good_or_nan(stiffness)
     return FilmValue(
         ln_k=math.log(k_n_per_m) if is_measured else math.nan,
         u_random=(stiffness.u_random or 0.0) / k_n_per_m if is_measured else math.nan,
-        shaft_um_pk=shown(readings[f"order1_shaft_{direction}_um_pk"]),
-        bearing_um_pk=shown(readings[f"order1_bearing_{direction}_um_pk"]),
-        evidence=evidence,
+        shaft_um_pk=value_or_nan(readings[f"order1_shaft_{direction}_um_pk"]),
+        bearing_um_pk=value_or_nan(readings[f"order1_bearing_{direction}_um_pk"]),
+        outcome=outcome,
         reason=reason,
     )
 
 
-def _condition_quality(readings: Mapping[str, Reading]) -> Quality:
-    return worst(readings[name].quality for name in ("eccentricity_ratio", "oil_temperature_c"))
-
-
-def _judged(stiffness: Reading, condition: Quality) -> tuple[Evidence, Reason]:
-    """What a stiffness is worth: silence rather than a number that is doubted."""
+def _outcome(stiffness: Reading, condition: Quality) -> tuple[ReadingOutcome, Reason]:
+    """Outcome of a stiffness reading: no number rather than a doubtful one."""
     quality = stiffness.quality
     if quality.reason is Reason.INSUFFICIENT_EXCITATION:
-        return Evidence.INSUFFICIENT_EXCITATION, quality.reason
+        return ReadingOutcome.INSUFFICIENT_EXCITATION, quality.reason
     found = quality if quality.level is not Level.GOOD else condition
     if found.level is not Level.GOOD:
-        return Evidence.BAD_QUALITY, found.reason
-    if not sure(stiffness) > 0.0 or not (stiffness.u_random or 0.0) > 0.0:
-        return Evidence.BAD_QUALITY, Reason.OUT_OF_RANGE
-    return Evidence.MEASURED, GOOD.reason
+        return ReadingOutcome.BAD_QUALITY, found.reason
+    if not good_or_nan(stiffness) > 0.0 or not (stiffness.u_random or 0.0) > 0.0:
+        return ReadingOutcome.BAD_QUALITY, Reason.OUT_OF_RANGE
+    return ReadingOutcome.MEASURED, GOOD.reason

@@ -1,62 +1,59 @@
-"""`FilmWatch`: follows a unit's operation, and reads its films once in a while."""
+"""`FilmWatch`: follows the operation of a unit, and reads its films at regular intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
-from core.change.film_judge import FilmJudge, FilmNews
-from core.change.film_memory import FilmMemory
-from core.change.film_reading import FilmReading, film_reading, shown, sure
-from core.change.film_rules import FilmRules
+from core.change.film_judge import FilmJudge, FilmMemory, FilmNews
+from core.change.film_reading import FilmReading, film_reading, good_or_nan, value_or_nan
+from core.change.settings import FilmRules
 from core.condition.cells import BearingCondition, FilmConditions
-from core.condition.oil_settling import NOT_AT_SPEED, OilSettling
-from core.condition.operating_state import NEVER_SEEN, OperatingReading, Operation, advance
+from core.condition.operating_state import (
+    NOT_AT_SPEED,
+    UNKNOWN_OPERATION,
+    OilSettling,
+    Operation,
+    step_operation,
+)
 from core.monitor.assessment import Assessment
 
 
 class FilmWatch:
-    """The films of one unit as results come in.
-
-    Parameters
-    ----------
-    judge
-        Says what readings mean.
-    """
+    """Watch of the films of one unit, fed with its assessments."""
 
     def __init__(self, rules: FilmRules, judge: FilmJudge) -> None:
         self.judge = judge
         self._rules = rules
-        self._operation = NEVER_SEEN
+        self._operation = UNKNOWN_OPERATION
         self._oil: dict[str, OilSettling] = {}
         self._slot: int | None = None
 
     @property
     def operation(self) -> Operation:
-        """What the unit does now."""
+        """Operating state of the unit now."""
         return self._operation
-
-    def go_on(self, operation: Operation, oil: Mapping[str, OilSettling]) -> None:
-        """Go on from what the unit did, and how warm its bearings were, when it was seen last."""
-        self._operation, self._oil = operation, dict(oil)
 
     @property
     def memory(self) -> FilmMemory:
-        """What must be known, beside stored readings, to go on from here elsewhere."""
+        """State that another process needs, beside stored readings, to continue."""
         return FilmMemory(self._operation, dict(self._oil), self._slot, self.judge.decided)
 
-    def resume(self, memory: FilmMemory) -> None:
-        """Go on from where another one was; after `go_on` and `FilmJudge.put_in_force`."""
-        self.go_on(memory.operation, memory.oil)
+    def restore_operation(self, operation: Operation, oil: Mapping[str, OilSettling]) -> None:
+        """Continue from an operation, and from the settling of the oil by bearing."""
+        self._operation, self._oil = operation, dict(oil)
+
+    def restore(self, memory: FilmMemory) -> None:
+        """Continue where another process stopped; baselines must have been activated before."""
+        self.restore_operation(memory.operation, memory.oil)
         self._slot = memory.slot
-        self.judge.resume(memory.decided)
+        self.judge.restore(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
-        """Take in what has been found of the bearings.
+        """Update with the assessments of all bearings.
 
         Returns
         -------
-        The same with the condition that it was found under, and what is said of the films if it
-        was time for a reading.
+        The assessments with their conditions, and news of the films if a reading was due.
         """
         seen: list[Assessment] = []
         news: list[FilmNews] = []
@@ -73,24 +70,26 @@ class FilmWatch:
         now_ns, last_ns = self._rules.lapsed_ns(assessment.time_ns), self._operation.last_ns
         if last_ns is not None and now_ns <= last_ns:
             if last_ns - now_ns <= self._rules.operating.longest_gap_ns:
-                return  # the same once more, or a clock put back a little
-            self._start_again()
-        reading = OperatingReading(
-            now_ns, shown(readings["speed_rpm"]), shown(readings["power_mw"])
+                return  # the same assessment again, or a clock put back a little
+            self._restart()
+        speed_rpm, power_mw = (value_or_nan(readings[key]) for key in ("speed_rpm", "power_mw"))
+        self._operation = step_operation(
+            self._operation, now_ns, speed_rpm, power_mw, self._rules.operating
         )
-        self._operation = advance(self._operation, reading, self._rules.operating)
 
-    def _start_again(self) -> None:
-        """After a clock was put back: what was said stands, but times are new."""
-        self.go_on(NEVER_SEEN, {})
+    def _restart(self) -> None:
+        """Keep decisions but not times, after a clock was put back."""
+        self.restore_operation(UNKNOWN_OPERATION, {})
         self._slot = None
         self.judge.forget_times()
 
     def _condition(self, assessment: Assessment) -> BearingCondition:
         readings, limits = assessment.readings, self._rules.operating
-        oil_c = sure(readings["oil_temperature_c"])
+        oil_c = good_or_nan(readings["oil_temperature_c"])
         here = FilmConditions.one(
-            sure(readings["eccentricity_ratio"]), oil_c, sure(readings["attitude_angle_deg"])
+            good_or_nan(readings["eccentricity_ratio"]),
+            oil_c,
+            good_or_nan(readings["attitude_angle_deg"]),
         )
         grid = self._rules.grid
         cell = tuple(grid.cells(here)[:, 0].tolist()) if grid.is_known(here)[0] else None
@@ -100,7 +99,7 @@ class FilmWatch:
         return BearingCondition(self._operation.state, is_settled, cell)
 
     def _is_time(self, time_ns: int) -> bool:
-        """Whether a reading is due; not in the first interval, of which little may be known."""
+        """Whether a reading is due; not in the first interval, which may have begun before."""
         slot = time_ns // self._rules.reading_ns
         if self._slot is None or slot <= self._slot:
             self._slot = max(slot, self._slot or slot)

@@ -1,44 +1,42 @@
-"""How large, how sure and how lasting a change must be."""
+"""Limits of a change, and the rules that the films of a unit are watched by."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
-import numpy as np
-
-from core.arrays import FloatArray
+from core.condition.cells import CellGrid
+from core.condition.operating_state import OperatingLimits
+from core.machine.unit import Estimator
 
 REFERENCE_H = 4.0
-LEAST_SIGNIFICANCE = 3.0
-"""However long the time scale."""
+MIN_SIGNIFICANCE = 3.0
+"""Smallest significance that is required, however long the time scale."""
 
 ALERT_MARGIN, DANGER_MARGIN = 1.0, 3.0
-"""Standard uncertainties by which a change must be beyond its limit. A loss of 5 % must still be
-found within two weeks, where means are known to 0.7 %. What becomes a danger has long been an
-alert."""
+"""Standard uncertainties by which a change must exceed its limit. A loss of 5 % must still be
+found within two weeks, where means are known to 0.7 %. A danger was an alert long before."""
 
 
 @dataclass(frozen=True)
 class ChangeLimits:
-    """Limits of the change of a film, in ln (0.035 is 3.5 %), either way.
+    """Limits of the change of a film, in ln (0.035 is 3.5 %), in both directions.
 
     Parameters
     ----------
     alert_change, danger_change
-        Size that a change that is sure must surely exceed to be an alert, or danger.
+        Size that a significant change must exceed, less its margin, to be an alert or a danger.
     deadband
-        How far below its limit a change must fall for a level to be left; significance must fall by
-        the same share.
+        How far below its limit a change must fall for the level to be left; the required
+        significance falls by the same fraction.
     significance, significance_fall
-        Standard uncertainties that a mean deviation over four hours must be away from zero to be
-        sure, and by how much fewer are enough whenever the time is four times longer: long means
-        have fewer occasions to stray.
+        Required distance of a mean deviation over four hours from zero, in standard uncertainties,
+        and how much less is required for each time scale four times longer: longer means have
+        fewer occasions to stray.
     min_evidence_h
-        Running hours with a baseline before anything is called normal. A time scale counts from its
-        own length on.
+        Running hours with a baseline before a film is called normal. A time scale counts after its
+        own length.
     on_delay_h, off_delay_h
         Running hours without interruption before a level counts, or counts no longer.
-    is_latching
-        Whether a level stays until it is released.
 
     Raises
     ------
@@ -55,10 +53,9 @@ class ChangeLimits:
     min_evidence_h: float = 4.0
     on_delay_h: float = 1.0
     off_delay_h: float = 8.0
-    is_latching: bool = False
 
     def __post_init__(self) -> None:
-        for key in (field.name for field in fields(self) if field.name != "is_latching"):
+        for key in (field.name for field in fields(self)):
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{key} = {value:g} must be a number above 0")
@@ -74,25 +71,36 @@ class ChangeLimits:
 
     @property
     def holding_share(self) -> float:
-        """Share of the significance below which a level is left."""
+        """Fraction of the required significance below which a level is left."""
         return 1.0 - self.deadband / self.alert_change
 
-    def sure_from(self, time_scale_h: float) -> float:
-        """Significance from which a mean over a time scale is sure."""
+    def significance_threshold(self, time_scale_h: float) -> float:
+        """Significance that a mean deviation over a time scale must reach."""
         fall = self.significance_fall * math.log(time_scale_h / REFERENCE_H, 4.0)
-        return max(self.significance - fall, LEAST_SIGNIFICANCE)
+        return max(self.significance - fall, MIN_SIGNIFICANCE)
 
 
-def sure_size(
-    change: FloatArray | float, significance: FloatArray | float, margin: float
-) -> FloatArray:
-    """Size that a mean deviation surely has: by how much its uncertainty leaves it away from zero.
+@dataclass(frozen=True)
+class FilmRules:
+    """Rules that the films of one unit are watched by.
 
     Parameters
     ----------
-    significance
-        Standard uncertainties away from zero; nothing is sure of one that is not above zero.
-    margin
-        Standard uncertainties that it may be smaller by.
+    estimators
+        Estimator whose stiffness is watched, by bearing; other bearings are not watched.
+    reading_ns
+        Time from one reading to the next.
+    time_lapse
+        Speed of time for operation and decision; above 1 in demonstrations only.
     """
-    return np.asarray(np.abs(change) * (1.0 - margin / np.maximum(significance, 1e-9)))
+
+    estimators: Mapping[str, Estimator]
+    grid: CellGrid
+    operating: OperatingLimits
+    change: ChangeLimits
+    reading_ns: int
+    time_lapse: float = 1.0
+
+    def lapsed_ns(self, time_ns: int) -> int:
+        """Time as operation and decision count it."""
+        return time_ns if self.time_lapse == 1.0 else round(time_ns * self.time_lapse)

@@ -1,1 +1,1 @@
-"""Under which condition a machine runs: its operating state, and the cell that a film is in."""
+"""Operating condition of a machine: operating state, shaft position and the cell of each film."""

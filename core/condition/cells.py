@@ -13,7 +13,7 @@ from core.condition.operating_state import OperatingState
 
 @dataclass(frozen=True, eq=False)
 class FilmConditions:
-    """Conditions of n readings as columns; NaN where something is not known.
+    """Conditions of n readings as columns; NaN where unknown.
 
     Parameters
     ----------
@@ -41,9 +41,14 @@ class FilmConditions:
             self.attitude_deg[wanted],
         )
 
+    def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
+        """(n,) whether eccentricity, oil temperature and, if needed, attitude are numbers."""
+        known = np.isfinite(self.eccentricity_ratio) & np.isfinite(self.oil_temperature_c)
+        return known & np.isfinite(self.attitude_deg) if needs_attitude else known
+
 
 Cell: TypeAlias = tuple[int, ...]
-"""Bin numbers of eccentricity ratio, oil temperature and, where it counts, attitude angle."""
+"""Bin numbers of eccentricity ratio, oil temperature and, if the grid has it, attitude angle."""
 
 CellArray: TypeAlias = npt.NDArray[np.int64]
 """(n_axes, n) bin numbers."""
@@ -58,7 +63,7 @@ class CellGrid:
     eccentricity_width, temperature_width_c
         Of eccentricity ratio and oil temperature.
     attitude_width_deg
-        Of the attitude angle; must divide the full circle. None if it does not count.
+        Of the attitude angle; must divide the full circle. None if cells do not depend on it.
 
     Raises
     ------
@@ -81,11 +86,11 @@ class CellGrid:
 
     @property
     def has_attitude(self) -> bool:
-        """Whether the attitude angle counts."""
+        """Whether cells depend on the attitude angle."""
         return self.attitude_width_deg is not None
 
     def cells(self, conditions: FilmConditions) -> CellArray:
-        """Cell of each reading; only where `is_known`.
+        """Cell of each reading; valid only where `is_known`.
 
         Returns
         -------
@@ -101,9 +106,7 @@ class CellGrid:
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """(n,) whether a reading has everything that its cell depends on."""
-        known = np.isfinite(conditions.eccentricity_ratio)
-        known &= np.isfinite(conditions.oil_temperature_c)
-        return known & np.isfinite(conditions.attitude_deg) if self.has_attitude else known
+        return conditions.is_known(self.has_attitude)
 
     def centre(self, cell: Cell) -> tuple[float, ...]:
         """Eccentricity ratio, oil temperature and attitude angle in the middle of a cell."""
@@ -113,7 +116,7 @@ class CellGrid:
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Operating state, eccentricity, attitude and oil temperature; None where not known."""
+    """Operating state, eccentricity, attitude and oil temperature; None where unknown."""
 
     state: OperatingState = OperatingState.UNKNOWN
     eccentricity_ratio: float | None = None
@@ -122,22 +125,21 @@ class OperatingPoint:
 
 
 NOWHERE_KNOWN = OperatingPoint()
-"""Of which nothing is known."""
 
 
 @dataclass(frozen=True)
 class BearingCondition:
-    """What a bearing's stiffness is compared by.
+    """Condition that a bearing's stiffness is compared under.
 
     Parameters
     ----------
     state
-        What the unit does.
+        Operating state of the unit.
     is_settled
-        Whether it has done so for the settling time, after the warm-up: only then are films alike.
+        Whether the state has lasted for the settling time, after the warm-up. Only settled films
+        are comparable.
     cell
-        Bins of eccentricity ratio, oil temperature and, where it counts, attitude angle; None where
-        one of them is not known.
+        None where one of its quantities is unknown.
     """
 
     state: OperatingState

@@ -1,32 +1,39 @@
-"""The operating state of a unit, and how it follows from speed and power reading by reading."""
+"""Operating state of a unit, stepped reading by reading, and settling of its bearings' oil.
+
+After a start the oil warms and clearances close. How long that takes depends on the machine and on
+how long it stood still, so it is read from the oil: the oil has settled once its temperature has
+stayed within a band for some time. Later changes, by load or weather, do not unsettle it: the
+temperature is part of the condition that films are compared under.
+"""
 
 import math
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from functools import cached_property
 from typing import TypeAlias
 
 from core.units import ns_from_s
 
 Band: TypeAlias = tuple[float, float, float]
-"""Below the first a limit is no longer passed, from the third on it is; the second decides when
-nothing is known of before."""
+"""A limit with its hysteresis: no longer passed below the first value, passed from the third on;
+the second decides where the state before is unknown."""
 
 
 @dataclass(frozen=True)
 class OperatingLimits:
-    """Limits of operating states, as shares of rated speed and power.
+    """Limits of operating states, as fractions of rated speed and power.
 
     Parameters
     ----------
     standing_below, at_speed_above
-        Share of the rated speed below which a unit stands still, and above which it is at speed.
+        Fraction of the rated speed below which a unit stands still, and above which it is at speed.
     loaded_above, full_load_above
-        Share of the rated power above which it is at part load, and at full load.
+        Fraction of the rated power above which it is at part load, and at full load.
     speed_hysteresis, power_hysteresis
         How far beyond a limit, up or down, a reading must be for the limit to count as crossed.
     settling_s
         Time in one state before readings count as settled: they are averages over about five
-        minutes, and the shaft takes its place within minutes.
+        minutes, and the shaft reaches its position within minutes.
     oil_band_c, oil_settling_s
         Oil has settled after a start once its temperature has stayed within a band of this width
         for this time at speed. Clearances close for hours after a start, later than the oil warms
@@ -37,7 +44,7 @@ class OperatingLimits:
         Time at speed after which readings count even if the oil has not settled, as where the load
         follows the grid.
     longest_gap_s
-        Time without readings after which nothing is known of what the unit did.
+        Time without readings after which the state before no longer counts.
 
     Raises
     ------
@@ -75,38 +82,38 @@ class OperatingLimits:
                 f" other by more than their hysteresis of {hysteresis:g}"
             )
 
-    @property
+    @cached_property
     def settling_ns(self) -> int:
         """Settling time."""
         return ns_from_s(self.settling_s)
 
-    @property
+    @cached_property
     def oil_settling_ns(self) -> int:
-        """Time for which oil stays near one temperature once it has settled."""
+        """Time that the oil must stay within its band."""
         return ns_from_s(self.oil_settling_s)
 
-    @property
+    @cached_property
     def warm_up_ns(self) -> int:
         """Longest time at speed until readings count."""
         return ns_from_s(self.warm_up_s)
 
-    @property
+    @cached_property
     def longest_gap_ns(self) -> int:
         """Longest gap that is bridged."""
         return ns_from_s(self.longest_gap_s)
 
-    @property
+    @cached_property
     def speed_bands_rpm(self) -> tuple[Band, Band]:
-        """Around standing still and being at speed."""
+        """Limits of standing still and of being at speed."""
         h = self.speed_hysteresis
         return (
             _band(self.standing_below, h, self.rated_speed_rpm),
             _band(self.at_speed_above, h, self.rated_speed_rpm),
         )
 
-    @property
+    @cached_property
     def power_bands_mw(self) -> tuple[Band, Band]:
-        """Around part load and full load."""
+        """Limits of part load and full load."""
         h = self.power_hysteresis
         return (
             _band(self.loaded_above, h, self.rated_power_mw),
@@ -119,7 +126,7 @@ def _band(share: float, hysteresis: float, rated: float) -> Band:
 
 
 class OperatingState(IntEnum):
-    """What a unit does; as small numbers, so that years of it fit into a column."""
+    """Operating state of a unit, stored in one byte."""
 
     UNKNOWN = 0
     STANDSTILL = 1
@@ -140,17 +147,8 @@ UNDER_LOAD = (OperatingState.SPEED_NO_LOAD, OperatingState.PART_LOAD, OperatingS
 
 
 @dataclass(frozen=True)
-class OperatingReading:
-    """Speed and power at one moment; NaN where there is no number."""
-
-    time_ns: int
-    speed_rpm: float
-    power_mw: float
-
-
-@dataclass(frozen=True)
 class Operation:
-    """What a unit does, since when, and what must be remembered to go on from here.
+    """Operating state of a unit since when, with the memory that the next step needs.
 
     Parameters
     ----------
@@ -159,21 +157,22 @@ class Operation:
     last_ns
         Newest reading.
     speed_passed, power_passed
-        Which limits are passed, lower and upper; None where it is not known.
+        Whether the lower and the upper limit are passed; None where that is not known.
     was_at_speed
-        Whether it was at rated speed (or stood still) last, while it is between the two.
+        While the speed is between the two: whether the unit was last at rated speed (or stood
+        still).
     at_speed_from_ns, at_speed_to_ns
-        First and newest reading of the stretch at rated speed; None if it is not, or not known.
+        First and newest reading of the stretch at rated speed; None if the unit is not at speed.
     """
 
     state: OperatingState = OperatingState.UNKNOWN
     since_ns: int | None = None
     last_ns: int | None = None
+    at_speed_from_ns: int | None = None
+    at_speed_to_ns: int | None = None
     speed_passed: tuple[bool, bool] | None = None
     power_passed: tuple[bool, bool] | None = None
     was_at_speed: bool | None = None
-    at_speed_from_ns: int | None = None
-    at_speed_to_ns: int | None = None
 
     def is_steady(self, limits: OperatingLimits) -> bool:
         """Whether a steady state has lasted for the settling time."""
@@ -188,43 +187,75 @@ class Operation:
         return has_oil_settled or self.last_ns - self.at_speed_from_ns >= limits.warm_up_ns
 
 
-NEVER_SEEN = Operation()
+UNKNOWN_OPERATION = Operation()
 
 
-def advance(operation: Operation, reading: OperatingReading, limits: OperatingLimits) -> Operation:
-    """Take in one reading of speed and power.
+def step_operation(
+    operation: Operation, time_ns: int, speed_rpm: float, power_mw: float, limits: OperatingLimits
+) -> Operation:
+    """Update the operation with one reading of speed and power, NaN where there is no number.
 
-    A gap longer than `limits.longest_gap_s` ends everything that is remembered: what the machine
-    did meanwhile is not known.
+    A gap longer than `limits.longest_gap_s` resets the operation: what the machine did meanwhile is
+    not known.
 
     Raises
     ------
     ValueError
         If the reading is not later than the one before.
     """
-    if operation.last_ns is not None and reading.time_ns <= operation.last_ns:
-        raise ValueError(f"reading at {reading.time_ns} ns is not after {operation.last_ns} ns")
-    if (
-        operation.last_ns is not None
-        and reading.time_ns - operation.last_ns > limits.longest_gap_ns
-    ):
-        operation = NEVER_SEEN
-    speed = _passed(reading.speed_rpm, operation.speed_passed, limits.speed_bands_rpm)
-    power = _passed(reading.power_mw, operation.power_passed, limits.power_bands_mw)
-    was_at_speed = operation.was_at_speed if speed == BETWEEN else _extreme(speed)
+    operation = _bridged(operation, time_ns, limits)
+    speed = _passed(speed_rpm, operation.speed_passed, limits.speed_bands_rpm)
+    power = _passed(power_mw, operation.power_passed, limits.power_bands_mw)
+    was_at_speed = operation.was_at_speed if speed == BETWEEN else _is_at_speed(speed)
     state = _state(speed, power, was_at_speed)
-    lasts = state == operation.state and operation.since_ns is not None
-    at_speed_from_ns, at_speed_to_ns = _at_speed(operation, reading.time_ns, speed, limits)
     return Operation(
-        state=state,
-        since_ns=operation.since_ns if lasts else reading.time_ns,
-        last_ns=reading.time_ns,
+        state,
+        *_times(operation, time_ns, state, _is_at_speed(speed), limits),
         speed_passed=speed,
         power_passed=power,
         was_at_speed=was_at_speed,
-        at_speed_from_ns=at_speed_from_ns,
-        at_speed_to_ns=at_speed_to_ns,
     )
+
+
+def step_given_state(
+    operation: Operation, time_ns: int, state: OperatingState, limits: OperatingLimits
+) -> Operation:
+    """Update the operation with a state that a file of readings gives; raises as above."""
+    operation = _bridged(operation, time_ns, limits)
+    is_at_speed = None if state is OperatingState.UNKNOWN else state in STEADY
+    return Operation(state, *_times(operation, time_ns, state, is_at_speed, limits))
+
+
+def _bridged(operation: Operation, time_ns: int, limits: OperatingLimits) -> Operation:
+    """The operation before a reading; the initial one after a gap."""
+    last_ns = operation.last_ns
+    if last_ns is None:
+        return operation
+    if time_ns <= last_ns:
+        raise ValueError(f"reading at {time_ns} ns is not after {last_ns} ns")
+    return UNKNOWN_OPERATION if time_ns - last_ns > limits.longest_gap_ns else operation
+
+
+def _times(
+    operation: Operation,
+    now_ns: int,
+    state: OperatingState,
+    is_at_speed: bool | None,
+    limits: OperatingLimits,
+) -> tuple[int, int, int | None, int | None]:
+    """`since_ns`, `last_ns`, `at_speed_from_ns`, `at_speed_to_ns` after a reading.
+
+    A few readings without a speed do not end the stretch at rated speed.
+    """
+    lasts = state == operation.state and operation.since_ns is not None
+    since_ns = operation.since_ns if lasts and operation.since_ns is not None else now_ns
+    from_ns, to_ns = operation.at_speed_from_ns, operation.at_speed_to_ns
+    if is_at_speed is None:
+        return since_ns, now_ns, from_ns, to_ns
+    if not is_at_speed:
+        return since_ns, now_ns, None, None
+    lasts = to_ns is not None and now_ns - to_ns <= limits.longest_gap_ns
+    return since_ns, now_ns, (from_ns if lasts else now_ns), now_ns
 
 
 BETWEEN = (True, False)
@@ -234,7 +265,7 @@ BETWEEN = (True, False)
 def _passed(
     value: float,
     before: tuple[bool, bool] | None,
-    bands: tuple[tuple[float, float, float], tuple[float, float, float]],
+    bands: tuple[Band, Band],
 ) -> tuple[bool, bool] | None:
     """Which of two limits are passed, each with its hysteresis."""
     if math.isnan(value):
@@ -246,23 +277,7 @@ def _passed(
     return lower, upper
 
 
-def _at_speed(
-    operation: Operation,
-    now_ns: int,
-    speed: tuple[bool, bool] | None,
-    limits: OperatingLimits,
-) -> tuple[int | None, int | None]:
-    """First and newest reading at speed; a few readings without a speed do not end the stretch."""
-    from_ns, to_ns = operation.at_speed_from_ns, operation.at_speed_to_ns
-    if speed is None:
-        return from_ns, to_ns
-    if not speed[1]:
-        return None, None
-    lasts = to_ns is not None and now_ns - to_ns <= limits.longest_gap_ns
-    return (from_ns if lasts else now_ns), now_ns
-
-
-def _extreme(speed: tuple[bool, bool] | None) -> bool | None:
+def _is_at_speed(speed: tuple[bool, bool] | None) -> bool | None:
     return None if speed is None else speed[1]
 
 
@@ -276,3 +291,56 @@ def _state(
     if not speed[0]:
         return OperatingState.STANDSTILL
     return OperatingState.UNKNOWN if power is None else UNDER_LOAD[sum(power)]
+
+
+OIL_LEVELS = 8
+"""Temperatures that are kept over the settling time."""
+
+
+@dataclass(frozen=True)
+class OilSettling:
+    """Settling of the oil of a bearing in one stretch at rated speed.
+
+    Parameters
+    ----------
+    stretch_ns
+        First reading at speed; None while the unit is not at speed.
+    levels
+        Times in ns and temperatures in °C over the settling time, oldest first.
+    has_settled
+        Whether the temperatures lay within the band.
+    """
+
+    stretch_ns: int | None = None
+    levels: tuple[tuple[int, float], ...] = ()
+    has_settled: bool = False
+
+    def step(
+        self, operation: Operation, oil_temperature_c: float, limits: OperatingLimits
+    ) -> "OilSettling":
+        """Update with one temperature (NaN if missing), after that reading's operation step."""
+        now_ns = operation.last_ns
+        if now_ns is None or operation.at_speed_from_ns is None:
+            return NOT_AT_SPEED
+        if operation.at_speed_to_ns != now_ns:
+            return self  # the speed is not known now
+        settling = self
+        if operation.at_speed_from_ns != self.stretch_ns:
+            settling = OilSettling(operation.at_speed_from_ns)
+        return settling._add(now_ns, oil_temperature_c, limits)
+
+    def _add(self, now_ns: int, oil_c: float, limits: OperatingLimits) -> "OilSettling":
+        if self.has_settled or math.isnan(oil_c):
+            return self
+        levels, span_ns = self.levels, limits.oil_settling_ns
+        if not levels or now_ns - levels[-1][0] >= span_ns // OIL_LEVELS:
+            levels = (*levels, (now_ns, oil_c))
+        while len(levels) > 1 and now_ns - levels[1][0] >= span_ns:
+            levels = levels[1:]
+        seen_c = (oil_c, *(level_c for _, level_c in levels))
+        is_near = max(seen_c) - min(seen_c) <= limits.oil_band_c
+        has_settled = is_near and now_ns - levels[0][0] >= span_ns
+        return OilSettling(self.stretch_ns, levels, has_settled)
+
+
+NOT_AT_SPEED = OilSettling()

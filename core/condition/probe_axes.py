@@ -1,7 +1,7 @@
-"""Two axes of shaft probes, one or two probes each: displacement told from thermal growth.
+"""Two axes of shaft probes, one or two probes each: displacement separated from thermal growth.
 
-A gap that differs from its reference by d holds the shaft's displacement u and what shaft and
-housing grew together, g: d_near = g − u on the positive axis, d_far = g + u across the shaft.
+The change d of a gap from its reference holds the shaft's displacement u and the thermal growth g
+of shaft and housing: d_near = g − u on the positive axis, d_far = g + u across the shaft.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from core.quality import Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
 NEAR_X, FAR_X, NEAR_Y, FAR_Y, GROWTH, ASYMMETRY = range(6)
-"""What a displacement is made of, in order; all are lengths in µm."""
+"""Sources of a displacement, in order; all are lengths in µm."""
 
 NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth", "uneven growth")
 
@@ -27,8 +27,8 @@ class ProbeAxis:
     Parameters
     ----------
     near, far
-        Mean gaps in µm of the probe on the positive axis and of the one across the shaft; `far` is
-        none where there is no such probe.
+        Mean gaps in µm of the probe on the positive axis and of the opposite probe, None if there
+        is no opposite probe.
     """
 
     near: Reading
@@ -43,7 +43,7 @@ class ProbeAxis:
 
     @property
     def changes_um(self) -> tuple[float, float]:
-        """What the gaps differ from their references; zero where not known."""
+        """Changes of the gaps from their references; zero where unknown."""
         near, far = self.near.value, self.far.value if self.far is not None else None
         return (
             0.0 if near is None else near - self.near_reference_um,
@@ -52,7 +52,7 @@ class ProbeAxis:
 
     @property
     def quality(self) -> Quality:
-        """Of a displacement from these gaps; one that lost one of its two probes is uncertain."""
+        """Quality of a displacement from these gaps; uncertain if one of two probes is lost."""
         if self.far is None:
             return self.near.quality
         if self.near.value is None and self.far.value is None:
@@ -65,12 +65,12 @@ class ProbeAxis:
 
 @dataclass(frozen=True)
 class Growth:
-    """By how much all gaps of a bearing have widened, when it was last measured with four probes.
+    """Thermal growth of all gaps of a bearing, as last measured with opposite probes.
 
     Parameters
     ----------
     half_width_um
-        Limits of what it may have been.
+        Limits of its error.
     """
 
     value_um: float
@@ -78,14 +78,14 @@ class Growth:
 
 
 class ProbeAxes:
-    """Displacement along both axes, as sums over everything that is known or limited.
+    """Displacement along both axes, as weighted sums over all sources.
 
     Attributes
     ----------
     values_um
         (6,) gap changes, external growth and its asymmetry.
     weights
-        (2, 6) share of each in the displacement along x and y; zero where it is not known.
+        (2, 6) weight of each in the displacement along x and y; zero where it is unknown.
     """
 
     def __init__(
@@ -100,11 +100,11 @@ class ProbeAxes:
 
     @property
     def growth_quality(self) -> Quality:
-        """Of the growth that is measured now."""
+        """Quality of the growth measured now."""
         return worst(axis.quality for axis in self._axes if axis.has_both)
 
     def growth_budget(self) -> Budget | None:
-        """Growth as four probes, or the two of one axis, measure it now; None if none can."""
+        """Growth measured now by opposite probes of one or both axes; None without them."""
         both = [axis for axis in (0, 1) if self._axes[axis].has_both]
         if not both:
             return None
@@ -154,7 +154,7 @@ class ProbeAxes:
         return np.zeros(len(NAMES))
 
     def _growth_of(self, axis: int) -> FloatArray:
-        """Growth along an axis that cannot tell it itself: the other's now, else the last known."""
+        """Growth along an axis without opposite probes: the other's now, else the last known."""
         if self._axes[1 - axis].has_both:
             return self._own_growth(1 - axis) + _unit(ASYMMETRY)
         return _unit(GROWTH) + axis * _unit(ASYMMETRY)

@@ -1,4 +1,4 @@
-"""Where the shaft runs in its bearing: centre, eccentricity ratio and attitude angle from gaps."""
+"""Shaft centre, eccentricity ratio and attitude angle in a bearing, from gaps."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from core.uncertainty import Budget, systematic_line
 CLEARANCE = "clearance"
 
 HALF_CIRCLE_DEG = 180.0
-"""Half-width of an angle of which nothing is known."""
+"""Half-width of an unknown angle."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,7 @@ class ShaftCentre:
     attitude_angle_deg
         Direction of the displacement, from the positive x axis towards the positive y axis.
     gap_growth_um
-        What all gaps have widened since their references were read; only an axis with two probes
-        tells it.
+        Widening of all gaps since their references were read; measured by opposite probes only.
     budgets
         Of position and eccentricity ratio, under the names of the fields.
     """
@@ -45,29 +44,6 @@ class ShaftCentre:
     budgets: Mapping[str, Budget] = field(default_factory=dict)
 
 
-def shaft_centre(
-    gap_um: tuple[Reading, Reading], reference_um: tuple[float, float], clearance_um: float
-) -> ShaftCentre:
-    """Locate the shaft from two probes on the positive axes, whose gaps shrink as it approaches.
-
-    Parameters
-    ----------
-    gap_um
-        Mean gaps (x, y).
-    reference_um
-        The gaps with the shaft centred.
-    clearance_um
-        Radial clearance; must be positive.
-
-    Raises
-    ------
-    ValueError
-        If the clearance is not positive.
-    """
-    x, y = (ProbeAxis(gap, near) for gap, near in zip(gap_um, reference_um, strict=True))
-    return locate_shaft(x, y, clearance_um)
-
-
 def locate_shaft(
     x: ProbeAxis,
     y: ProbeAxis,
@@ -77,16 +53,16 @@ def locate_shaft(
 ) -> ShaftCentre:
     """Locate the shaft from one or two probes on each axis, with uncertainty.
 
-    An axis that has or keeps one probe only cannot tell the shaft's displacement from thermal
-    growth. It takes the growth that the other axis measures now, else `last_growth`, else none, and
-    says by how much that may be wrong.
+    An axis with one probe cannot separate the shaft's displacement from thermal growth. It takes
+    the growth that the other axis measures now, else `last_growth`, else none, with the
+    corresponding uncertainty.
 
     Parameters
     ----------
     clearance_um
         Radial clearance; must be positive.
     accuracy
-        Limits of everything that is not exact; by default those of :class:`GapAccuracy`.
+        Limits of error; by default those of :class:`GapAccuracy`.
     last_growth
         Growth when it was last measured.
 
@@ -147,7 +123,7 @@ def _not_below_zero(reading: Reading) -> Reading:
 
 
 def _angle(axes: ProbeAxes, outward: FloatArray, radius_um: float, angle_deg: float) -> Budget:
-    """Angle with the uncertainty of the motion across it; near the centre any angle may be true."""
+    """Angle with the uncertainty of the motion across it; unknown near the centre."""
     across = np.array([-outward[1], outward[0]]) @ axes.weights
     along_um = Budget(angle_deg, axes.lines(across)).combined
     if math.degrees(along_um) >= HALF_CIRCLE_DEG / math.sqrt(3.0) * radius_um:

@@ -1,4 +1,4 @@
-"""Where the shaft ran during the averaged segments, from the gaps of two or four probes."""
+"""Shaft position over the averaged segments, from the gaps of two or four probes, as readings."""
 
 from collections.abc import Mapping, Sequence
 
@@ -56,7 +56,7 @@ def position_results(
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
-    """Thermal growth for later, when it can no longer be measured."""
+    """Measured thermal growth, to be used once it can no longer be measured."""
     growth = readings["gap_growth_um"]
     if growth.value is None or growth.interval_95 is None:
         return None
@@ -64,7 +64,7 @@ def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
 
 
 def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
-    """Slow channel of the quantities that a bearing has from one."""
+    """Slow channel of each quantity of a bearing that is measured by one."""
     return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
 
 
@@ -73,7 +73,7 @@ def slow_results(
 ) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
     """Means of slow channels over the segments, by quantity, with their scatter.
 
-    How well the plant's own transmitters are calibrated is not known here.
+    The calibration uncertainty of the plant's transmitters is unknown here.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def slow_results(
 def probe_axis(
     bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
 ) -> ProbeAxis:
-    """The probes of an axis (0 is x) with their references.
+    """Probes of an axis (0 is x) with their references.
 
     Parameters
     ----------
     near, far
-        Mean gaps (x, y), µm; of the probes on the positive axes, and of those across the shaft.
+        Mean gaps (x, y), µm, of the probes on the positive axes and of the opposite probes.
     """
     has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
     if not has_far or bearing.opposite_reference_um is None:
@@ -117,7 +117,7 @@ def _mean_slow(segments: Sequence[Segment], channel: str | None) -> tuple[Readin
 def _gap(
     unit: Unit, segments: Sequence[Segment], channel: str | None, slow_channel: str | None
 ) -> tuple[Reading, FloatArray]:
-    """Mean gap, µm, by the slow channel or a DC-coupled probe, and what it is the mean of."""
+    """Mean gap, µm, of the slow channel or a DC-coupled probe, and the values it is the mean of."""
     if slow_channel is not None:
         gap_mm, values_mm = _mean_slow(segments, slow_channel)
         if gap_mm.value is None:

@@ -11,7 +11,7 @@ from core.alarms.event import AlarmNews
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.statistics import SHOWN_NS
 from core.alarms.unit_alarms import UnitAlarms
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from core.samples.blocks import SampleBlock
 from service.alarms.engine import NO_MEMORIES, AlarmEngine
 from service.alarms.gone_alarms import is_shared

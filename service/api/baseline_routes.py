@@ -6,7 +6,6 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Response
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.exchange import BASELINE, FORMAT_VERSION, to_json
 from service.api.access.actors import actor_or
 from service.api.access.declared import needs
 from service.api.baseline_models import (
@@ -39,6 +38,7 @@ from service.films.actions import (
 from service.films.progress import learning_progress
 from service.films.versions import versions_after
 from service.security.roles import Permission
+from service.store.documents import BASELINE, FORMAT_VERSION, to_json
 
 Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]
 

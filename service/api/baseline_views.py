@@ -4,8 +4,9 @@ from dataclasses import asdict
 
 import numpy as np
 
-from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
+from core.baseline.history import Watched
 from core.condition.cells import CellGrid
 from core.machine.unit import Estimator
 from service.api.baseline_models import (

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.stiffness_history import CodeArray, Evidence
-from core.change.verdict import Verdict
+from core.baseline.history import CodeArray, ReadingOutcome
+from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
 from service.api.film_conditions import STATE_NAMES
@@ -18,7 +18,7 @@ from service.store.film_port import FilmHistory, FilmQuery
 
 Rows = npt.NDArray[np.int64]
 
-EVIDENCE_NAMES = {code: cast("EvidenceName", code.name.lower()) for code in Evidence}
+EVIDENCE_NAMES = {code: cast("EvidenceName", code.name.lower()) for code in ReadingOutcome}
 
 
 def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
@@ -75,7 +75,7 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
         u_random_n_per_m=listed(stiffness * column(history.u_random)),
         shaft_um_pk=listed(column(history.shaft_um_pk)),
         bearing_um_pk=listed(column(history.bearing_um_pk)),
-        evidence=[EVIDENCE_NAMES[Evidence(code)] for code in column(history.evidence)],
+        evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
         verdict=[verdict_name(Verdict(code)) for code in column(found.verdict)],
         level=_levels(column(found.level)),
         change_percent=listed(100.0 * np.expm1(column(found.change))),

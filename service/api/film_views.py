@@ -4,14 +4,12 @@ import math
 from dataclasses import dataclass
 from typing import cast
 
-from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
-from core.baseline.stiffness_history import DIRECTIONS
-from core.change.decision import Decision
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
+from core.baseline.history import DIRECTIONS, Watched
+from core.change.decision import Decision, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
-from core.change.film_rules import FilmRules
-from core.change.verdict import Verdict
+from core.change.settings import FilmRules
 from core.condition.cells import FilmConditions
 from service.api.context import Context
 from service.api.film_conditions import condition_model
@@ -224,7 +222,7 @@ def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmC
         ln_std=std,
         time_scale_h=time_scale_h,
         significance=abs(change) / std,
-        significance_wanted=rules.change.sure_from(time_scale_h),
+        significance_wanted=rules.change.significance_threshold(time_scale_h),
         as_of=None if counted_ns is None else rfc3339(round(counted_ns / rules.time_lapse)),
     )
 

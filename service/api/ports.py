@@ -9,7 +9,7 @@ from core.alarms.statistics import ChatterRule
 from core.alarms.vector_change import VectorReference
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from core.quality import Reason
 from core.samples.blocks import SampleBlock

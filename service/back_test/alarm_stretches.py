@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.change.back_test import DecisionHistory
+from core.change.backtest import DecisionHistory
 from core.limits import AlarmLevel
 
 

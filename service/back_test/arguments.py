@@ -3,8 +3,8 @@
 import re
 from datetime import UTC, datetime, timedelta
 
-from service.back_test.coded import IDENTIFIER
 from service.back_test.periods import MachineEvent
+from service.back_test.reading import IDENTIFIER
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _EVENT = re.compile(

@@ -6,18 +6,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
-from core.baseline.far_readings import far_readings
-from core.baseline.history_rows import BearingRows, Place
+from core.baseline.agreement import far_readings
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.change.back_test import DecisionHistory, back_test
-from core.change.operation_history import OperationHistory, operation_history, operation_of_states
+from core.change.backtest import (
+    DecisionHistory,
+    OperationHistory,
+    decide_all,
+    operation_history,
+    operation_of_states,
+)
+from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
-from core.change.verdict import OF_EVIDENCE, Verdict
 from core.condition.operating_state import OperatingLimits
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import Learning, MachineEvent, Period, periods_of
 from service.films.learning import drifted
 
@@ -138,7 +143,9 @@ def _run(
     later, settled = history.rows(learned, end), is_settled[learned:end]
     run = PeriodRun(period, baseline, {}, doubt or "", far or "")
     decided = {
-        direction: _decided(later, settled, run.stiffness(direction), direction, rules.change)
+        direction: decide_all(
+            WatchedReadings.of(later, settled, direction), run.stiffness(direction), rules.change
+        )
         for direction in DIRECTIONS
     }
     return replace(run, decided=decided)
@@ -154,21 +161,3 @@ def _origin(place: Place, period: Period, rules: BackTestRules) -> Origin:
     return Origin(
         *place, rules.estimator, period.version, rules.author, rules.created_ns, period.event
     )
-
-
-def _decided(
-    history: StiffnessHistory,
-    is_settled: _Bools,
-    baseline: QuantityBaseline | None,
-    direction: str,
-    limits: ChangeLimits,
-) -> DecisionHistory:
-    if baseline is not None:
-        return back_test(history, is_settled, baseline, limits)
-    evidence = history.evidence[DIRECTIONS.index(direction)]
-    verdict = np.full(len(history), Verdict.NO_BASELINE, np.int8)
-    for said, unusable in OF_EVIDENCE.items():
-        verdict[evidence == said] = unusable
-    verdict[~is_settled] = Verdict.TRANSIENT
-    nothing = np.full(len(history), np.nan)
-    return DecisionHistory(verdict, np.zeros_like(verdict), nothing, nothing, nothing)

@@ -7,16 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.baseline.baseline import Watched
-from core.baseline.response import (
-    MEAN_READINGS,
-    ShaftResponse,
-    learn_response,
-    place_columns,
-)
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.baseline.watched import watched_values
-from core.change.attribution import Attribution, Cause, PlaceReadings, attribute
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
+from core.change.cause import Attribution, Cause, UnitReadings, attribute
+from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 from service.back_test.bearing_run import BackTestRules, BearingRun
 from service.back_test.periods import Period, periods_of
 
@@ -48,7 +41,7 @@ class UnitCauses:
         events = [event for event in rules.events if event.unit == unit]
         self._periods = periods_of(self._time_ns, events, rules.learning)
         self.responses = [self._learned(period) for period in self._periods]
-        self._columns: PlaceReadings | None = None
+        self._columns: UnitReadings | None = None
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
         """Cause of an alarm, judged with readings up to a time."""
@@ -83,7 +76,7 @@ class UnitCauses:
         pairs = zip(self._runs, self._rows, strict=True)
         return [run.operation.is_settled[rows] for run, rows in pairs]
 
-    def _readings(self) -> PlaceReadings:
+    def _readings(self) -> UnitReadings:
         if self._columns is None:
             compared = [
                 [column[rows] for column in _compared_places(run, direction)]
@@ -92,8 +85,8 @@ class UnitCauses:
             ]
             deviation, rise = (np.stack(columns) for columns in zip(*compared, strict=True))
             attitude = [h.attitude_deg for h in self._histories.values() for _ in DIRECTIONS]
-            columns = (*place_columns(self._histories), deviation, rise, np.stack(attitude))
-            self._columns = PlaceReadings(*columns)
+            columns = (*film_columns(self._histories), deviation, rise, np.stack(attitude))
+            self._columns = UnitReadings(*columns)
         return self._columns
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from core.baseline.history_rows.problems import RowProblems
 from service.back_test.file_columns import LINE, TIME, TIME_NS, ReadingsError, schema_of
+from service.back_test.problems import RowProblems
 
 _UTC = pa.timestamp("ns", tz="UTC")
 _NO_TIME = "not a time of ISO 8601 with an offset from UTC, like 2026-03-01T08:00:00Z:"
@@ -92,7 +92,7 @@ def _cast(
         found = pc.cast(column, kind)
     except pa.ArrowInvalid:
         fits = [_fits(column.slice(row, 1), kind) for row in range(len(column))]
-        problems.add_values(~np.array(fits), text, lambda row: _said(column[row]))
+        problems.add(~np.array(fits), text, lambda row: _said(column[row]))
         found = pa.nulls(len(column), kind)
     return found.fill_null(np.nan if pa.types.is_floating(kind) else 0)
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from core.baseline.exchange import response_to_json, to_json
 from service.back_test.running import Found
+from service.store.documents import to_json
 
 
 def export_baselines(found: Found, folder: Path) -> int:
@@ -27,4 +27,4 @@ def _files(found: Found) -> Iterator[tuple[str, str]]:
         of = baseline.origin
         yield f"{of.unit}-{of.bearing}-v{of.version}.json", to_json(baseline)
     for unit, number, response in found.responses:
-        yield f"{unit}-shaft-response-v{number}.json", response_to_json(response)
+        yield f"{unit}-shaft-response-v{number}.json", to_json(response)

@@ -1,17 +1,32 @@
-"""Which columns a file of readings has, and in which shape they are handed on."""
+"""Columns of a file of readings, and the schema that the reading process sends them in."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pyarrow as pa
 
-from core.baseline.history_rows.columns import KNOWN, NAMES, NUMBERS, OPTIONAL_NAMES, REQUIRED
-from core.baseline.history_rows.problems import shown
+from service.back_test.problems import shown
 
 TIME, TIME_NS, LINE = "time", "time_ns", "line"
+NAMES, OPTIONAL_NAMES = ("unit", "bearing", "direction", "quality"), ("state", "reason")
+STIFFNESS = ("k_n_per_m", "u_random")
+PER_BEARING = (
+    *("eccentricity_ratio", "oil_temperature_c", "speed_rpm", "power_mw"),
+    *("u_eccentricity", "attitude_deg"),
+)
+"""Columns that are the same for both directions."""
+
+AMPLITUDES = ("shaft_um_pk", "bearing_um_pk")
+NUMBERS = (*STIFFNESS, *PER_BEARING, *AMPLITUDES)
+REQUIRED = (*NAMES, *STIFFNESS, "eccentricity_ratio", "oil_temperature_c")
+"""Columns that a file must have beside the time; missing numbers of the others are NaN."""
+
 TEXTS = (*NAMES, *OPTIONAL_NAMES)
-HEADINGS = (TIME, *(key for key in (*NAMES, *NUMBERS, *OPTIONAL_NAMES) if key in KNOWN))
+HEADINGS = (TIME, *NAMES, *NUMBERS, *OPTIONAL_NAMES)
 """In the order in which padwatch writes them."""
+
+SILENT = "insufficient_excitation"
+"""Quality, or reason, of a reading without enough motion to measure stiffness."""
 
 MAX_COLUMNS = 100
 MAX_ROWS = 40_000_000
@@ -23,7 +38,7 @@ class ReadingsError(Exception):
 
 
 def check_headings(headings: Sequence[str]) -> None:
-    """Refuse headings that are missing, unknown or there twice.
+    """Refuse headings that are missing, unknown or repeated.
 
     Raises
     ------
@@ -38,19 +53,19 @@ def check_headings(headings: Sequence[str]) -> None:
 
 
 def schema_of(headings: Sequence[str]) -> Any:
-    """What a file with these headings is handed on as."""
+    """Schema of the rows of a file with these headings."""
     texts = [(key, pa.string()) for key in TEXTS if key in headings]
     numbers = [(key, pa.float64()) for key in NUMBERS if key in headings]
     return pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
 
 
 def _problems(headings: Sequence[str]) -> Iterator[str]:
-    missing = [key for key in REQUIRED if key not in headings and key != TIME_NS]
+    missing = [key for key in REQUIRED if key not in headings]
     if TIME not in headings and TIME_NS not in headings:
         missing.insert(0, f"{TIME} or {TIME_NS}")
     if missing:
         yield f"missing columns: {', '.join(missing)}"
-    unknown = [heading for heading in headings if heading not in (TIME, *KNOWN)]
+    unknown = [heading for heading in headings if heading not in (TIME_NS, *HEADINGS)]
     if unknown:
         yield f"unknown columns: {_listed(unknown)}; known are {TIME_NS}, {', '.join(HEADINGS)}"
     twice = sorted({heading for heading in headings if headings.count(heading) > 1})

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from core.baseline.history_rows import Place
 from service.back_test.bearing_run import BackTestRules
+from service.back_test.histories import Place
 from service.back_test.periods import Learning, MachineEvent
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.plant import PlantFile

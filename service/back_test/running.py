@@ -7,13 +7,13 @@ from itertools import groupby
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.history_rows import BearingRows, Place
-from core.baseline.response import ShaftResponse
-from core.baseline.stiffness_history import Evidence, StiffnessHistory
+from core.baseline.history import ReadingOutcome, StiffnessHistory
+from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import STEADY
 from service.back_test.bearing_run import BackTestRules, BearingRun, run_bearing
 from service.back_test.causes import UnitCauses
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import DAY_NS
 from service.back_test.report import AlarmReport, FilmReport, RateReport
 from service.back_test.unit_report import alarm_reports, film_reports
@@ -149,6 +149,6 @@ def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Ite
 
 
 def _without_condition(history: StiffnessHistory) -> int:
-    is_good = np.any(history.evidence == Evidence.MEASURED, axis=0)
+    is_good = np.any(history.outcome == ReadingOutcome.MEASURED, axis=0)
     is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
     return int(np.sum(is_good & ~is_known))

@@ -9,11 +9,11 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from core.baseline.history_rows import Place
-from core.baseline.history_rows.columns import AMPLITUDES, PER_BEARING, SILENT
-from core.baseline.stiffness_history import DIRECTIONS, Evidence
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
+from service.back_test.file_columns import AMPLITUDES, PER_BEARING, SILENT
+from service.back_test.histories import Place
 from service.back_test.periods import DAY_NS
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 
@@ -22,9 +22,9 @@ AT_ONCE_NS = 90 * DAY_NS
 
 SUFFIXES = (".csv", ".parquet")
 QUALITY = {
-    Evidence.MEASURED: "good",
-    Evidence.INSUFFICIENT_EXCITATION: SILENT,
-    Evidence.BAD_QUALITY: "bad",
+    ReadingOutcome.MEASURED: "good",
+    ReadingOutcome.INSUFFICIENT_EXCITATION: SILENT,
+    ReadingOutcome.BAD_QUALITY: "bad",
 }
 
 
@@ -51,7 +51,7 @@ def table_of(place: Place, found: FilmHistory) -> Any:
 def _side(place: Place, found: FilmHistory, side: int) -> Any:
     history, n = found.history, len(found)
     states = np.array([state.name.lower() for state in OperatingState])
-    qualities = np.array([QUALITY[evidence] for evidence in Evidence])
+    qualities = np.array([QUALITY[evidence] for evidence in ReadingOutcome])
     numbers = {
         "k_n_per_m": np.exp(history.ln_k[side]),
         "u_random": history.u_random[side],
@@ -66,7 +66,7 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
             "direction": [DIRECTIONS[side]] * n,
             **{key: pa.array(column, from_pandas=True) for key, column in numbers.items()},
             "state": states[found.state],
-            "quality": qualities[history.evidence[side]],
+            "quality": qualities[history.outcome[side]],
         }
     )
 

@@ -7,9 +7,9 @@ import numpy as np
 from core.arrays import FloatArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.cell_table import Support
-from core.baseline.stiffness_history import DIRECTIONS
-from core.change.attribution import Attribution
-from core.change.verdict import JUDGED, Verdict
+from core.baseline.history import DIRECTIONS
+from core.change.cause import Attribution
+from core.change.decision import JUDGED, Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
 from service.api.times import rfc3339

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.clock import SystemClock
-from core.baseline.history_rows import BearingRows, Place
 from service.back_test.arguments import event_of, time_ns_of
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.listing import lines_of
 from service.back_test.periods import Learning
 from service.back_test.reading import read_histories

@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
 from core.baseline.learning import learn
-from core.baseline.response import learn_response
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.change.back_test import DecisionHistory, back_test
-from core.change.film_rules import FilmRules
-from core.change.operation_history import OperationHistory, operation_history
+from core.change.backtest import DecisionHistory, OperationHistory, decide_all, operation_history
+from core.change.decision import WatchedReadings
+from core.change.settings import FilmRules
+from core.change.shaft_response import learn_response
 from core.machine.unit import Estimator
 from core.stiffness.estimators import STIFFNESS_OF
 from service.films.rules import film_rules_of
@@ -108,7 +108,10 @@ def judged(
     quantities = [quantity for quantity in found if quantity is not None]
     if len(quantities) < len(DIRECTIONS):
         raise ValueError(f"nothing was learned of {learned.origin.bearing}: too few readings")
-    said = [back_test(history, operation.is_settled, q, rules.change) for q in quantities]
+    said = [
+        decide_all(WatchedReadings.of(history, operation.is_settled, q.direction), q, rules.change)
+        for q in quantities
+    ]
     deviations = [_deviation(history, operation.is_settled, q) for q in quantities]
     return FilmHistory(
         history=history,

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from core.baseline.baseline import BearingBaseline, QuantityBaseline, Watched
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
+from core.baseline.history import Watched
 from core.change.decision import Decision
 from core.change.film_judge import FilmNews
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from core.condition.cells import Cell, FilmConditions
 from service.api.times import rfc3339
 from service.evidence.bearing_part import AXES, Direction
@@ -153,5 +154,5 @@ def _time_scales(
             time_scale_h=found.time_scale_h,
             change=found.change,
             std=found.std,
-            sure_from=rules.change.sure_from(found.time_scale_h),
+            sure_from=rules.change.significance_threshold(found.time_scale_h),
         )

@@ -3,7 +3,7 @@
 import hashlib
 from typing import Any
 
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from service.api.alarm_views import LEVEL_NAMES, VALUE_UNITS
 from service.api.times import rfc3339
 from service.evidence.bearing_part import Direction

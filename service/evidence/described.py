@@ -3,10 +3,9 @@
 import math
 from collections.abc import Iterator
 
-from core.change.attribution import Attribution
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
-from core.change.film_rules import FilmRules
+from core.change.cause import Attribution
+from core.change.film_judge import FilmFinding, FilmNews
+from core.change.settings import FilmRules
 from core.condition.cells import BearingCondition, Cell, CellGrid
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment, AveragingWindow

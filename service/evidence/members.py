@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.stiffness_history import StiffnessHistory
-from core.change.film_rules import FilmRules
+from core.baseline.history import StiffnessHistory
+from core.change.settings import FilmRules
 from core.condition.cells import Cell
 from core.units import NS_PER_S
 from service.evidence.bearing_part import AXES, Direction

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from core.alarms.event import AlarmEvent
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from service.films.keeper import FilmKeeper
 from service.live import LiveView, UnitStatus

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from core.change.verdict import Verdict
+from core.change.decision import Verdict
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import CrossSpectrum
 from service.evidence.bearing_part import AXES

@@ -9,12 +9,10 @@ import structlog
 from acquisition.clock import Clock
 from core.alarms.alarm import AlarmIdentity, AlarmKind
 from core.baseline.baseline import BearingBaseline
-from core.baseline.stiffness_history import DIRECTIONS
-from core.change.film_finding import alarm_condition
-from core.change.film_judge import FilmJudge, FilmNews
-from core.change.film_memory import FilmMemory
-from core.change.film_rules import FilmRules
+from core.baseline.history import DIRECTIONS
+from core.change.film_judge import FilmJudge, FilmMemory, FilmNews, alarm_condition
 from core.change.film_watch import FilmWatch
+from core.change.settings import FilmRules
 from core.limits import Condition
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
@@ -83,7 +81,7 @@ class FilmKeeper:
         for unit, films in self._films.items():
             response = responses.get(unit)
             found = await asyncio.to_thread(unit_start, self._store, unit, films.rules, response)
-            _go_on(films.watch, found)
+            _restore(films.watch, found)
 
     def memory(self, unit: str) -> FilmMemory | None:
         """What must be known of the films of a unit, beside stored readings, to go on elsewhere."""
@@ -92,7 +90,7 @@ class FilmKeeper:
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
         """Go on where another process stopped; after `start`."""
         if memory is not None and unit in self._films:
-            self._films[unit].watch.resume(memory)
+            self._films[unit].watch.restore(memory)
 
     def rules(self, unit: str) -> FilmRules | None:
         """How the films of a unit are watched; None if they are not."""
@@ -180,7 +178,7 @@ class FilmKeeper:
     async def _learn_response(self, unit: str) -> None:
         films, now_ns = self._films[unit], self._clock.now_ns()
         response = await asyncio.to_thread(self.learner.learn_response, unit, films.rules, now_ns)
-        films.watch.judge.answer_by(response)
+        films.watch.judge.set_response(response)
 
     async def act(self, place: FilmPlace, action: Action, actor: str, reason: str) -> Versions:
         """Do to the baselines of a bearing what an engineer asks for.
@@ -210,7 +208,7 @@ class FilmKeeper:
         held = films.watch.judge.baseline(place.bearing)
         found = await asyncio.to_thread(in_force, self._store, place, films.rules)
         if found.baseline is None or held is None or found.baseline.origin != held.origin:
-            films.watch.judge.put_in_force(place.bearing, found.baseline, found.decisions)
+            films.watch.judge.activate_baseline(place.bearing, found.baseline, found.decisions)
 
 
 def alarm_id(unit: str, bearing: str, direction: str) -> str:
@@ -223,10 +221,9 @@ def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
     return WatchedFilms(rules, FilmWatch(rules, FilmJudge(rules, brackets)), {})
 
 
-def _go_on(watch: FilmWatch, found: UnitStart) -> None:
-    watch.go_on(found.operation, found.oil)
+def _restore(watch: FilmWatch, found: UnitStart) -> None:
+    watch.restore_operation(found.operation, found.oil)
     for bearing, its in found.bearings.items():
-        watch.judge.put_in_force(bearing, its.baseline, its.decisions)
-    for column in found.recent:
-        watch.judge.recent.append(column)
-    watch.judge.answer_by(found.response)
+        watch.judge.activate_baseline(bearing, its.baseline, its.decisions)
+    watch.judge.add_recent(found.recent)
+    watch.judge.set_response(found.response)

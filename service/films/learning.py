@@ -7,13 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import TimeArray
-from core.baseline.agreement import learning_drift, mean_difference
+from core.baseline.agreement import far_readings, learning_drift, mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
-from core.baseline.far_readings import far_readings
+from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
-from core.baseline.response import ShaftResponse, learn_response
-from core.baseline.stiffness_history import StiffnessHistory
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
+from core.change.shaft_response import ShaftResponse, learn_response
 from core.machine.unit import Estimator
 from core.units import NS_PER_S
 from service.films.versions import Versions, versions_after

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.baseline.stiffness_history import Evidence
-from core.change.verdict import JUDGED
+from core.baseline.history import ReadingOutcome
+from core.change.decision import JUDGED
 from core.condition.operating_state import STEADY
 from service.films.learning import DAY_NS, FilmPlace
 from service.films.versions import Versions
@@ -128,4 +128,4 @@ def _recent(
 def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
     """(n,) for each direction: whether readings have stiffness and condition."""
     is_known = settings.baseline.settings().is_known(found.history.conditions)
-    return [is_known & (evidence == Evidence.MEASURED) for evidence in found.history.evidence]
+    return [is_known & (outcome == ReadingOutcome.MEASURED) for outcome in found.history.outcome]

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import FloatArray
-from core.baseline.baseline import BearingBaseline, Watched
-from core.baseline.response import ShaftResponse
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.change.catching_up import decision_after, operation_after
-from core.change.decision import UNDECIDED, Decision
-from core.change.film_rules import FilmRules
-from core.change.recent_readings import KEPT
-from core.condition.oil_settling import OilSettling
-from core.condition.operating_state import Operation
+from core.baseline.baseline import BearingBaseline
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
+from core.change.backtest import last_decision, last_operation
+from core.change.decision import INITIAL_DECISION, Decision
+from core.change.film_judge import MAX_RECENT
+from core.change.settings import FilmRules
+from core.change.shaft_response import ShaftResponse
+from core.condition.operating_state import OilSettling, Operation
 from core.units import NS_PER_S
 from service.films.learning import FilmPlace, common_times
 from service.films.versions import versions_after
@@ -62,7 +61,9 @@ def caught_up(
     found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
     learned = (baseline.of(Watched.STIFFNESS, direction) for direction in DIRECTIONS)
     return tuple(
-        decision_after(found.history, found.is_settled, quantity, rules) if quantity else UNDECIDED
+        last_decision(found.history, found.is_settled, quantity, rules)
+        if quantity
+        else INITIAL_DECISION
         for quantity in learned
     )
 
@@ -76,7 +77,7 @@ class UnitStart:
     oil, bearings
         By bearing.
     recent
-        Newest readings, as :meth:`RecentReadings.append` takes them.
+        Newest readings, as `FilmJudge.add_recent` takes them.
     """
 
     operation: Operation
@@ -98,7 +99,7 @@ def unit_start(
         )
         for place in places
     }
-    seen = {bearing: operation_after(film.history, rules) for bearing, film in found.items()}
+    seen = {bearing: last_operation(film.history, rules) for bearing, film in found.items()}
     bearings = {place.bearing: in_force(store, place, rules) for place in places}
     return UnitStart(
         seen[places[0].bearing][0],
@@ -115,7 +116,7 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
 
 
 def _recent(found: Mapping[str, FilmHistory], bearings: Mapping[str, InForce]) -> list[FloatArray]:
-    """Newest settled readings at the same times, (5, n_places) each."""
+    """Newest settled readings at the same times, (5, n_films) each."""
     common = common_times([history.history.time_ns for history in found.values()])
     columns, settled = [], np.ones(common.size, np.bool_)
     for bearing, film in found.items():
@@ -127,7 +128,7 @@ def _recent(found: Mapping[str, FilmHistory], bearings: Mapping[str, InForce]) -
         rows_of = (history.ln_k, np.log(shaft), film.deviation[:, rows])
         columns.append(np.stack([*rows_of, _rises(history, baseline), attitude]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
-    return [whole[:, :, i] for i in range(max(0, whole.shape[2] - KEPT), whole.shape[2])]
+    return [whole[:, :, i] for i in range(max(0, whole.shape[2] - MAX_RECENT), whole.shape[2])]
 
 
 def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:

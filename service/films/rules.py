@@ -1,6 +1,6 @@
 """From the plant file to the rules that a unit's films are watched by."""
 
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from core.machine.unit import Estimator
 from core.units import ns_from_s
 from service.settings.bearings import BearingSettings

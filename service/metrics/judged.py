@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from prometheus_client.metrics_core import Metric
 
 from core.alarms.alarm import PLANT, Alarm, AlarmState
+from core.change.decision import Verdict
 from core.change.film_judge import FilmNews
-from core.change.verdict import Verdict
 from core.limits import AlarmLevel
 from core.quality import Level
 from service.api.ports import AlarmBoard

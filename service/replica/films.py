@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from core.baseline.baseline import BearingBaseline
-from core.change.decision import UNDECIDED
+from core.change.decision import INITIAL_DECISION
 from core.change.film_judge import FilmNews
-from core.change.film_rules import FilmRules
+from core.change.settings import FilmRules
 from service.films.learning import FilmPlace
 from service.films.rules import film_rules_of
 from service.replica.unit_state import UnitState
@@ -78,7 +78,7 @@ class ReplicaFilms:
     def take(self, unit: str, state: UnitState, baselines: Mapping[str, BearingBaseline]) -> None:
         """Take what was written down of a unit, with the baselines that `fetch` has read."""
         for bearing, film in state.films.items():
-            news = FilmNews(film.reading, film.findings, (UNDECIDED, UNDECIDED))
+            news = FilmNews(film.reading, film.findings, (INITIAL_DECISION, INITIAL_DECISION))
             self._newest[unit, bearing] = news
         others = {key: held for key, held in self._baselines.items() if key[0] != unit}
         self._baselines = others | {(unit, b): found for b, found in baselines.items()}

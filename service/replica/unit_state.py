@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from core.alarms.alarm import Alarm
-from core.change.film_finding import FilmFinding
+from core.change.film_judge import FilmFinding
 from core.change.film_reading import FilmReading
 from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from core.alarms.board import AlarmMemory
-from core.change.film_memory import FilmMemory
+from core.change.film_judge import FilmMemory
 from core.monitor.monitor_state import MonitorState
 from core.samples.counts import Count
 

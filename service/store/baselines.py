@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.exchange import from_json, response_from_json, response_to_json, to_json
-from core.baseline.response import ShaftResponse
+from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
 from service.store.database import Connection
+from service.store.documents import baseline_from_json, response_from_json, to_json
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 from service.store.port import StoreError
 
@@ -87,7 +87,7 @@ def select_baseline(
     """
     found = select_document(reader, unit, bearing, version)
     try:
-        return None if found is None else from_json(found)
+        return None if found is None else baseline_from_json(found)
     except ValueError as error:
         name = f"baseline {version} of unit {unit} bearing {bearing}"
         raise StoreError(f"{name}: {error}") from error
@@ -117,7 +117,7 @@ def select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredStep
 
 def set_response(writer: Connection, unit: str, response: ShaftResponse, now_ns: int) -> None:
     """Put a unit's response in the place of the one before."""
-    writer.execute(SET_RESPONSE, (unit, now_ns, response_to_json(response)))
+    writer.execute(SET_RESPONSE, (unit, now_ns, to_json(response)))
 
 
 def select_responses(reader: Connection) -> dict[str, ShaftResponse]:

@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
-from core.baseline.response import ShaftResponse
-from core.baseline.stiffness_history import CodeArray, StiffnessHistory
+from core.baseline.history import CodeArray, StiffnessHistory
 from core.change.decision import Decision
 from core.change.film_judge import FilmNews
+from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from service.store.value_range import ValueRange

@@ -7,22 +7,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from core.baseline.exchange import content, written
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
-from core.baseline.strict import decode
-from core.change.decision import Decision
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
+from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmValue
 from core.machine.unit import Estimator
 from service.store.conditions import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 from service.store.database import Connection
+from service.store.documents import decision_from_json, to_json
 from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision
 from service.store.moments import free_moment
 from service.store.port import StoreError
 from service.store.series import series_of
-
-DECISION = "padwatch-decision"
 
 CONDITION_COLUMNS = (
     *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
@@ -99,7 +94,7 @@ def insert_film_news(
         for direction, finding, decision in zip(
             DIRECTIONS, told.findings, told.decisions, strict=True
         ):
-            document = written(DECISION, decision)
+            document = to_json(decision)
             version = finding.baseline_version
             writer.execute(REMEMBER, (series, direction, reading.estimator, version, document))
 
@@ -126,7 +121,7 @@ def _row(
 
 def _value_cells(value: FilmValue) -> tuple[object, ...]:
     numbers = (value.ln_k, value.u_random, value.shaft_um_pk, value.bearing_um_pk)
-    return (*(_or_null(number) for number in numbers), int(value.evidence), value.reason.value)
+    return (*(_or_null(number) for number in numbers), int(value.outcome), value.reason.value)
 
 
 def _finding_cells(finding: FilmFinding) -> tuple[object, ...]:
@@ -162,7 +157,7 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
                 direction,
                 Estimator(estimator),
                 version,
-                decode(Decision, content(document, DECISION), "content"),
+                decision_from_json(document),
             )
             for direction, estimator, version, document in rows
         ]
@@ -210,7 +205,7 @@ def _history(
             u_random=pair("u_random"),
             shaft_um_pk=pair("shaft_um_pk"),
             bearing_um_pk=pair("bearing_um_pk"),
-            evidence=codes(pair("evidence")),
+            outcome=codes(pair("evidence")),
         ),
         state=codes(column["operating_state"]),
         is_settled=column["is_settled"] > 0.0,

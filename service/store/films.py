@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
-from core.baseline.response import ShaftResponse
 from core.change.film_judge import FilmNews
+from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import step_deeds

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.stiffness_history import DIRECTIONS, Evidence
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.machine.unit import Estimator
 from core.quality import GOOD, Reason, bad
 from core.spectra.speed import SpeedSource
@@ -16,7 +16,7 @@ from service.store.database import Connection
 from service.store.film_port import FilmHistory, Provenance
 from service.store.film_readings import COLUMNS, CONDITION_COLUMNS, INSERT
 
-MEASURED = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "evidence")
+MEASURED = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk")
 SAID = ("verdict", "level", "change", "change_std", "deviation", "deviation_std")
 INSERT_RESULT = """
     INSERT INTO assessment VALUES (?,?,0,0,0,0,1.0,?,?,?,?,?,?,?,?,?,?)
@@ -80,21 +80,21 @@ def _film_rows(series: int, estimator: Estimator, films: FilmHistory) -> list[tu
     for name in CONDITION_COLUMNS:
         columns[name] = _numbers(getattr(films.history, name))
     for row, d in enumerate(DIRECTIONS):
-        evidence = films.history.evidence[row]
+        outcome = films.history.outcome[row]
         columns |= {f"{name}_{d}": _numbers(getattr(films.history, name)[row]) for name in MEASURED}
         columns |= {f"{name}_{d}": _numbers(getattr(films, name)[row]) for name in SAID}
-        columns[f"evidence_{d}"] = evidence.tolist()
+        columns[f"evidence_{d}"] = outcome.tolist()
         columns[f"verdict_{d}"] = films.verdict[row].tolist()
         columns[f"level_{d}"] = _nullable(films.level[row], films.level[row] > 0)
-        columns[f"reason_{d}"] = [REASONS[code] for code in evidence.tolist()]
+        columns[f"reason_{d}"] = [REASONS[code] for code in outcome.tolist()]
     nothing: list[object] = [None] * n
     return list(zip(*(columns.get(name, nothing) for name in COLUMNS), strict=True))
 
 
 REASONS = {
-    Evidence.MEASURED: Reason.OK.value,
-    Evidence.INSUFFICIENT_EXCITATION: Reason.INSUFFICIENT_EXCITATION.value,
-    Evidence.BAD_QUALITY: Reason.NOT_MEASURED.value,
+    ReadingOutcome.MEASURED: Reason.OK.value,
+    ReadingOutcome.INSUFFICIENT_EXCITATION: Reason.INSUFFICIENT_EXCITATION.value,
+    ReadingOutcome.BAD_QUALITY: Reason.NOT_MEASURED.value,
 }
 
 

@@ -11,7 +11,7 @@ from acquisition.simulated.life.moment import TRANSDUCER_NOISE
 from acquisition.simulated.life.operation import RATED_POWER_MW
 from acquisition.simulated.plant.rotor import RotorParameters
 from acquisition.simulated.plant.scenario import TransducerNoise
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory
 from core.units import ns_from_s
 from service.conversion import machine_of
 from service.settings.simulated_life import SimulatedDamageSettings

@@ -7,8 +7,8 @@ import pytest
 
 from core.alarms.alarm import AlarmKind, AlarmState
 from core.alarms.event import AlarmChange
-from core.change.attribution import Cause
-from core.change.verdict import Verdict
+from core.change.cause import Cause
+from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason

@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from core.arrays import FloatArray, TimeArray
-from core.baseline.stiffness_history import DIRECTIONS
+from core.baseline.history import DIRECTIONS
 from core.units import NS_PER_S
 
 

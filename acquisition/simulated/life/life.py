@@ -25,7 +25,7 @@ from acquisition.simulated.life.truth import (
 )
 from acquisition.simulated.plant.films import FilmColumns
 from core.arrays import ComplexArray, FloatArray
-from core.baseline.stiffness_history import Evidence, StiffnessHistory
+from core.baseline.history import ReadingOutcome, StiffnessHistory
 
 
 def ln_stiffness(film: FilmColumns) -> FloatArray:
@@ -53,9 +53,9 @@ def readings(
     u = u_random(hydraulic_force_n(operation.load))
     ln_k = truth.ln_k + apparent + chain.ln_k_error
     ln_k += u * random.standard_normal((2, n))
-    measured = chain.evidence == Evidence.MEASURED
+    measured = chain.evidence == ReadingOutcome.MEASURED
     shaft_um_pk, bearing_um_pk = _amplitudes_um_pk(random, truth, chain, probe_gain, bearing_gain)
-    out_of_order = chain.evidence == Evidence.BAD_QUALITY
+    out_of_order = chain.evidence == ReadingOutcome.BAD_QUALITY
     ratio, u_ratio, attitude_deg = _position(bearing, truth, chain)
     return StiffnessHistory(
         time_ns=operation.time_ns,
@@ -69,7 +69,7 @@ def readings(
         u_random=np.where(measured, u * _known(random, n), np.nan),
         shaft_um_pk=np.where(out_of_order, np.nan, shaft_um_pk),
         bearing_um_pk=np.where(out_of_order, np.nan, bearing_um_pk),
-        evidence=chain.evidence,
+        outcome=chain.evidence,
     )
 
 

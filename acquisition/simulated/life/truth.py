@@ -11,7 +11,7 @@ from acquisition.simulated.life.operation import YEAR_S, Operation, wander
 from acquisition.simulated.life.shaft import ConditionChange
 from acquisition.simulated.plant.films import FilmColumns
 from core.arrays import ComplexArray, FloatArray
-from core.baseline.stiffness_history import CodeArray, Evidence, StiffnessHistory
+from core.baseline.history import CodeArray, ReadingOutcome, StiffnessHistory
 
 U_RANDOM_AT_REFERENCE = 0.005
 REFERENCE_FORCE_N = 20.0e3
@@ -63,7 +63,7 @@ class Chain:
     runout_um_pk : (2,)
         Phasors.
     evidence : (2, n)
-        Members of `Evidence`.
+        Members of `ReadingOutcome`.
     """
 
     probe_gain: FloatArray
@@ -110,10 +110,10 @@ def _gains(random: np.random.Generator, half_width: float) -> FloatArray:
 def _evidence(random: np.random.Generator, operation: Operation) -> CodeArray:
     n = len(operation)
     silence = np.where(operation.load < 0.05, NO_LOAD_SILENCE, LOADED_SILENCE)
-    evidence = np.full(n, Evidence.MEASURED, np.int8)
-    evidence[random.random(n) < silence] = Evidence.INSUFFICIENT_EXCITATION
-    evidence[_is_out_of_order(random, n, operation.step_s)] = Evidence.BAD_QUALITY
-    evidence[~operation.is_at_speed] = Evidence.BAD_QUALITY
+    evidence = np.full(n, ReadingOutcome.MEASURED, np.int8)
+    evidence[random.random(n) < silence] = ReadingOutcome.INSUFFICIENT_EXCITATION
+    evidence[_is_out_of_order(random, n, operation.step_s)] = ReadingOutcome.BAD_QUALITY
+    evidence[~operation.is_at_speed] = ReadingOutcome.BAD_QUALITY
     return evidence
 
 

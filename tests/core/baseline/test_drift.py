@@ -7,9 +7,9 @@ import pytest
 
 from core.baseline.agreement import Drift, drift_within, learning_drift
 from core.baseline.baseline import Origin
+from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import StiffnessHistory
 from core.baseline.surface_fit import slope_scatter
 
 FilmLife = Callable[..., StiffnessHistory]

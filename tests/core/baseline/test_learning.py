@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline, Watched
+from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import Support, cells_between, neighbourhood
+from core.baseline.history import StiffnessHistory, Watched
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import StiffnessHistory
 from core.condition.cells import CellGrid, FilmConditions
 
 ORIGIN = Origin("U1", "UJB", "dynamic", 1, "Ada", 1_700_000_000_000_000_000, "commissioning")

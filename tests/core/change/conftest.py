@@ -7,14 +7,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from core.baseline.baseline import Origin, QuantityBaseline, Watched
+from core.baseline.baseline import Origin, QuantityBaseline
+from core.baseline.history import StiffnessHistory, Watched
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import Evidence, StiffnessHistory
-from core.change.back_test import DecisionHistory, back_test
-from core.change.decision import UNDECIDED, Decision, advance
-from core.change.operation_history import operation_history
-from core.change.reading import WatchedReading
+from core.change.backtest import DecisionHistory, decide_all, operation_history
+from core.change.decision import INITIAL_DECISION, Decision, WatchedReadings, step
 from core.change.settings import ChangeLimits
 from core.condition.operating_state import OperatingLimits
 
@@ -33,23 +31,19 @@ class Watch:
 
     def whole(self, limits: ChangeLimits = LIMITS) -> DecisionHistory:
         """Decide over all that came later at once."""
-        return back_test(self.later, self.is_settled, self.baseline, limits)
+        readings = WatchedReadings.of(self.later, self.is_settled, "x")
+        return decide_all(readings, self.baseline, limits)
 
-    def steps(self, limits: ChangeLimits = LIMITS, begin: Decision = UNDECIDED) -> list[Decision]:
+    def steps(
+        self, limits: ChangeLimits = LIMITS, begin: Decision = INITIAL_DECISION
+    ) -> list[Decision]:
         """Decide reading by reading."""
         found, history = [begin], self.later
         for row in range(len(history)):
-            reading = WatchedReading(
-                time_ns=int(history.time_ns[row]),
-                is_settled=bool(self.is_settled[row]),
-                eccentricity_ratio=float(history.eccentricity_ratio[row]),
-                oil_temperature_c=float(history.oil_temperature_c[row]),
-                attitude_deg=float(history.attitude_deg[row]),
-                value=float(history.ln_k[0, row]),
-                u_random=float(history.u_random[0, row]),
-                evidence=Evidence(int(history.evidence[0, row])),
-            )
-            found.append(advance(found[-1], reading, self.baseline, limits))
+            settled = self.is_settled[row : row + 1]
+            one = WatchedReadings.of(history.rows(row, row + 1), settled, "x")
+            [(time_ns, outcome)] = one.compared(self.baseline)
+            found.append(step(found[-1], time_ns, outcome, self.baseline, limits))
         return found[1:]
 
     def first(self, n: int) -> "Watch":

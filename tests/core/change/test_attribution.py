@@ -5,14 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from core.baseline.response import (
-    MEAN_READINGS,
-    ShaftResponse,
-    learn_response,
-    place_columns,
-)
-from core.baseline.stiffness_history import StiffnessHistory
-from core.change.attribution import PROBE_REASON, Attribution, Cause, PlaceReadings, attribute
+from core.baseline.history import StiffnessHistory
+from core.change.cause import PROBE_REASON, Attribution, Cause, UnitReadings, attribute
+from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 
 BEARINGS = ("UJB", "LJB", "TJB")
 PLACES = tuple((bearing, direction) for bearing in BEARINGS for direction in "xy")
@@ -89,13 +84,13 @@ def put_down(
     rise
         Of the baseline with ln of the eccentricity, which a probe that reads more seems to raise.
     """
-    healthy, changed = place_columns(machine(seed)), place_columns(machine(seed, **changes))
+    healthy, changed = film_columns(machine(seed)), film_columns(machine(seed, **changes))
     further = np.zeros(6)
     for probe, gain in changes.get("probe", {}).items():
         further[probe - probe % 2 : probe - probe % 2 + 2] += 0.5 * np.log(gain)  # at 45 degrees
     deviation = changed[0] - healthy[0] - rise * further[:, np.newaxis]
     steep, attitude_deg = np.full((6, N), rise), np.full((6, N), 45.0)
-    readings = PlaceReadings(*changed, deviation, steep, attitude_deg)
+    readings = UnitReadings(*changed, deviation, steep, attitude_deg)
     newest = np.arange(100, 100 + MEAN_READINGS)
     return attribute(PLACES[row], response, readings.columns(newest), BRACKETS_N_PER_M)
 
@@ -183,7 +178,7 @@ def test_a_small_change_or_one_without_response_or_readings_has_no_cause(
     shares = [put_down(response, 0, seed, film={0: 0.995}) for seed in range(3, 6)]
     assert {found.cause for found in shares} <= {Cause.UNKNOWN, Cause.FILM}
     assert any(found.cause is Cause.UNKNOWN for found in shares)
-    nothing = PlaceReadings(*np.full((5, 6, 3), np.nan))
+    nothing = UnitReadings(*np.full((5, 6, 3), np.nan))
     assert attribute(PLACES[0], response, nothing).cause is Cause.UNKNOWN
     assert attribute(PLACES[0], None, nothing).cause is Cause.UNKNOWN
     assert attribute(("XJB", "x"), response, nothing).cause is Cause.UNKNOWN

@@ -3,16 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.change.operation_history import operation_history
+from core.change.backtest import operation_history, operation_of_states
 from core.condition.cells import CellGrid, FilmConditions
-from core.condition.oil_settling import NOT_AT_SPEED
 from core.condition.operating_state import (
-    NEVER_SEEN,
+    NOT_AT_SPEED,
+    UNKNOWN_OPERATION,
     OperatingLimits,
-    OperatingReading,
     OperatingState,
     Operation,
-    advance,
+    step_operation,
 )
 
 LIMITS = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0, warm_up_s=1200.0)
@@ -22,10 +21,9 @@ MINUTE_NS = 60_000_000_000
 def run(
     speeds_rpm: list[float], powers_mw: list[float], step_ns: int = MINUTE_NS
 ) -> list[Operation]:
-    operation, found = NEVER_SEEN, []
+    operation, found = UNKNOWN_OPERATION, []
     for index, (speed_rpm, power_mw) in enumerate(zip(speeds_rpm, powers_mw, strict=True)):
-        reading = OperatingReading(index * step_ns, speed_rpm, power_mw)
-        operation = advance(operation, reading, LIMITS)
+        operation = step_operation(operation, index * step_ns, speed_rpm, power_mw, LIMITS)
         found.append(operation)
     return found
 
@@ -49,12 +47,11 @@ def test_a_state_settles_after_its_time_and_stays_where_power_hovers_at_a_limit(
 
 def test_a_warm_up_lasts_on_through_changes_of_load() -> None:
     limits = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
-    operation, settled = NEVER_SEEN, []
+    operation, settled = UNKNOWN_OPERATION, []
     for minute in range(0, 8 * 60, 10):
         speed_rpm = float("nan") if minute == 100 else 92.3
         power_mw = 200.0 if minute < 200 else 320.0
-        reading = OperatingReading(minute * MINUTE_NS, speed_rpm, power_mw)
-        operation = advance(operation, reading, limits)
+        operation = step_operation(operation, minute * MINUTE_NS, speed_rpm, power_mw, limits)
         settled.append(operation.is_settled(limits))
     assert settled == [False] * 36 + [True] * 12
 
@@ -78,14 +75,14 @@ def test_a_bearing_is_warm_when_its_oil_has_settled_and_not_after_a_number_of_ho
 
 
 def test_without_speed_or_power_or_after_a_gap_the_state_is_unknown_and_time_goes_on() -> None:
-    before = advance(NEVER_SEEN, OperatingReading(0, 92.3, 200.0), LIMITS)
-    after = advance(before, OperatingReading(120 * MINUTE_NS, 50.0, 0.0), LIMITS)
+    before = step_operation(UNKNOWN_OPERATION, 0, 92.3, 200.0, LIMITS)
+    after = step_operation(before, 120 * MINUTE_NS, 50.0, 0.0, LIMITS)
     assert after.state is OperatingState.UNKNOWN
     states = [o.state for o in run([float("nan"), 92.3], [200.0, float("nan")])]
     assert states == [OperatingState.UNKNOWN] * 2
-    operation = advance(NEVER_SEEN, OperatingReading(5, 92.3, 200.0), LIMITS)
+    operation = step_operation(UNKNOWN_OPERATION, 5, 92.3, 200.0, LIMITS)
     with pytest.raises(ValueError, match="not after 5 ns"):
-        advance(operation, OperatingReading(5, 92.3, 200.0), LIMITS)
+        step_operation(operation, 5, 92.3, 200.0, LIMITS)
 
 
 def wander(random: np.random.Generator, n: int, top: float) -> np.ndarray:
@@ -107,9 +104,9 @@ def test_a_history_has_the_states_that_its_readings_have_one_by_one(seed: int) -
     oil_c = 40.0 + np.cumsum(random.normal(0.0, 0.2, n))
     oil_c[random.random(n) < 0.03] = np.nan
     limits = replace(LIMITS, oil_settling_s=1800.0, settling_s=900.0, warm_up_s=4800.0)
-    operation, oil, states, settled, warm = NEVER_SEEN, NOT_AT_SPEED, [], [], 0
+    operation, oil, states, settled, warm = UNKNOWN_OPERATION, NOT_AT_SPEED, [], [], 0
     for now_ns, rpm, mw, now_c in zip(time_ns, speed_rpm, power_mw, oil_c, strict=True):
-        operation = advance(operation, OperatingReading(int(now_ns), rpm, mw), limits)
+        operation = step_operation(operation, int(now_ns), rpm, mw, limits)
         oil = oil.step(operation, now_c, limits)
         states.append(int(operation.state))
         settled.append(operation.is_settled(limits, oil.has_settled))
@@ -119,6 +116,19 @@ def test_a_history_has_the_states_that_its_readings_have_one_by_one(seed: int) -
     assert found.state.tolist() == states
     assert found.is_settled.tolist() == settled
     assert len(set(states)) >= len(OperatingState) - 1
+
+
+def test_states_that_are_told_settle_as_those_that_are_followed() -> None:
+    n = 300
+    power_mw = np.where(np.arange(n) % 120 < 90, 200.0, 320.0)
+    speed_rpm = np.where(np.arange(n) > 200, np.where(np.arange(n) > 210, 92.3, 0.0), 92.3)
+    time_ns = 10 * MINUTE_NS * np.arange(n)
+    limits = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
+    followed = operation_history(time_ns, speed_rpm, power_mw, limits)
+    told = operation_of_states(time_ns, followed.state, limits)
+    assert told.is_settled.tolist() == followed.is_settled.tolist()
+    assert 0 < np.sum(told.is_settled) < n
+    assert set(followed.state.tolist()) > {OperatingState.PART_LOAD, OperatingState.STANDSTILL}
 
 
 def one(grid: CellGrid, e: float, t: float, attitude_deg: float = 0.0) -> tuple[int, ...]:

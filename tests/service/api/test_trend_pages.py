@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment

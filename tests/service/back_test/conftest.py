@@ -15,8 +15,8 @@ from rigs.tiers import fast_and_long
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.truth import UnitLife
-from core.baseline.stiffness_history import DIRECTIONS, Evidence
-from core.change.operation_history import operation_history
+from core.baseline.history import DIRECTIONS, ReadingOutcome
+from core.change.backtest import operation_history
 from core.condition.operating_state import OperatingLimits, OperatingState
 
 DAY_NS = 86_400 * 10**9
@@ -28,9 +28,9 @@ HEADINGS = (
     "state,quality"
 )
 EVIDENCE_NAMES = {
-    Evidence.MEASURED: "good",
-    Evidence.INSUFFICIENT_EXCITATION: "insufficient_excitation",
-    Evidence.BAD_QUALITY: "bad",
+    ReadingOutcome.MEASURED: "good",
+    ReadingOutcome.INSUFFICIENT_EXCITATION: "insufficient_excitation",
+    ReadingOutcome.BAD_QUALITY: "bad",
 }
 
 
@@ -116,7 +116,7 @@ def told_states(life: UnitLife) -> Any:
 
 def _table(unit: str, life: UnitLife) -> Any:
     states = np.array([state.name.lower() for state in OperatingState])[told_states(life)]
-    qualities = np.array([EVIDENCE_NAMES[evidence] for evidence in Evidence])
+    qualities = np.array([EVIDENCE_NAMES[evidence] for evidence in ReadingOutcome])
     return pa.concat_tables(
         pa.table(
             {
@@ -132,7 +132,7 @@ def _table(unit: str, life: UnitLife) -> Any:
                 "shaft_um_pk": history.shaft_um_pk[side],
                 "bearing_um_pk": history.bearing_um_pk[side],
                 "state": states,
-                "quality": qualities[history.evidence[side]],
+                "quality": qualities[history.outcome[side]],
             }
         )
         for bearing, history in life.readings.items()

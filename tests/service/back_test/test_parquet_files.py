@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.baseline.history_rows import Place
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import Place
 from service.back_test.parquet_rows import parquet_batches
 from service.back_test.reading import read_histories
 
@@ -124,7 +124,7 @@ def test_a_wrong_column_or_cell_is_named_with_its_row(
 def test_a_row_that_makes_no_sense_is_named_with_its_file(
     written: Written, key: str, value: Any, says: str
 ) -> None:
-    """All refusals of rows are tested with `histories_from_columns`."""
+    """All refusals of rows are tested with `histories_of`."""
     path = written(**{key: pa.array(with_value(key, value))})
     with pytest.raises(ReadingsError, match=says) as refused:
         read_histories(path, [UJB])
@@ -135,7 +135,7 @@ def test_a_reason_says_why_a_reading_is_bad(written: Written) -> None:
     quality = ["bad", "bad", "uncertain", *["good"] * 17]
     reason = ["insufficient_excitation", "clipped", "few_segments", *["ok"] * 17]
     found = read_histories(written(quality=quality, reason=reason))[UJB].history
-    assert found.evidence[0, :4].tolist() == [1, 2, 2, 0]
+    assert found.outcome[0, :4].tolist() == [1, 2, 2, 0]
     with pytest.raises(ReadingsError, match="row 1: quality good for the reason 'clipped'"):
         read_histories(written(reason=["clipped"] * N_ROWS))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from core.change.back_test import DecisionHistory
+from core.change.backtest import DecisionHistory
 from core.limits import AlarmLevel
 from service.back_test.alarm_stretches import alarm_stretches
 from service.back_test.arguments import event_of, time_ns_of

@@ -8,12 +8,10 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from core.baseline.stiffness_history import Evidence
-from core.change.decision import UNDECIDED
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
+from core.baseline.history import ReadingOutcome
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
-from core.change.verdict import Verdict
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
@@ -27,18 +25,18 @@ T0 = 1_767_225_600_000_000_000
 STEP_NS = 600 * 10**9
 N = 50
 NAN = float("nan")
-EVIDENCE = [Evidence(n % 10 if n % 10 < 3 else 0) for n in range(N)]
+EVIDENCE = [ReadingOutcome(n % 10 if n % 10 < 3 else 0) for n in range(N)]
 FINDING = FilmFinding(Verdict.NO_BASELINE)
 
 
 def value(n: int, shift: float) -> FilmValue:
-    is_measured = EVIDENCE[n] is Evidence.MEASURED
+    is_measured = EVIDENCE[n] is ReadingOutcome.MEASURED
     return FilmValue(
         ln_k=20.0 + shift + 0.01 * n if is_measured else NAN,
         u_random=0.01 if is_measured else NAN,
         shaft_um_pk=50.0 + n,
         bearing_um_pk=NAN,
-        evidence=EVIDENCE[n],
+        outcome=EVIDENCE[n],
         reason=Reason.OK,
     )
 
@@ -75,7 +73,7 @@ def filled(plant_path: Path) -> Path:
     """A plant file whose database has readings of two bearings."""
     store = SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")
     store.films.add_simulated(
-        FilmNews(film_reading(n, bearing), (FINDING, FINDING), (UNDECIDED, UNDECIDED))
+        FilmNews(film_reading(n, bearing), (FINDING, FINDING), (INITIAL_DECISION, INITIAL_DECISION))
         for bearing in ("UJB", "LJB")
         for n in range(N)
     )
@@ -107,7 +105,7 @@ def test_stored_readings_come_back_out_of_the_file(
     for key in ("attitude_deg", "eccentricity_ratio", "power_mw", "u_eccentricity"):
         column = np.array([getattr(r, key) for r in expected])
         assert np.array_equal(getattr(rows.history, key), column, equal_nan=True)
-    assert rows.history.evidence[0].tolist() == EVIDENCE
+    assert rows.history.outcome[0].tolist() == EVIDENCE
     assert rows.history.shaft_um_pk[1].tolist() == [50.0 + n for n in range(N)]
     assert rows.state is not None
     assert rows.state.tolist() == [r.condition.state for r in expected]

@@ -9,26 +9,25 @@ import numpy.typing as npt
 import pytest
 
 from acquisition.simulated.life.truth import UnitLife
-from core.baseline.baseline import Origin, Watched
-from core.baseline.exchange import from_json
-from core.baseline.history_rows import BearingRows, Place
+from core.baseline.baseline import Origin
+from core.baseline.history import DIRECTIONS, Watched, watched_values
 from core.baseline.learning import learn
-from core.baseline.response import learn_response, place_columns
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import DIRECTIONS
-from core.baseline.watched import watched_values
-from core.change.attribution import PlaceReadings, attribute
-from core.change.back_test import back_test
-from core.change.operation_history import operation_history
+from core.change.backtest import decide_all, operation_history
+from core.change.cause import UnitReadings, attribute
+from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
+from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 from service.api.times import rfc3339
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines
 from service.back_test.file_columns import ReadingsError
+from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import DAY_NS, Learning, MachineEvent
 from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
+from service.store.documents import baseline_from_json
 
 START_NS = 19_723 * DAY_NS
 Histories = Mapping[Place, BearingRows]
@@ -90,7 +89,8 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
                 film = baseline.of(Watched.STIFFNESS, direction)
                 assert film is not None
                 later = history.rows(n, len(history))
-                decided = back_test(later, is_settled[n:], film, ChangeLimits())
+                readings = WatchedReadings.of(later, is_settled[n:], direction)
+                decided = decide_all(readings, film, ChangeLimits())
                 active = np.concatenate([[0], decided.level > 0, [0]])
                 begins = np.flatnonzero(np.diff(active) == 1)
                 expected += [
@@ -153,9 +153,9 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
     begins = [rfc3339(int(t)) == alarm.begin for t in life.operation.time_ns]
     known = np.isfinite(deviation[places.index(("LJB", "x"))])
     newest = np.flatnonzero(known[: int(np.flatnonzero(begins)[0]) + 1])[-24:]
-    columns = (*place_columns(histories), deviation, np.stack(rise), np.stack(attitude))
+    columns = (*film_columns(histories), deviation, np.stack(rise), np.stack(attitude))
     brackets = np.repeat([BRACKETS["U2", bearing] for bearing in histories], 2)
-    readings = PlaceReadings(*columns).columns(newest)
+    readings = UnitReadings(*columns).columns(newest)
     expected = attribute(("LJB", "x"), response, readings, brackets)
     assert (alarm.cause.cause, alarm.cause.reason) == (expected.cause, expected.reason)
     assert alarm.cause.film_share == pytest.approx(expected.film_share, rel=1e-6)
@@ -190,7 +190,7 @@ def test_every_reading_is_counted_once(two_units: Any, histories: Histories, fou
 
 def test_exported_baselines_read_back_as_they_were(found: Found, tmp_path: Any) -> None:
     assert export_baselines(found, tmp_path / "out") == 8
-    stored = from_json((tmp_path / "out" / "U2-LJB-v1.json").read_text(encoding="utf-8"))
+    stored = baseline_from_json((tmp_path / "out" / "U2-LJB-v1.json").read_text(encoding="utf-8"))
     assert stored in found.baselines
     with pytest.raises(FileExistsError):
         export_baselines(found, tmp_path / "out")

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.baseline.stiffness_history import StiffnessHistory
-from core.change.verdict import JUDGED, Verdict
+from core.baseline.history import StiffnessHistory
+from core.change.decision import JUDGED, Verdict
 from core.machine.unit import Estimator
 from core.units import NS_PER_S
 from service.demo.past import fill, without_past

@@ -6,13 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.baseline.stiffness_history import Evidence, StiffnessHistory
-from core.change.decision import UNDECIDED
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
+from core.baseline.history import ReadingOutcome, StiffnessHistory
+from core.change.backtest import operation_history
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
-from core.change.operation_history import operation_history
-from core.change.verdict import Verdict
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
@@ -40,7 +38,7 @@ def told() -> Callable[..., list[FilmNews]]:
             FilmNews(
                 reading_at(history, i, bearing, int(found.state[i]), bool(found.is_settled[i])),
                 (NOTHING_SAID, NOTHING_SAID),
-                (UNDECIDED, UNDECIDED),
+                (INITIAL_DECISION, INITIAL_DECISION),
             )
             for i in range(len(history))
         ]
@@ -57,7 +55,9 @@ def reading_at(
             float(history.u_random[row, i]),
             float(history.shaft_um_pk[row, i]),
             float(history.bearing_um_pk[row, i]),
-            Evidence.MEASURED if np.isfinite(history.ln_k[row, i]) else Evidence.BAD_QUALITY,
+            ReadingOutcome.MEASURED
+            if np.isfinite(history.ln_k[row, i])
+            else ReadingOutcome.BAD_QUALITY,
             Reason.OK if np.isfinite(history.ln_k[row, i]) else Reason.LOW_COVERAGE,
         )
         for row in range(2)

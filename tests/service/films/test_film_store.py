@@ -10,16 +10,14 @@ import numpy as np
 import pytest
 
 from core.baseline.baseline import BearingBaseline, Origin
+from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
-from core.baseline.response import learn_response
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import StiffnessHistory
-from core.change.attribution import Attribution, Cause
-from core.change.decision import Decision
+from core.change.cause import Attribution, Cause
+from core.change.decision import Decision, Verdict
 from core.change.evidence import Finding, GatheredEvidence, ScaleSums
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
-from core.change.verdict import Verdict
+from core.change.film_judge import FilmFinding, FilmNews
+from core.change.shaft_response import learn_response
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.machine.unit import Estimator
@@ -55,8 +53,8 @@ def test_readings_are_read_back_to_the_last_bit(
     history = film_life(2, days=3)
     ln_k = history.ln_k.copy()
     ln_k[0, 5] = np.nan
-    evidence = np.where(np.isnan(ln_k), 2, 0).astype(np.int8)
-    history = replace(history, ln_k=ln_k, evidence=evidence)
+    outcome = np.where(np.isnan(ln_k), 2, 0).astype(np.int8)
+    history = replace(history, ln_k=ln_k, outcome=outcome)
     news = told(history)
     news[7] = replace(news[7], findings=(FOUND, FilmFinding(Verdict.NORMAL, baseline_version=3)))
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory
+from core.change.decision import JUDGED
 from core.change.film_judge import FilmJudge, FilmNews
-from core.change.film_rules import FilmRules
-from core.change.verdict import JUDGED
+from core.change.settings import FilmRules
 from core.condition.cells import CellGrid
 from core.machine.unit import Bearing, Channel, Estimator, Measurand, Unit
 from service.films.actions import Accept, BaselineRefusedError, Freeze, Reject, Renew, Thaw

@@ -8,9 +8,8 @@ from prometheus_client import Metric
 from core.alarms.operation import Shelve
 from core.alarms.rules import UnitRules
 from core.alarms.unit_alarms import UnitAlarms
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
-from core.change.verdict import Verdict
+from core.change.decision import Verdict
+from core.change.film_judge import FilmFinding, FilmNews
 from core.machine.unit import Bearing, Channel, Measurand, Unit
 from service.alarms.engine import AlarmEngine
 from service.delivery.deliveries import ReceiverView

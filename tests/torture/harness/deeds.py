@@ -11,12 +11,10 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
-from core.baseline.stiffness_history import Evidence
-from core.change.decision import UNDECIDED
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
+from core.baseline.history import ReadingOutcome
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
-from core.change.verdict import Verdict
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Condition
@@ -87,7 +85,8 @@ def _is_acknowledged(number: int) -> bool:
 def _film(seed: int, number: int) -> FilmNews:
     numbers = [value(seed, number, f"film {n}") for n in range(10)]
     values = tuple(
-        FilmValue(*numbers[4 * row : 4 * row + 4], Evidence.MEASURED, Reason.OK) for row in (0, 1)
+        FilmValue(*numbers[4 * row : 4 * row + 4], ReadingOutcome.MEASURED, Reason.OK)
+        for row in (0, 1)
     )
     reading = FilmReading(
         *("U1", "UJB", Estimator.DYNAMIC, T0_NS + number * HOP_NS),
@@ -96,7 +95,7 @@ def _film(seed: int, number: int) -> FilmNews:
         (values[0], values[1]),
     )
     said = FilmFinding(Verdict.NO_BASELINE)
-    return FilmNews(reading, (said, said), (UNDECIDED, UNDECIDED))
+    return FilmNews(reading, (said, said), (INITIAL_DECISION, INITIAL_DECISION))
 
 
 def letters(alarm: Alarm, event: AlarmEvent) -> Iterator[Letter]:

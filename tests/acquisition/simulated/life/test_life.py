@@ -13,7 +13,7 @@ from acquisition.simulated.life.life import live
 from acquisition.simulated.life.shaft import cooling_failure, four_fold
 from acquisition.simulated.life.truth import UnitLife
 from core.arrays import FloatArray
-from core.baseline.stiffness_history import Evidence
+from core.baseline.history import ReadingOutcome
 
 Life = Callable[..., UnitLife]
 SEEDS = (0, *fast_and_long(1, 2))
@@ -129,7 +129,7 @@ def test_little_load_means_little_excitation_and_more_uncertainty(two_years: Lif
     life = two_years(0)
     readings, load = life.readings["UJB"], life.operation.load
     no_load, full = load < 0.05, load > 0.9
-    silent = readings.evidence[0] == Evidence.INSUFFICIENT_EXCITATION
+    silent = readings.outcome[0] == ReadingOutcome.INSUFFICIENT_EXCITATION
 
     assert np.nanmedian(readings.u_random[0, no_load]) > 2.0 * np.nanmedian(
         readings.u_random[0, full]

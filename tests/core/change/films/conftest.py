@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from core.baseline.baseline import BearingBaseline, Origin
+from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import StiffnessHistory
+from core.change.backtest import operation_history
 from core.change.film_judge import FilmJudge, FilmNews
-from core.change.film_rules import FilmRules
 from core.change.film_watch import FilmWatch
-from core.change.operation_history import operation_history
-from core.change.settings import ChangeLimits
+from core.change.settings import ChangeLimits, FilmRules
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
 from core.machine.unit import Estimator
@@ -52,7 +51,7 @@ class Films:
     def watch(self, rules: FilmRules = RULES, *, has_baseline: bool = True) -> FilmWatch:
         """A watch that begins anew."""
         judge = FilmJudge(rules, BRACKETS)
-        judge.put_in_force("UJB", self.baseline if has_baseline else None)
+        judge.activate_baseline("UJB", self.baseline if has_baseline else None)
         return FilmWatch(rules, judge)
 
     def results(self, history: StiffnessHistory) -> Iterator[Assessment]:

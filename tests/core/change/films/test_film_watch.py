@@ -7,15 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.baseline.baseline import Watched
-from core.baseline.stiffness_history import Evidence
-from core.change.back_test import back_test
-from core.change.catching_up import decision_after, operation_after
-from core.change.film_finding import FilmFinding, alarm_condition
+from core.baseline.history import ReadingOutcome, Watched
+from core.change.backtest import decide_all, last_decision, last_operation, operation_history
+from core.change.decision import JUDGED, Verdict, WatchedReadings
+from core.change.film_judge import FilmFinding, alarm_condition
 from core.change.film_reading import film_reading
-from core.change.film_rules import FilmRules
-from core.change.operation_history import operation_history
-from core.change.verdict import JUDGED, Verdict
+from core.change.settings import FilmRules
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.quality import Reading, Reason, missing, uncertain
@@ -41,7 +38,7 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(
     assert [n.reading.condition.is_settled for n in news] == settled.tolist()
     for row, direction in enumerate("xy"):
         learned = films.baseline.of(Watched.STIFFNESS, direction)
-        whole = back_test(said, settled, learned, rules.change)
+        whole = decide_all(WatchedReadings.of(said, settled, direction), learned, rules.change)
         findings = [n.findings[row] for n in news]
         assert [f.verdict for f in findings] == whole.verdict.tolist()
         assert [f.level or 0 for f in findings] == whole.level.tolist()
@@ -58,9 +55,9 @@ def test_a_restart_in_the_middle_changes_no_verdict(films: Any, rules: FilmRules
     first = films.watched(history.rows(0, n))
 
     after = films.watch(has_baseline=False)
-    after.judge.put_in_force("UJB", films.baseline, first[-1].decisions)
-    operation, oil = operation_after(history.rows(n - 200, n), rules)
-    after.go_on(operation, {"UJB": oil})
+    after.judge.activate_baseline("UJB", films.baseline, first[-1].decisions)
+    operation, oil = last_operation(history.rows(n - 200, n), rules)
+    after.restore_operation(operation, {"UJB": oil})
     second = films.watched(history.rows(n - 1, len(history)), after)
 
     assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]
@@ -74,7 +71,7 @@ def test_decisions_caught_up_with_are_those_that_would_have_been_made(
     settled = np.array([n.reading.condition.is_settled for n in made])
     for row, direction in enumerate("xy"):
         learned = films.baseline.of(Watched.STIFFNESS, direction)
-        caught = decision_after(history.rows(1, len(history)), settled, learned, rules)
+        caught = last_decision(history.rows(1, len(history)), settled, learned, rules)
         through = made[-1].decisions[row]
         assert (caught.verdict, caught.level) == (through.verdict, through.level)
         assert caught.evidence.n_counted == through.evidence.n_counted
@@ -123,21 +120,21 @@ def test_doubtful_numbers_are_no_numbers(films: Any, rules: FilmRules) -> None:
     condition = films.watch(has_baseline=False).take([films.assessment(**good)])[0][0].condition
     assert condition is not None
     x, y = film_reading(films.assessment(**good), condition, rules.estimators["UJB"]).values
-    assert (x.evidence, x.ln_k, x.u_random) == (Evidence.MEASURED, np.log(0.5e9), 0.02)
-    assert (y.evidence, y.reason) == (Evidence.BAD_QUALITY, Reason.LOW_COVERAGE)
+    assert (x.outcome, x.ln_k, x.u_random) == (ReadingOutcome.MEASURED, np.log(0.5e9), 0.02)
+    assert (y.outcome, y.reason) == (ReadingOutcome.BAD_QUALITY, Reason.LOW_COVERAGE)
     assert np.isnan(y.ln_k)
 
     cold = good | {"oil_temperature_c": missing(Reason.OUT_OF_RANGE)}
     x, _ = film_reading(films.assessment(**cold), condition, rules.estimators["UJB"]).values
-    assert (x.evidence, x.reason) == (Evidence.BAD_QUALITY, Reason.OUT_OF_RANGE)
+    assert (x.outcome, x.reason) == (ReadingOutcome.BAD_QUALITY, Reason.OUT_OF_RANGE)
 
     still = good | {"dynamic_k_xx_n_per_m": missing(Reason.INSUFFICIENT_EXCITATION)}
     x, _ = film_reading(films.assessment(**still), condition, rules.estimators["UJB"]).values
-    assert x.evidence is Evidence.INSUFFICIENT_EXCITATION
+    assert x.outcome is ReadingOutcome.INSUFFICIENT_EXCITATION
 
     soft = good | {"dynamic_k_xx_n_per_m": Reading(-1e6, u_random=1e6)}
     x, _ = film_reading(films.assessment(**soft), condition, rules.estimators["UJB"]).values
-    assert x.evidence is Evidence.BAD_QUALITY
+    assert x.outcome is ReadingOutcome.BAD_QUALITY
 
 
 def test_results_say_the_condition_that_they_were_found_under(films: Any) -> None:

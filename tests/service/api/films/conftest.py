@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.baseline.baseline import Watched
-from core.baseline.stiffness_history import DIRECTIONS, Evidence, StiffnessHistory
-from core.change.decision import UNDECIDED
-from core.change.film_finding import FilmFinding
-from core.change.film_judge import FilmNews
+from core.baseline.history import DIRECTIONS, ReadingOutcome, StiffnessHistory, Watched
+from core.change.backtest import operation_history
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
-from core.change.operation_history import operation_history
-from core.change.verdict import Verdict
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
@@ -68,7 +65,7 @@ def database_file(
         FilmNews(
             stored_reading(lived, i, OperatingState(found.state[i]), bool(found.is_settled[i])),
             (NOTHING_SAID, NOTHING_SAID),
-            (UNDECIDED, UNDECIDED),
+            (INITIAL_DECISION, INITIAL_DECISION),
         )
         for i in range(len(lived))
     )
@@ -92,7 +89,7 @@ def stored_reading(
             float(lived.u_random[row, i]),
             float(lived.shaft_um_pk[row, i]),
             float(lived.bearing_um_pk[row, i]),
-            Evidence.MEASURED,
+            ReadingOutcome.MEASURED,
             Reason.OK,
         )
         for row in range(2)

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from rigs.probes import post
 
-from core.baseline.baseline import Watched
-from core.baseline.exchange import from_json
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory, Watched
 from service.api.times import rfc3339
+from service.store.documents import baseline_from_json
 
 BASELINES = "/api/v1/units/U1/bearings/UJB/baselines"
 FILM = "/api/v1/units/U1/bearings/UJB/film"
@@ -76,7 +75,7 @@ async def test_cells_and_export_are_what_was_learned(learned: Any) -> None:
     name = 'attachment; filename="U1-UJB-baseline-1.json"'
     assert export.headers["content-disposition"] == name
     assert export.headers["content-type"] == "application/json"
-    assert from_json(export.text) == learned.store.films.baseline("U1", "UJB", 1)
+    assert baseline_from_json(export.text) == learned.store.films.baseline("U1", "UJB", 1)
 
 
 async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_again(

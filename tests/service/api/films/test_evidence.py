@@ -17,7 +17,7 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
-from core.change.film_finding import alarm_condition
+from core.change.film_judge import alarm_condition
 from service.security.people import create_key
 from service.security.roles import Role
 

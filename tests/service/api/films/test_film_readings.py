@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from core.baseline.stiffness_history import StiffnessHistory
+from core.baseline.history import StiffnessHistory
 from service.api.times import rfc3339
 
 READINGS = "/api/v1/units/U1/bearings/UJB/film/readings"

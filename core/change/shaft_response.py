@@ -1,9 +1,9 @@
-"""How shaft motion at 1× answers to stiffness, learned from a healthy machine.
+"""Response of shaft motion at 1× to stiffness, learned from a healthy machine.
 
-Which conditions it meets makes a machine's films four times stiffer or softer and back, so that its
-healthy readings show how far the shaft moves for any stiffness of its bearings. A film that is
-damaged moves it as any film of its stiffness does; a bracket or transducer that changes what is
-measured does not. What unbalance does is common to all places: only the share of each place in the
+Operating conditions make a machine's films four times stiffer or softer and back, so that its
+healthy readings show how far the shaft moves for any stiffness of its bearings. A damaged film
+moves it as any film of that stiffness does; a bracket or transducer that changes the measurement
+does not. Unbalance acts on all bearings alike: only the share of each film direction in the
 geometric mean of all is learned.
 """
 
@@ -17,28 +17,28 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.grouping import bisquare, robust_std
-from core.baseline.stiffness_history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 
-Place: TypeAlias = tuple[str, str]
+FilmDirection: TypeAlias = tuple[str, str]
 """Bearing and direction."""
 
 MEAN_READINGS = 24
 """Readings that are averaged before a response is judged: four hours."""
 
-LEAST_MEANS = 50
-"""Averages that must be there to learn from."""
+MIN_MEANS = 50
+"""Number of averages that learning requires."""
 
 PARTS = 6
-"""Parts of the time of learning that are left out in turn to see how far a response errs."""
+"""Parts of the learning period that are left out in turn for cross-validation."""
 
 ROUNDS = 6
 RIDGE = 1e-6
-LEAST_STD = 1e-4
+MIN_STD = 1e-4
 
 
 @dataclass(frozen=True)
 class ShaftResponse:
-    """Share of each place in the shaft's motion, as a quadratic function of all stiffnesses.
+    """Share of each film in the shaft's motion, as a quadratic function of all stiffnesses.
 
     Parameters
     ----------
@@ -47,13 +47,12 @@ class ShaftResponse:
     centre
         ln of a typical stiffness of each.
     coefficients
-        (n_places, n_terms)
+        (n_films, n_terms)
     std
-        What means of `MEAN_READINGS` of each place scatter by, in ln, in a time that was not
-        learned.
+        Cross-validated scatter of means of `MEAN_READINGS` of each film, in ln.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[FilmDirection, ...]
     centre: tuple[float, ...]
     coefficients: tuple[tuple[float, ...], ...]
     std: tuple[float, ...]
@@ -71,15 +70,15 @@ class ShaftResponse:
         return np.array(self.coefficients)
 
     def expected(self, ln_k: FloatArray) -> FloatArray:
-        """Ln of the shaft's motion at each place over the geometric mean of all.
+        """Expected ln of the shaft's motion at each film over the geometric mean of all.
 
         Parameters
         ----------
-        ln_k : (n_places, n)
+        ln_k : (n_films, n)
 
         Returns
         -------
-        (n_places, n)
+        (n_films, n)
         """
         return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
 
@@ -87,7 +86,7 @@ class ShaftResponse:
 def learn_response(
     histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
 ) -> ShaftResponse | None:
-    """Learn from all bearings of a unit together.
+    """Learn the response from all bearings of a unit together.
 
     Parameters
     ----------
@@ -97,12 +96,12 @@ def learn_response(
 
     Returns
     -------
-    None if there are too few readings with stiffness and amplitude at every place.
+    None if there are too few readings with stiffness and amplitude of every film.
     """
     places = tuple((bearing, direction) for bearing in histories for direction in DIRECTIONS)
-    ln_k, ln_shaft = place_columns(histories)
+    ln_k, ln_shaft = film_columns(histories)
     usable = is_settled & np.all(np.isfinite(ln_k) & np.isfinite(ln_shaft), axis=0)
-    if np.sum(usable) < LEAST_MEANS * MEAN_READINGS:
+    if np.sum(usable) < MIN_MEANS * MEAN_READINGS:
         return None
     ln_k, ln_shaft = ln_k[:, usable], ln_shaft[:, usable]
     centre = np.median(ln_k, axis=1)
@@ -112,12 +111,12 @@ def learn_response(
         places,
         tuple(centre.tolist()),
         tuple(tuple(_fit(terms, share).tolist()) for share in shares),
-        tuple(max(_mean_std(row), LEAST_STD) for row in _held_out(terms, shares)),
+        tuple(max(_mean_std(row), MIN_STD) for row in _held_out(terms, shares)),
     )
 
 
-def place_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
-    """Ln of stiffness and of shaft motion at every place: (n_places, n) each.
+def film_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
+    """Ln of stiffness and of shaft motion of every film: (n_films, n) each.
 
     Raises
     ------
@@ -133,8 +132,8 @@ def place_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray
     return ln_k, np.log(np.where(shaft > 0.0, shaft, np.nan))
 
 
-def _n_terms(n_places: int) -> int:
-    return 1 + n_places + n_places * (n_places + 1) // 2
+def _n_terms(n_films: int) -> int:
+    return 1 + n_films + n_films * (n_films + 1) // 2
 
 
 def _terms(x: FloatArray) -> FloatArray:
@@ -151,12 +150,12 @@ def _fit(terms: FloatArray, share: FloatArray) -> FloatArray:
         normal = weighted @ terms.T + RIDGE * share.size * np.eye(terms.shape[0])
         coefficients = np.asarray(np.linalg.solve(normal, weighted @ share), np.float64)
         residual = share - coefficients @ terms
-        weight = bisquare(residual / max(robust_std(residual), LEAST_STD))
+        weight = bisquare(residual / max(robust_std(residual), MIN_STD))
     return coefficients
 
 
 def _held_out(terms: FloatArray, shares: FloatArray) -> FloatArray:
-    """(n_places, n) what is left over of each part of the time by a fit to the others."""
+    """(n_films, n) residuals of each part of the time from a fit to the others."""
     left = np.empty_like(shares)
     for part in np.array_split(np.arange(shares.shape[1]), PARTS):
         others = np.delete(np.arange(shares.shape[1]), part)

@@ -1,7 +1,7 @@
 """Readings of one bearing over time as columns: what baselines learn from and back-tests run on."""
 
 from dataclasses import dataclass, field, fields
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import TypeAlias
 
 import numpy as np
@@ -17,7 +17,15 @@ DIRECTIONS = ("x", "y")
 """Rows of every column of shape (2, n)."""
 
 
-class Evidence(IntEnum):
+class Watched(StrEnum):
+    """Quantity that has a baseline: stiffness, and the two 1× amplitudes that show its cause."""
+
+    STIFFNESS = "stiffness"
+    SHAFT = "shaft"
+    BEARING = "bearing"
+
+
+class ReadingOutcome(IntEnum):
     """Whether a stiffness was measured, and if not, why there is no number."""
 
     MEASURED = 0
@@ -40,14 +48,14 @@ class StiffnessHistory:
         Random standard uncertainty of stiffness relative to it, which is that of `ln_k`.
     shaft_um_pk, bearing_um_pk : (2, n)
         Amplitudes at 1×, of shaft relative to bearing and of bearing.
-    evidence : (2, n), optional
-        Members of `Evidence`; by default a missing `ln_k` is of bad quality.
+    outcome : (2, n), optional
+        Members of `ReadingOutcome`; by default a missing `ln_k` is of bad quality.
 
     Raises
     ------
     ValueError
         If a column has another length or shape, time does not increase, a number is infinite, an
-        uncertainty is not above zero, or evidence and number contradict one another; with column
+        uncertainty is not above zero, or outcome and number contradict one another; with column
         and row.
     """
 
@@ -62,12 +70,14 @@ class StiffnessHistory:
     u_random: FloatArray
     shaft_um_pk: FloatArray
     bearing_um_pk: FloatArray
-    evidence: CodeArray = field(default_factory=lambda: np.empty((2, 0), np.int8))
+    outcome: CodeArray = field(default_factory=lambda: np.empty((2, 0), np.int8))
 
     def __post_init__(self) -> None:
-        if self.evidence.size == 0:
-            missing = np.where(np.isnan(self.ln_k), Evidence.BAD_QUALITY, Evidence.MEASURED)
-            object.__setattr__(self, "evidence", missing.astype(np.int8))
+        if self.outcome.size == 0:
+            missing = np.where(
+                np.isnan(self.ln_k), ReadingOutcome.BAD_QUALITY, ReadingOutcome.MEASURED
+            )
+            object.__setattr__(self, "outcome", missing.astype(np.int8))
         self._check_shapes()
         steps = np.flatnonzero(np.diff(self.time_ns) <= 0)
         if steps.size:
@@ -79,7 +89,7 @@ class StiffnessHistory:
 
     @property
     def conditions(self) -> FilmConditions:
-        """What all readings are compared under."""
+        """Conditions of all readings."""
         return FilmConditions(self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
@@ -105,11 +115,13 @@ class StiffnessHistory:
         for column in fields(self):
             _refuse(column.name, "is infinite", np.isinf(getattr(self, column.name)))
         measured = np.isfinite(self.ln_k)
-        _refuse("evidence", "contradicts ln_k", (self.evidence == Evidence.MEASURED) != measured)
+        _refuse(
+            "outcome", "contradicts ln_k", (self.outcome == ReadingOutcome.MEASURED) != measured
+        )
         _refuse("u_random", "must be above 0", measured & ~(self.u_random > 0.0))
 
 
-PER_DIRECTION = frozenset({"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "evidence"})
+PER_DIRECTION = frozenset({"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "outcome"})
 """Columns of shape (2, n)."""
 
 
@@ -117,3 +129,24 @@ def _refuse(column: str, why: str, is_wrong: npt.NDArray[np.bool_]) -> None:
     wrong = np.argwhere(is_wrong)
     if wrong.size:
         raise ValueError(f"{column}: row {wrong[0][-1]} {why}")
+
+
+def watched_values(
+    history: StiffnessHistory, quantity: Watched, direction: str
+) -> tuple[FloatArray, FloatArray]:
+    """Logarithm of a quantity and its random uncertainty.
+
+    Returns
+    -------
+    (n,), (n,)
+        NaN where there is no number. The uncertainty of amplitudes is unknown and given as zero: it
+        is part of the learned scatter.
+    """
+    row = DIRECTIONS.index(direction)
+    if quantity is Watched.STIFFNESS:
+        return history.ln_k[row], np.nan_to_num(history.u_random[row])
+    amplitude = history.shaft_um_pk if quantity is Watched.SHAFT else history.bearing_um_pk
+    is_there = amplitude[row] > 0.0
+    value = np.full(len(history), np.nan)
+    value[is_there] = np.log(amplitude[row][is_there])
+    return value, np.zeros(len(history))

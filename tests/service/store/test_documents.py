@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.baseline.baseline import BearingBaseline, Origin, Watched
-from core.baseline.exchange import from_json, to_json
+from core.baseline.baseline import BearingBaseline, Origin
+from core.baseline.history import StiffnessHistory, Watched
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.baseline.stiffness_history import StiffnessHistory
+from core.change.shaft_response import ShaftResponse
+from service.store.documents import baseline_from_json, response_from_json, to_json
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,14 @@ def baseline(film_life: Callable[..., StiffnessHistory]) -> BearingBaseline:
 
 
 def test_a_baseline_comes_back_as_it_was(baseline: BearingBaseline) -> None:
-    assert from_json(to_json(baseline)) == baseline
+    assert baseline_from_json(to_json(baseline)) == baseline
+
+
+def test_a_response_comes_back_as_it_was_unless_it_was_tampered_with() -> None:
+    response = ShaftResponse((("UJB", "x"),), (20.0,), ((0.1, 0.2, 0.3),), (0.01,))
+    assert response_from_json(to_json(response)) == response
+    with pytest.raises(ValueError, match="std"):
+        response_from_json(to_json(response).replace('"std": [', '"std": [-1.0, ', 1))
 
 
 def change(content: Any, path: list[str | int], value: object) -> None:
@@ -39,20 +47,20 @@ FIRST = ["content", "quantities", 0]
 @pytest.mark.parametrize(
     ("path", "value", "says"),
     [
-        (["format"], "spectrum", "expected 'padwatch-baseline'"),
-        (["format_version"], 2, "expected 'padwatch-baseline' version 1"),
-        (["content", "origin", "author"], KeyError, "content.origin: expected .* author"),
-        (["content", "origin", "auther"], "Ada", "content.origin: expected"),
-        (["content", "origin", "version"], "3", "content.origin.version: '3'"),
-        (["content", "origin", "version"], True, "content.origin.version: True"),
-        ([*FIRST, "direction"], "z", r"quantities\[0\]: direction = 'z'"),
-        ([*FIRST, "quantity"], "colour", r"quantities\[0\].quantity: 'colour' is not one of"),
-        ([*FIRST, "scatter"], -1.0, r"quantities\[0\]: scatter = -1"),
+        (["format"], "spectrum", "format: .* 'padwatch-baseline'"),
+        (["format_version"], 2, "format_version: .* 1 "),
+        (["content", "origin", "author"], KeyError, "content.origin.author: Field required"),
+        (["content", "origin", "auther"], "Ada", "content.origin.auther: Unexpected"),
+        (["content", "origin", "version"], "3", "content.origin.version: .* '3'"),
+        (["content", "origin", "version"], True, "content.origin.version: .* True"),
+        ([*FIRST, "direction"], "z", "quantities.0: direction = 'z'"),
+        ([*FIRST, "quantity"], "colour", "quantities.0.quantity: .* 'colour'"),
+        ([*FIRST, "scatter"], -1.0, "quantities.0: scatter = -1"),
         ([*FIRST, "surface", "coefficients"], [1.0], "coefficients: 1, expected"),
-        ([*FIRST, "surface", "coefficients", 0], None, r"coefficients\[0\]: None"),
+        ([*FIRST, "surface", "coefficients", 0], None, "coefficients.0: .* None"),
         ([*FIRST, "surface", "shape", "temperature", "width"], 0.0, "temperature: width = 0"),
         ([*FIRST, "grid", "eccentricity_width"], -0.05, "grid: eccentricity_width = -0.05"),
-        ([*FIRST, "table", "cells", 0, "support"], "some", r"cells\[0\].support: 'some'"),
+        ([*FIRST, "table", "cells", 0, "support"], "some", "cells.0.support: .* 'some'"),
         ([*FIRST, "table", "cells", 0, "cell"], [99, 99, 99], "not all have as many axes"),
         ([*FIRST, "time_scatter", 0, "time_scale_h"], 1e9, "must increase"),
     ],
@@ -63,7 +71,7 @@ def test_a_baseline_that_was_tampered_with_is_refused(
     content = json.loads(to_json(baseline))
     change(content, path, value)
     with pytest.raises(ValueError, match=says):
-        from_json(json.dumps(content))
+        baseline_from_json(json.dumps(content))
 
 
 @pytest.mark.parametrize(
@@ -72,10 +80,10 @@ def test_a_baseline_that_was_tampered_with_is_refused(
 )
 def test_what_is_no_baseline_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r".+"):
-        from_json(text)
+        baseline_from_json(text)
 
 
 def test_a_huge_number_is_refused(baseline: BearingBaseline) -> None:
     text = to_json(baseline).replace('"scatter": ', '"scatter": 1e999, "x": ', 1)
     with pytest.raises(ValueError, match=r".+"):
-        from_json(text)
+        baseline_from_json(text)

@@ -1,0 +1,185 @@
+"""Operation and decisions over stored readings: the steps of a running unit, folded."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray, TimeArray
+from core.baseline.baseline import QuantityBaseline
+from core.baseline.history import CodeArray, StiffnessHistory
+from core.change.decision import INITIAL_DECISION, Decision, WatchedReadings, step
+from core.change.settings import ChangeLimits, FilmRules
+from core.condition.operating_state import (
+    NOT_AT_SPEED,
+    UNKNOWN_OPERATION,
+    OilSettling,
+    OperatingLimits,
+    OperatingState,
+    Operation,
+    step_given_state,
+    step_operation,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class OperationHistory:
+    """Operating state of every reading.
+
+    Parameters
+    ----------
+    state : (n,)
+        Members of `OperatingState`.
+    is_settled : (n,)
+    """
+
+    state: CodeArray
+    is_settled: npt.NDArray[np.bool_]
+
+
+def operation_history(
+    time_ns: TimeArray,
+    speed_rpm: FloatArray,
+    power_mw: FloatArray,
+    limits: OperatingLimits,
+    oil_temperature_c: FloatArray | None = None,
+) -> OperationHistory:
+    """Operating states from speed and power.
+
+    Parameters
+    ----------
+    time_ns, speed_rpm, power_mw : (n,)
+        Strictly increasing; NaN where there is no number.
+    oil_temperature_c : (n,), optional
+        Of the bearing; without it a film warms up for the longest time.
+    """
+    rows = zip(time_ns.tolist(), speed_rpm.tolist(), power_mw.tolist(), strict=True)
+    return _history(_folded(step_operation, rows, oil_temperature_c, limits), limits)
+
+
+def operation_of_states(
+    time_ns: TimeArray,
+    state: CodeArray,
+    limits: OperatingLimits,
+    oil_temperature_c: FloatArray | None = None,
+) -> OperationHistory:
+    """Settling where a file of readings gives the operating states.
+
+    Parameters
+    ----------
+    state : (n,)
+        Members of `OperatingState`.
+    oil_temperature_c : (n,), optional
+        Of the bearing; without it a film warms up for the longest time.
+    """
+    rows = zip(time_ns.tolist(), map(OperatingState, state.tolist()), strict=True)
+    return _history(_folded(step_given_state, rows, oil_temperature_c, limits), limits)
+
+
+def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
+    """Operation of a unit and settling of a bearing's oil after the bearing's stored readings."""
+    time_ns = history.time_ns
+    if len(history):
+        # readings keep their distances, though time may be made to pass faster from now on
+        time_ns = time_ns + (rules.lapsed_ns(int(time_ns[-1])) - int(time_ns[-1]))
+    columns = (time_ns, history.speed_rpm, history.power_mw)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    steps = _folded(step_operation, rows, history.oil_temperature_c, rules.operating)
+    found = deque(steps, maxlen=1)
+    return found[0] if found else (UNKNOWN_OPERATION, NOT_AT_SPEED)
+
+
+def _folded(
+    step: Callable[..., Operation],
+    rows: Iterable[tuple[Any, ...]],
+    oil_temperature_c: FloatArray | None,
+    limits: OperatingLimits,
+) -> Iterator[tuple[Operation, OilSettling]]:
+    """Operation and oil after each row; `step` takes the operation, the row and the limits."""
+    temperatures = repeat(np.nan) if oil_temperature_c is None else oil_temperature_c.tolist()
+    operation, oil = UNKNOWN_OPERATION, NOT_AT_SPEED
+    for row, oil_c in zip(rows, temperatures, strict=False):
+        operation = step(operation, *row, limits)
+        oil = oil.step(operation, oil_c, limits)
+        yield operation, oil
+
+
+def _history(
+    found: Iterator[tuple[Operation, OilSettling]], limits: OperatingLimits
+) -> OperationHistory:
+    rows = [(int(o.state), o.is_settled(limits, oil.has_settled)) for o, oil in found]
+    state, is_settled = np.array(rows, np.int8).reshape(-1, 2).T
+    return OperationHistory(state, is_settled.astype(np.bool_))
+
+
+@dataclass(frozen=True, eq=False)
+class DecisionHistory:
+    """The decision after every reading.
+
+    Parameters
+    ----------
+    verdict : (n,)
+        Members of `Verdict`.
+    level : (n,)
+        Level that is held: 0 for none, or a member of `AlarmLevel`.
+    change, significance, time_scale_h : (n,)
+        The most significant mean deviation; NaN before there is one.
+    """
+
+    verdict: CodeArray
+    level: CodeArray
+    change: FloatArray
+    significance: FloatArray
+    time_scale_h: FloatArray
+
+    def raised(self) -> npt.NDArray[np.int64]:
+        """Rows in which a level rises."""
+        return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
+
+
+def decide_all(
+    readings: WatchedReadings, baseline: QuantityBaseline | None, limits: ChangeLimits
+) -> DecisionHistory:
+    """Decide over stored readings, oldest first, from the initial decision on."""
+    nothing = (np.nan, np.nan, np.nan)
+    rows = [
+        (
+            *(decision.verdict, decision.level or 0),
+            *((f.change, f.significance, f.time_scale_h) if (f := decision.finding) else nothing),
+        )
+        for decision in _decisions(readings, baseline, limits)
+    ]
+    verdict, level, *finding = np.array(rows, np.float64).reshape(-1, 5).T.copy()
+    return DecisionHistory(verdict.astype(np.int8), level.astype(np.int8), *finding)
+
+
+def last_decision(
+    history: StiffnessHistory,
+    is_settled: npt.NDArray[np.bool_],
+    baseline: QuantityBaseline,
+    rules: FilmRules,
+) -> Decision:
+    """Decision after stored readings, as if the baseline had been in force.
+
+    Parameters
+    ----------
+    is_settled : (n,)
+    """
+    readings = WatchedReadings.of(history, is_settled, baseline.direction)
+    lapsed = [rules.lapsed_ns(time_ns) for time_ns in history.time_ns.tolist()]
+    readings = replace(readings, time_ns=np.array(lapsed, np.int64))
+    found = deque(_decisions(readings, baseline, rules.change), maxlen=1)
+    return found[0] if found else INITIAL_DECISION
+
+
+def _decisions(
+    readings: WatchedReadings, baseline: QuantityBaseline | None, limits: ChangeLimits
+) -> Iterator[Decision]:
+    decision = INITIAL_DECISION
+    for time_ns, outcome in readings.compared(baseline):
+        decision = step(decision, time_ns, outcome, baseline, limits)
+        yield decision
