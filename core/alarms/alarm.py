@@ -1,6 +1,7 @@
-"""`Alarm`: what is known of one alarm, and the words of its life cycle."""
+"""`Alarm` and `AlarmEvent`: one alarm at one moment, and one line of its history."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -18,53 +19,6 @@ class AlarmState(StrEnum):
     SHELVED = "shelved"
     SUPPRESSED = "suppressed"
     OUT_OF_SERVICE = "out_of_service"
-
-
-class AlarmKind(StrEnum):
-    """What is wrong, in a word that is part of the alarm's identity."""
-
-    CHANNEL_NOT_OK = "channel_not_ok"
-    SHAFT_X = "order1_shaft_x"
-    SHAFT_Y = "order1_shaft_y"
-    CHANGE_SHAFT_X = "order1_change_shaft_x"
-    CHANGE_SHAFT_Y = "order1_change_shaft_y"
-    CHANGE_BEARING_X = "order1_change_bearing_x"
-    CHANGE_BEARING_Y = "order1_change_bearing_y"
-    OVERALL_SHAFT_X = "overall_shaft_x"
-    OVERALL_SHAFT_Y = "overall_shaft_y"
-    OVERALL_BEARING_X = "overall_bearing_x"
-    OVERALL_BEARING_Y = "overall_bearing_y"
-    ZONE_SHAFT_X = "zone_shaft_x"
-    ZONE_SHAFT_Y = "zone_shaft_y"
-    ZONE_SHAFT = "zone_shaft"
-    ZONE_BEARING_X = "zone_bearing_x"
-    ZONE_BEARING_Y = "zone_bearing_y"
-    ECCENTRICITY = "eccentricity_ratio"
-    GAP_X = "gap_x"
-    GAP_Y = "gap_y"
-    OPPOSITE_GAP_X = "opposite_gap_x"
-    OPPOSITE_GAP_Y = "opposite_gap_y"
-    OIL_TEMPERATURE = "oil_temperature"
-    STIFFNESS_X = "stiffness_x"
-    STIFFNESS_Y = "stiffness_y"
-    CLOCK_OFFSET = "clock_offset"
-    CLOCK_DRIFT = "clock_drift"
-    TIME_STAMPS = "time_stamps"
-    LINK_LOST = "link_lost"
-    SAMPLES_LOST = "samples_lost"
-    RESULTS_NOT_STORED = "results_not_stored"
-    RESULTS_LOST = "results_lost"
-    BLOCKS_WAITING = "blocks_waiting"
-    ANALYSIS_LATE = "analysis_late"
-    CAPTURES_NOT_KEPT = "captures_not_kept"
-    SAMPLES_NOT_RECORDED = "samples_not_recorded"
-    RECORDINGS_DAMAGED = "recordings_damaged"
-    QUESTIONS_REFUSED = "questions_refused"
-    DISK_NEARLY_FULL = "disk_nearly_full"
-    STORED_DATA_DAMAGED = "stored_data_damaged"
-    MESSAGES_REFUSED = "messages_refused"
-    STREAM_AWAY = "stream_away"
-    ANALYSIS_GONE = "analysis_gone"
 
 
 PLANT = "plant"
@@ -86,7 +40,7 @@ class AlarmIdentity:
 
     unit: str
     subject: str
-    kind: AlarmKind
+    kind: str
 
     @cached_property
     def id(self) -> str:
@@ -186,8 +140,8 @@ class Alarm:
         return AlarmState.ACKNOWLEDGED if self.is_acknowledged else AlarmState.UNACKNOWLEDGED
 
     @cached_property
-    def is_resting(self) -> bool:
-        """Whether it would not be changed by one more condition that is known and within limits."""
+    def is_settled_inactive(self) -> bool:
+        """Whether one more condition that is known and within limits leaves it unchanged."""
         return (
             self.level is None
             and self.condition.is_known
@@ -195,3 +149,118 @@ class Alarm:
             and self.suppressed_by is None
             and self.timers == (RESTED, RESTED)
         )
+
+
+class AlarmChange(StrEnum):
+    """What happened to an alarm."""
+
+    RAISED = "raised"
+    ESCALATED = "escalated"
+    EASED = "eased"
+    RETURNED = "returned"
+    LATCHED = "latched"
+    RESET = "reset"
+    ACKNOWLEDGED = "acknowledged"
+    SHELVED = "shelved"
+    UNSHELVED = "unshelved"
+    SUPPRESSED = "suppressed"
+    UNSUPPRESSED = "unsuppressed"
+    TAKEN_OUT_OF_SERVICE = "taken_out_of_service"
+    RETURNED_TO_SERVICE = "returned_to_service"
+    COMMENTED = "commented"
+    CONDITION_UNKNOWN = "condition_unknown"
+    CONDITION_KNOWN = "condition_known"
+
+
+ANNOUNCED = (AlarmChange.RAISED, AlarmChange.ESCALATED)
+"""The changes that begin a new occurrence."""
+
+
+@dataclass(frozen=True)
+class AlarmEvent:
+    """A transition of an alarm, or news of it that somebody must be able to find later.
+
+    Parameters
+    ----------
+    number
+        Of this alarm's events, from 1 without a hole.
+    level
+        That the alarm has after it; of one that has returned or was reset, that it had.
+    time_ns
+        Of the samples where they decided, of the host where a person or a link did.
+    occurrence
+        Which occurrence of the alarm it belongs to.
+    actor
+        Who did it; empty if nobody did.
+    reason
+        Why, in a word or in the words of the actor.
+    raised_at
+        Under which operating condition that occurrence was raised; None where that was not known.
+    """
+
+    identity: AlarmIdentity
+    number: int
+    change: AlarmChange
+    level: AlarmLevel | None
+    state_before: AlarmState
+    state_after: AlarmState
+    time_ns: int
+    occurrence: int
+    value: float | None = None
+    limit: float | None = None
+    actor: str = ""
+    reason: str = ""
+    raised_at: OperatingPoint | None = None
+
+
+@dataclass(frozen=True)
+class AlarmNews:
+    """An alarm with the events that have led to what it is now.
+
+    Parameters
+    ----------
+    peer
+        Address from which somebody asked for them; None if nobody did, or it is not known.
+    command
+        Which command asked for them, where it came through the database: it is answered by being
+        stored with them.
+    """
+
+    alarm: Alarm
+    events: Sequence[AlarmEvent]
+    peer: str | None = None
+    command: str | None = None
+
+
+def changed(
+    before: Alarm,
+    after: Alarm,
+    change: AlarmChange,
+    time_ns: int,
+    actor: str = "",
+    reason: str = "",
+) -> tuple[Alarm, AlarmEvent]:
+    """Count one more event and write it down.
+
+    Parameters
+    ----------
+    after
+        The alarm as it is to be, but for the number of its events.
+    """
+    after = replace(after, n_events=before.n_events + 1)
+    event = AlarmEvent(
+        identity=after.identity,
+        number=after.n_events,
+        change=change,
+        level=after.level if after.level is not None else before.level,
+        state_before=before.state,
+        state_after=after.state,
+        time_ns=time_ns,
+        occurrence=after.occurrence,
+        value=after.condition.value,
+        limit=after.condition.limit,
+        actor=actor,
+        reason=reason,
+        raised_at=after.raised_at,
+    )
+    return after, event

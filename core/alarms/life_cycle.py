@@ -6,8 +6,7 @@ samples lead to the same events however fast they are played.
 
 from dataclasses import replace
 
-from core.alarms.alarm import Alarm, AlarmRule
-from core.alarms.event import AlarmChange, AlarmEvent, changed
+from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmRule, changed
 from core.limits import ON, RESTED, AlarmLevel, Condition, DelayTimer
 
 Timers = tuple[DelayTimer, DelayTimer]

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from core.alarms.alarm import Alarm, Hold
-from core.alarms.event import AlarmChange, AlarmEvent, changed
+from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, Hold, changed
 from core.alarms.life_cycle import shown_again, standing_level
 from core.units import NS_PER_S
 

@@ -4,8 +4,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import Alarm, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
 

@@ -2,14 +2,12 @@
 
 from collections.abc import Iterable
 
-from core.alarms.alarm import AlarmIdentity, AlarmKind
+from core.alarms.alarm import AlarmIdentity
 from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
 from core.limits import WITHIN, AlarmLevel, Condition
 from service.alarms.told_alarms import ToldAlarms
-
-STREAM = "stream"
-"""Subject of alarms about the stream and what it carries."""
+from service.settings.alarm_kinds import MESSAGES_REFUSED, STREAM
 
 REFUSED_FOR_S = 600.0
 """How long an alarm stands after the last message that was refused."""
@@ -35,4 +33,4 @@ def refuse(alarms: ToldAlarms, unit: str, reason: str) -> None:
 
 
 def _refused(unit: str) -> AlarmIdentity:
-    return AlarmIdentity(unit, STREAM, AlarmKind.MESSAGES_REFUSED)
+    return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import AlarmIdentity, AlarmKind
+from core.alarms.alarm import AlarmIdentity
+from core.alarms.kinds import FILM_KINDS
 from core.baseline.baseline import BearingBaseline
 from core.baseline.stiffness_history import DIRECTIONS
 from core.change.film_finding import alarm_condition
@@ -32,7 +33,7 @@ log = structlog.get_logger()
 MAX_LEARN_S = 900.0
 """Longest that learning one bearing from its whole history may take."""
 
-KINDS = dict(zip(DIRECTIONS, (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y), strict=True))
+KINDS = dict(zip(DIRECTIONS, FILM_KINDS, strict=True))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
-from core.alarms.kinds import drift_reading
+from core.alarms.judgements import drift_reading
 
 
 @pytest.mark.parametrize(

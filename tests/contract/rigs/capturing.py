@@ -10,8 +10,7 @@ import numpy as np
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import RecordingWriter
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Shelve, operate
 from core.limits import AlarmLevel, Condition
@@ -71,7 +70,7 @@ def block(
 
 
 def raised(
-    at_s: float, kind: AlarmKind = AlarmKind.SHAFT_X, unit: str = "U1", shelved: bool = False
+    at_s: float, kind: str = "order1_shaft_x", unit: str = "U1", shelved: bool = False
 ) -> AlarmNews:
     """An alarm that is raised so many seconds after the start."""
     alarm = Alarm(AlarmIdentity(unit, "UJB", kind))

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Action, operate
 from core.limits import Condition
@@ -52,7 +51,7 @@ class Life:
 
     rule: AlarmRule
     alarm: Alarm = field(
-        default_factory=lambda: Alarm(AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X))
+        default_factory=lambda: Alarm(AlarmIdentity("U1", "UJB", "order1_shaft_x"))
     )
     events: list[AlarmEvent] = field(default_factory=list)
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import pytest
 
 from core.alarms.alarm import AlarmState
+from core.alarms.judgements import OrderVector, VectorReference, vector_condition
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.alarms.vector_change import OrderVector, VectorReference, vector_condition
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Condition, Limits, unknown
 from core.machine.unit import Unit

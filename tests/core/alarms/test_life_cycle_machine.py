@@ -8,8 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmEvent, AlarmIdentity, AlarmRule, AlarmState
 from core.alarms.life_cycle import advance, interrupted, restored
 from core.alarms.operation import (
     Acknowledge,
@@ -24,7 +23,7 @@ from core.alarms.operation import (
 )
 from core.limits import AlarmLevel, Condition, unknown
 
-IDENTITY = AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X)
+IDENTITY = AlarmIdentity("U1", "UJB", "order1_shaft_x")
 
 LEVELS = st.sampled_from([None, AlarmLevel.ALERT, AlarmLevel.DANGER])
 STEPS = st.integers(0, 7)

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.alarms.condition_limits import AT_SPEED, ConditionLimits, Region
-from core.alarms.kinds import (
+from core.alarms.alarm import AlarmRule
+from core.alarms.judgements import (
     channel_condition,
     drift_reading,
     link_condition,
@@ -13,8 +13,9 @@ from core.alarms.kinds import (
     slow_channel_condition,
     stamp_condition,
 )
+from core.alarms.rules import LimitRule, Region
 from core.condition.cells import OperatingPoint
-from core.condition.operating_state import OperatingState
+from core.condition.operating_state import STEADY, OperatingState
 from core.limits import AlarmLevel, Limits, ZoneLimits, judge
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 from core.samples.device_clock import DeviceClock, StampFault
@@ -124,7 +125,9 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
     assert judge(Reading(409.0), GAP, DANGER).level is DANGER
     assert judge(Reading(411.0), GAP, DANGER).level is ALERT
 
-    found = ConditionLimits(((in_(FULL), Limits(100.0)), (in_(PART), Limits(150.0))))
+    found = LimitRule(
+        None, AlarmRule(), tables=((in_(FULL), Limits(100.0)), (in_(PART), Limits(150.0)))
+    )
 
     assert found.judge(Reading(120.0), OperatingPoint(FULL), None).level is ALERT
     assert found.judge(Reading(120.0), OperatingPoint(PART), None).level is None
@@ -135,7 +138,7 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
 def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
     state: OperatingState, value: float
 ) -> None:
-    limits = ConditionLimits.single(Limits(100.0), AT_SPEED)
+    limits = LimitRule(Limits(100.0), AlarmRule(), STEADY)
     found = limits.judge(Reading(value), OperatingPoint(state), ALERT)
 
     assert not found.is_known
@@ -143,7 +146,9 @@ def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
 
 
 def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
-    found = ConditionLimits(((in_(PART), Limits(150.0)), (in_(FULL), Limits(100.0))))
+    found = LimitRule(
+        None, AlarmRule(), tables=((in_(PART), Limits(150.0)), (in_(FULL), Limits(100.0)))
+    )
     condition = found.judge(Reading(120.0), OperatingPoint(), None)
 
     assert (condition.level, condition.limit, condition.suppressed_by) == (ALERT, 100.0, None)
@@ -165,10 +170,10 @@ def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
 def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_count_that_may(
     eccentricity: float | None, attitude_deg: float | None, oil_c: float | None, passed: list[float]
 ) -> None:
-    cell = Region(AT_SPEED, (0.35, 0.4), (45.0, 47.5), (0.0, 90.0))
-    warm = Region(AT_SPEED, oil_temperature_c=(47.5, 50.0))
+    cell = Region(STEADY, (0.35, 0.4), (45.0, 47.5), (0.0, 90.0))
+    warm = Region(STEADY, oil_temperature_c=(47.5, 50.0))
     tables = ((cell, Limits(150.0)), (warm, Limits(60.0)))
-    found = ConditionLimits(tables, (Region(AT_SPEED), Limits(100.0)))
+    found = LimitRule(Limits(100.0), AlarmRule(), STEADY, tables)
     point = OperatingPoint(FULL, eccentricity, attitude_deg, oil_c)
 
     assert [limits.alert for limits in found.at(point)] == passed
@@ -180,13 +185,13 @@ def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_co
 def test_a_condition_has_one_table() -> None:
     tables = ((in_(FULL, PART), Limits(100.0)), (in_(FULL), Limits(150.0)))
     with pytest.raises(ValueError, match="two limits for the operating state full_load"):
-        ConditionLimits(tables)
+        LimitRule(None, AlarmRule(), tables=tables)
     with pytest.raises(ValueError, match="count in no operating state"):
         in_()
     with pytest.raises(ValueError, match="must rise"):
         Region(eccentricity_ratio=(0.4, 0.4))
     apart = [Region(oil_temperature_c=(low, low + 5.0)) for low in (40.0, 45.0)]
-    assert ConditionLimits(tuple((region, LIMITS) for region in apart)).tables
+    assert LimitRule(None, AlarmRule(), tables=tuple((region, LIMITS) for region in apart)).tables
 
 
 @pytest.mark.parametrize(

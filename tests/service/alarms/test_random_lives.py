@@ -18,8 +18,7 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.alarms.alarm import Alarm, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.alarms.operation import (
     Acknowledge,
     Action,
@@ -81,7 +80,9 @@ class Life:
         self.rules = UnitRules(
             channel=rule_of(0.0, 0.0),
             films=rule_of(0.0, 0.0, is_latching=self.is_latching),
-            clock=None,
+            clock_offset=None,
+            clock_drift=None,
+            time_stamps=None,
             link=rule_of(0.0, 0.0),
         )
         self.store: SqliteStore | None = None

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.limits import AlarmLevel, Condition
 from service.store.outbox_port import Letter, LetterState
@@ -13,7 +12,7 @@ ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_lim
 
 
 def news(subject: str) -> AlarmNews:
-    identity = AlarmIdentity("U1", subject, AlarmKind.SHAFT_X)
+    identity = AlarmIdentity("U1", subject, "order1_shaft_x")
     return AlarmNews(*advance(Alarm(identity), ALERT, 5, AlarmRule()))
 
 

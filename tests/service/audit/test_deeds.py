@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Action, Comment, Shelve, TakeOutOfService, operate
-from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Condition
 from service.audit.acting import Acting, acting_as
@@ -41,7 +40,7 @@ def count(store: SqliteStore) -> int:
 
 
 def raised() -> AlarmNews:
-    identity = AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X)
+    identity = AlarmIdentity("U1", "UJB", "order1_shaft_x")
     return AlarmNews(*advance(Alarm(identity), ALERT, T0, AlarmRule()))
 
 

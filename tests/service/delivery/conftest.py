@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmChange, AlarmNews
+from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.limits import AlarmLevel, Condition
 from service.delivery.facts import Surroundings
@@ -58,7 +57,7 @@ class HandClock:
 
 def news(number: int, *conditions: Condition, unit: str = "U1") -> AlarmNews:
     """An alarm of its own that goes through some conditions."""
-    alarm, events = Alarm(AlarmIdentity(unit, f"B{number}", AlarmKind.SHAFT_X)), []
+    alarm, events = Alarm(AlarmIdentity(unit, f"B{number}", "order1_shaft_x")), []
     for step, condition in enumerate(conditions or (ALERT,)):
         alarm, found = advance(alarm, condition, T0 + number * 10**9 + step, AlarmRule())
         events += found

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.limits import AlarmLevel, Condition
 from core.monitor.assessment import Assessment
@@ -33,7 +32,7 @@ SECOND = 1_000_000_000
 
 def news_of(
     at_s: float = 0.0,
-    kind: AlarmKind = AlarmKind.SHAFT_X,
+    kind: str = "order1_shaft_x",
     subject: str = "UJB",
     unit: str = "U1",
     occurrence: int = 1,

@@ -17,8 +17,7 @@ from rigs.alarm_runs import PROBE, Make, changes, play
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.limits import AlarmLevel, Condition
 from core.monitor.assessment import Assessment
@@ -193,7 +192,7 @@ async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothin
 
 def news_of(subject: str) -> AlarmNews:
     """That a channel has failed."""
-    identity = AlarmIdentity("U1", subject, AlarmKind.CHANNEL_NOT_OK)
+    identity = AlarmIdentity("U1", subject, "channel_not_ok")
     return AlarmNews(*advance(Alarm(identity), Condition(AlarmLevel.ALERT), at(0), AlarmRule()))
 
 

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rigs.store_fixtures import Execute, gap
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
 from core.condition.cells import OperatingPoint
@@ -26,7 +25,7 @@ ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_lim
 
 
 def identity(subject: str = "UJB", unit: str = "U1") -> AlarmIdentity:
-    return AlarmIdentity(unit, subject, AlarmKind.SHAFT_X)
+    return AlarmIdentity(unit, subject, "order1_shaft_x")
 
 
 def raised(n_ns: int = T0, subject: str = "UJB", unit: str = "U1") -> AlarmNews:

@@ -7,8 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
 from core.baseline.stiffness_history import Evidence
@@ -69,7 +68,7 @@ def _alarm(readings: Mapping[str, float], number: int) -> AlarmNews:
     """An alarm that is raised; every third one is acknowledged at once."""
     time_ns = T0_NS + number * HOP_NS
     alarm, events = advance(
-        Alarm(AlarmIdentity("U1", f"B{number}", AlarmKind.SHAFT_X)),
+        Alarm(AlarmIdentity("U1", f"B{number}", "order1_shaft_x")),
         Condition(AlarmLevel.ALERT, value=150.0 + readings["speed_rpm"], limit=150.0),
         time_ns,
         AlarmRule(),

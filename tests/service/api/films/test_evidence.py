@@ -13,8 +13,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_finding import alarm_condition
@@ -41,7 +40,7 @@ def raised(service: Any, machine: Any) -> AlarmNews:
     rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
     condition = alarm_condition(told.findings[0], rules.change)
     assert condition.level is not None
-    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.STIFFNESS_X))
+    alarm = Alarm(AlarmIdentity("U1", "UJB", "stiffness_x"))
     news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
     service.evidence.see([news])
     service.store.append([], [], [news])
