@@ -133,15 +133,16 @@ class UnitAlarms:
             return []
         for assessment in assessments:
             self._take_assessment(assessment)
-        self._take_channels(block)
+        now_ns = block.stop_ns
+        self._take_channels(block, now_ns)
         for watch in self._of_rule[SLOW_CHANNEL]:
             reading = block.slow.get(watch.source, NOT_DELIVERED)
-            self._update(watch, slow_channel_condition(reading), block.stop_ns)
+            self._update(watch, slow_channel_condition(reading), now_ns)
         for warmth in self._limits_of_rule[OIL_TEMPERATURE]:
             reading = block.slow.get(warmth.source, NOT_DELIVERED)
-            point = self._recent_point(warmth.identity.subject, block.stop_ns)
-            self._compare(warmth, reading, block.stop_ns, point)
-        self._take_clock(block, host_ns)
+            point = self._recent_point(warmth.identity.subject, now_ns)
+            self._compare(warmth, reading, now_ns, point)
+        self._take_clock(block, self._recent_point(DEVICE, now_ns), host_ns)
         return self._board.drain_news()
 
     def films(self, conditions: Mapping[str, Condition], now_ns: int) -> list[AlarmNews]:
@@ -309,13 +310,13 @@ class UnitAlarms:
         elif wrong_sign is False and fault is Reason.POLARITY:
             del self._segment_faults[channel]
 
-    def _take_channels(self, block: SampleBlock) -> None:
+    def _take_channels(self, block: SampleBlock, now_ns: int) -> None:
         """Judge every channel; one comparison while all are OK and their quality is the same."""
         if block.channel_quality == self._inactive_with:
             return
         watches = self._of_rule[WAVEFORM_CHANNEL]
         for watch in watches:
-            self._update(watch, self._channel_condition(watch.source, block), block.stop_ns)
+            self._update(watch, self._channel_condition(watch.source, block), now_ns)
         are_inactive = all(self._board.alarm(watch.id).is_settled_inactive for watch in watches)
         self._inactive_with = block.channel_quality if are_inactive else None
 
@@ -327,8 +328,7 @@ class UnitAlarms:
         clipped_percent = self._clipped_percent.get(channel) or None
         return channel_condition(quality, self._segment_faults.get(channel), clipped_percent)
 
-    def _take_clock(self, block: SampleBlock, host_ns: int) -> None:
-        point = self._recent_point(DEVICE, block.stop_ns)
+    def _take_clock(self, block: SampleBlock, point: OperatingPoint, host_ns: int) -> None:
         for rule, reading_of in CLOCK_READINGS.items():
             for watch in self._limits_of_rule[rule]:
                 self._compare(watch, reading_of(block.clock), host_ns, point)
