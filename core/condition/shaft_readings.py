@@ -7,7 +7,8 @@ import numpy as np
 from core.arrays import FloatArray
 from core.condition.probe_axes import Growth, ProbeAxis
 from core.condition.shaft_centre import locate_shaft
-from core.machine.unit import Bearing, GapAccuracy, Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import Bearing, GapAccuracy, Unit
 from core.quality import NOT_TOLD, Reading, Reason, current_mean, missing
 from core.spectra.segments import Segment
 from core.uncertainty import SHAFT_GAIN, Budget, mean_budget, numbers, systematic_line, with_budgets

@@ -11,7 +11,7 @@ from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
 from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import position_results, slow_channels, slow_results
-from core.machine.transducers import line_floor_um_pk
+from core.machine.channel import line_floor_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.overall_results import overall_results, phase_results
 from core.monitor.settings import AnalysisSettings

@@ -14,7 +14,7 @@ from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.port import DaqServer
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings

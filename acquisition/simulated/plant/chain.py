@@ -11,7 +11,8 @@ from acquisition.simulated.plant.probes import ShaftRunout, reference_gap_um, st
 from acquisition.simulated.plant.response_filter import ResponseFilter
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
 from core.arrays import FloatArray
-from core.machine.unit import Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import Unit
 
 
 class TransducerChain:

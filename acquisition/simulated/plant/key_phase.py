@@ -4,7 +4,8 @@ import numpy as np
 
 from acquisition.simulated.plant.scenario import KeyPhasePulse
 from core.arrays import FloatArray
-from core.machine.unit import Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import Unit
 
 
 class KeyPhasePulses:

@@ -8,7 +8,8 @@ import numpy as np
 from acquisition.simulated.plant.conditions import Conditions
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario
 from core.arrays import ComplexArray, FloatArray
-from core.machine.unit import Bearing, Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import Bearing, Unit
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from acquisition.simulated.plant.rotor import (
 )
 from acquisition.simulated.plant.rotor_steps import state_matrix
 from core.arrays import FloatArray
-from core.machine.unit import Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import Unit
 
 SHAFT, BEARING = "shaft", "bearing"
 

@@ -20,7 +20,8 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.selection import select
 from acquisition.recordings.source import RecordingSource
 from acquisition.simulated.devices.recorded import RecordedFeed
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Unit
 from core.samples.blocks import Rejection
 
 Record = Callable[[Iterable[RawBlock]], Path]

@@ -14,7 +14,7 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Shelve, operate
 from core.limits import AlarmLevel, Condition
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 from rigs.standing_clock import StandingClock

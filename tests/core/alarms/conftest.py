@@ -11,7 +11,8 @@ from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmRule
 from core.alarms.life_cycle import advance
 from core.alarms.operation import Action, operate
 from core.limits import Condition
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S

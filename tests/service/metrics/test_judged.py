@@ -11,7 +11,8 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.change.film_finding import FilmFinding
 from core.change.film_judge import FilmNews
 from core.change.verdict import Verdict
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from service.alarms.engine import AlarmEngine
 from service.delivery.deliveries import ReceiverView
 from service.delivery.sender import Receiver, SenderStatus

@@ -13,7 +13,8 @@ from acquisition.modbus.transport import TcpTransport
 from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.devices.vector_device import VectorDevice
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.settings import AnalysisSettings
 from core.monitor.vector_monitor import VectorMonitor
 from core.spectra.vector_rows import VectorPart, VectorRow
