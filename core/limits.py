@@ -1,4 +1,4 @@
-"""Levels, limits, zones and delays: what alarms and changes of films are judged by."""
+"""Levels, limits, zones and delays, by which alarms and changes of films are judged."""
 
 import math
 from dataclasses import dataclass, replace
@@ -19,22 +19,22 @@ class AlarmLevel(IntEnum):
 
 @dataclass(frozen=True)
 class Condition:
-    """What is found at one moment of what an alarm watches.
+    """What an alarm watches, judged at one moment.
 
     Parameters
     ----------
     level
-        Which limit is passed; None if none is. While nothing is known, that which was known last.
+        Level whose limit is passed, if any. While the condition is unknown, the last known level.
     is_known
-        Whether it could be judged at all; if not, it is neither active nor returned.
+        Whether the condition could be judged; if not, it is neither active nor returned.
     value, limit
-        What was compared with what, where there are numbers.
+        Value and the limit that it was compared with, where there are numbers.
     reason
-        Why it is so, in a word; "ok" if all is well.
+        Why, in a word; "ok" if no limit is passed.
     suppressed_by
-        Why, by design, the alarm counts for nothing now; None if it counts.
+        Why the alarm is suppressed by design; None if it is not.
     point
-        Under which operating condition, where that is known of a level.
+        Operating condition under which a limit was passed, if known.
     """
 
     level: AlarmLevel | None = None
@@ -47,39 +47,39 @@ class Condition:
 
 
 WITHIN = Condition()
-"""All is well, and there is no number to it."""
+"""Within limits, without a value."""
 
 
 NEVER_JUDGED = Condition(is_known=False, reason="waiting_for_data")
 
 
 def unknown(reason: str, suppressed_by: str | None = None) -> Condition:
-    """Build the condition of which nothing is known now."""
+    """A judgement while the condition is unknown."""
     return Condition(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
 MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
-"""Doubts about a reading that may have made it too low: it was read beside its line."""
+"""Reasons of doubt with which a reading may be too low, as it was read beside its line."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Beyond which values an alarm becomes active; in the unit of the quantity.
+    """Limits beyond which an alarm becomes active, in the unit of the quantity.
 
     Parameters
     ----------
     alert, danger
-        Above which values; None where there is no such level.
+        Upper limits; None if there is no such level.
     deadband
-        How far inside a limit the value must come back for its level to be left.
+        How far inside a limit a value must be for its level to end.
     alert_below, danger_below
-        Below which values.
+        Lower limits.
 
     Raises
     ------
     ValueError
-        If there is no limit at all, or one is not a number above zero, danger does not lie outside
-        alert, or the deadband is negative, or so wide that a value could be left by no level.
+        If there is no limit, a limit is not a number above zero, danger does not lie outside alert,
+        or the deadband is negative or so wide that no value would end a level.
     """
 
     alert: float | None = None
@@ -127,17 +127,13 @@ class Limits:
             return self._lowest_high
         return (self._lowest_high - self._highest_low) / 2.0
 
-    @cached_property
-    def lowest(self) -> float:
-        """The upper limit that is passed first; infinite if there is none."""
-        return math.inf if self._lowest_high is None else self._lowest_high
-
     def is_within(self, value: float) -> bool:
         """Whether a value passes no limit."""
-        return value <= self.lowest and (self._highest_low is None or value >= self._highest_low)
+        high, low = self._lowest_high, self._highest_low
+        return (high is None or value <= high) and (low is None or value >= low)
 
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
-        """The worst level whose limit a value is beyond, or not yet clearly inside again."""
+        """The worst level whose limit a value passes; a held level ends inside its deadband."""
         levels = [
             level
             for level, high, low in zip(
@@ -181,15 +177,14 @@ class Limits:
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Condition:
     """Compare a reading with limits.
 
-    A reading at a speed that something contradicts may be too low: it can raise an alarm but not
-    clear it. A shaft that does not turn has no
-    vibration to be judged: its alarms are suppressed, not returned, for it may be the speed that
-    is wrong.
+    A reading at an implausible speed may be too low: it can raise an alarm but not clear it. A
+    shaft at standstill has no vibration: its alarms are suppressed and do not return, since the
+    speed itself may be wrong.
 
     Parameters
     ----------
     held
-        The level of the condition before.
+        Level of the judgement before.
     """
     value = reading.value
     if value is None:
@@ -208,7 +203,7 @@ ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
 
 @dataclass(frozen=True)
 class ZoneLimits(Limits):
-    """Zones as limits: C is an alert, D a danger; what is within says whether it is A or B.
+    """Zones as limits: C is an alert, D a danger; A and B are within limits.
 
     Parameters
     ----------
@@ -240,12 +235,12 @@ class ZoneLimits(Limits):
 
 @dataclass(frozen=True)
 class DelayTimer:
-    """Whether a level counts, and for how long the condition has said otherwise.
+    """On-delay and off-delay of one level: whether it counts, and the time against that.
 
     Parameters
     ----------
     opposed_ns
-        Known time for which it has; what passes unseen does not count.
+        Known time for which the condition contradicts; time without samples does not count.
     last_ns
         When it last did; None if nothing was known since.
     """
@@ -255,7 +250,7 @@ class DelayTimer:
     last_ns: int | None = None
 
     def step(self, wanted: bool, now_ns: int, on_delay_ns: int, off_delay_ns: int) -> "DelayTimer":
-        """Take in what the condition says now; a clock that was put back adds nothing."""
+        """The timer after one more judgement; a clock that was set back adds no time."""
         if wanted == self.is_on:
             return ON if wanted else RESTED
         since_ns = now_ns if self.last_ns is None else self.last_ns
@@ -265,7 +260,7 @@ class DelayTimer:
         return DelayTimer(self.is_on, opposed_ns, now_ns)
 
     def paused(self) -> "DelayTimer":
-        """The timer when nothing is known: what is pending stays pending, and no time passes."""
+        """The timer while the condition is unknown: pending, with no time passing."""
         return self if self.last_ns is None else replace(self, last_ns=None)
 
 

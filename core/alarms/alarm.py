@@ -22,20 +22,21 @@ class AlarmState(StrEnum):
 
 
 PLANT = "plant"
-"""In the place of a unit: what concerns all of them. No unit may be called so."""
+"""Unit of alarms about the service. No unit may have this name."""
 
 
 @dataclass(frozen=True)
 class AlarmIdentity:
-    """Which alarm: the same for as long as the plant calls its parts by the same names.
+    """Identity of an alarm, the same as long as the plant file names its parts alike.
 
     Parameters
     ----------
     unit
-        `PLANT` where it is about the service itself.
+        Unit, or `PLANT` for alarms about the service.
     subject
-        Channel or bearing that it is about; "device" or "link" where it is about the whole unit,
-        "store", "service" or "captures" where it is about the service.
+        Id of a channel or bearing, or the subject of its kind, such as "device".
+    kind
+        Name of an `AlarmKind`.
     """
 
     unit: str
@@ -44,18 +45,18 @@ class AlarmIdentity:
 
     @cached_property
     def id(self) -> str:
-        """All of it in one word, fit for a URL."""
+        """Id in one word, fit for a URL."""
         return f"{self.unit}:{self.subject}:{self.kind}"
 
 
 @dataclass(frozen=True)
 class Hold:
-    """That somebody has taken an alarm off the list, and why.
+    """Who has taken an alarm off the list, and why.
 
     Parameters
     ----------
     until_ns
-        When that ends by itself, host time; None if never.
+        When it ends by itself, host time; None if never.
     """
 
     actor: str
@@ -66,12 +67,12 @@ class Hold:
 
 @dataclass(frozen=True)
 class AlarmRule:
-    """How long a condition must last, and whether what it raised stays.
+    """Delays and latch of an alarm.
 
     Parameters
     ----------
     on_delay_ns, off_delay_ns
-        Known time without interruption before a level counts, or counts no longer.
+        Known time without contradiction before a level counts, or ceases to.
     is_latching
         Whether the alarm stays active after its condition has gone, until it is reset.
     """
@@ -88,27 +89,27 @@ class Alarm:
     Parameters
     ----------
     level
-        Of the alarm itself, after delays and latch; None if it is not active.
+        Level after delays and latch; None if the alarm is not active.
     occurrence
-        How often it was raised or rose in level; the number that is acknowledged.
+        Number of times that it was raised or rose in level; acknowledged by this number.
     is_acknowledged
-        Whether somebody has seen this occurrence.
+        Whether this occurrence is acknowledged.
     raised_ns
-        When this occurrence began.
+        Start of this occurrence.
     raised_at
-        Under which operating condition; None where that was not known.
+        Operating condition at that time, if known.
     n_events
-        How many events it has had; the newest has this number.
+        Number of its events, and of the newest event.
     condition
-        What was found last.
+        Newest judgement.
     suppressed_by
-        Why it counts for nothing by design; None if it counts.
+        Why it is suppressed by design; None if it is not.
     shelf, outage
-        Whether somebody has shelved it, or taken it out of service.
+        Who has shelved it or taken it out of service, if anyone.
     is_latched
-        Whether only its latch keeps it at its level.
+        Whether only its latch holds its level.
     timers
-        Of alert and danger.
+        Delays of alert and danger.
     """
 
     identity: AlarmIdentity
@@ -127,7 +128,7 @@ class Alarm:
 
     @property
     def state(self) -> AlarmState:
-        """State of the life cycle; what hides an alarm most thoroughly names it."""
+        """State of the life cycle: out of service, shelved or suppressed come before all others."""
         if self.outage is not None:
             return AlarmState.OUT_OF_SERVICE
         if self.shelf is not None:
@@ -178,24 +179,24 @@ ANNOUNCED = (AlarmChange.RAISED, AlarmChange.ESCALATED)
 
 @dataclass(frozen=True)
 class AlarmEvent:
-    """A transition of an alarm, or news of it that somebody must be able to find later.
+    """A transition of an alarm, or another entry of its history.
 
     Parameters
     ----------
     number
-        Of this alarm's events, from 1 without a hole.
+        Number among this alarm's events, from 1 without gaps.
     level
-        That the alarm has after it; of one that has returned or was reset, that it had.
+        Level after the event, or before it if the alarm has returned or was reset.
     time_ns
-        Of the samples where they decided, of the host where a person or a link did.
+        Time of the samples that decided; host time of an action or of the link.
     occurrence
-        Which occurrence of the alarm it belongs to.
+        Occurrence of the alarm that it belongs to.
     actor
-        Who did it; empty if nobody did.
+        Person who acted; empty if none did.
     reason
         Why, in a word or in the words of the actor.
     raised_at
-        Under which operating condition that occurrence was raised; None where that was not known.
+        Operating condition when that occurrence was raised, if known.
     """
 
     identity: AlarmIdentity
@@ -215,15 +216,14 @@ class AlarmEvent:
 
 @dataclass(frozen=True)
 class AlarmNews:
-    """An alarm with the events that have led to what it is now.
+    """An alarm with its newest events.
 
     Parameters
     ----------
     peer
-        Address from which somebody asked for them; None if nobody did, or it is not known.
+        Network address of the client that asked for them, if known.
     command
-        Which command asked for them, where it came through the database: it is answered by being
-        stored with them.
+        Id of the command that asked for them; it is answered by being stored with them.
     """
 
     alarm: Alarm
@@ -240,13 +240,7 @@ def changed(
     actor: str = "",
     reason: str = "",
 ) -> tuple[Alarm, AlarmEvent]:
-    """Count one more event and write it down.
-
-    Parameters
-    ----------
-    after
-        The alarm as it is to be, but for the number of its events.
-    """
+    """The alarm after a change, with the number of its events counted up, and the event."""
     after = replace(after, n_events=before.n_events + 1)
     event = AlarmEvent(
         identity=after.identity,

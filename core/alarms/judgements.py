@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 from core.checks.sensor_checks import MAX_CLIPPED_SHARE
 from core.condition.operating_state import OperatingState
 from core.limits import WITHIN, AlarmLevel, Condition, Limits, judge, unknown
-from core.quality import Level, Quality, Reading, Reason, missing, worst
+from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, worst
 from core.samples.device_clock import DeviceClock, StampFault
 
 COVERAGE = 1.96
 """Standard uncertainties on each side of a value that hold the truth with 95 %."""
-
-NO_CLOCK, NO_DRIFT = missing(Reason.NOT_MEASURED), missing(Reason.WAITING_FOR_DATA)
 
 SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 """Faults of a channel that only a whole segment shows."""
@@ -53,14 +51,14 @@ def slow_channel_condition(reading: Reading) -> Condition:
 def offset_reading(clock: DeviceClock | None) -> Reading:
     """Absolute offset of a device's time stamps from the host's clock, s."""
     if clock is None or clock.offset_s is None:
-        return NO_CLOCK
+        return NOT_TOLD
     return Reading(abs(clock.offset_s))
 
 
 def drift_reading(clock: DeviceClock | None) -> Reading:
     """Absolute drift of a device's sampling that exceeds its uncertainty, parts per million."""
     if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
-        return NO_DRIFT
+        return missing(Reason.WAITING_FOR_DATA)
     return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
 
 

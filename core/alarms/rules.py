@@ -9,7 +9,7 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Condition, Limits, judge, unknown
 from core.monitor.assessment import Assessment
-from core.quality import Reading, Reason, missing
+from core.quality import NOT_TOLD, Reading, Reason
 from core.units import ns_from_s
 
 EVERY_STATE = frozenset(OperatingState)
@@ -145,14 +145,11 @@ def point_of(assessment: Assessment) -> OperatingPoint:
     """Operating condition of a result, doubted or not; a standstill is known without a state."""
     condition, readings = assessment.condition, assessment.readings
     state = OperatingState.UNKNOWN if condition is None else condition.state
-    speed = readings.get("speed_rpm", NOT_MEASURED)
+    speed = readings.get("speed_rpm", NOT_TOLD)
     if state is OperatingState.UNKNOWN and speed.quality.reason is Reason.STANDSTILL:
         state = OperatingState.STANDSTILL
     names = ("eccentricity_ratio", "attitude_angle_deg", "oil_temperature_c")
-    return OperatingPoint(state, *(readings.get(name, NOT_MEASURED).value for name in names))
-
-
-NOT_MEASURED = missing(Reason.NOT_MEASURED)
+    return OperatingPoint(state, *(readings.get(name, NOT_TOLD).value for name in names))
 
 
 @dataclass(frozen=True)

@@ -36,13 +36,11 @@ from core.condition.operating_state import OperatingState
 from core.limits import Condition, unknown
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from core.quality import Quality, Reading, Reason, missing, worst
+from core.quality import NOT_TOLD, Quality, Reading, Reason, worst
 from core.samples.blocks import SampleBlock
 from core.stiffness.line_results import AMPLITUDES, DIRECTIONS
 from core.stiffness.polarity import is_reversed
 from core.units import NS_PER_S
-
-NOT_DELIVERED = missing(Reason.NOT_MEASURED)
 
 POINT_HOLDS_NS = 300 * NS_PER_S
 """How long the operating condition of a result is taken for that of later samples."""
@@ -136,10 +134,10 @@ class UnitAlarms:
         now_ns = block.stop_ns
         self._take_channels(block, now_ns)
         for watch in self._of_rule[SLOW_CHANNEL]:
-            reading = block.slow.get(watch.source, NOT_DELIVERED)
+            reading = block.slow.get(watch.source, NOT_TOLD)
             self._update(watch, slow_channel_condition(reading), now_ns)
         for warmth in self._limits_of_rule[OIL_TEMPERATURE]:
-            reading = block.slow.get(warmth.source, NOT_DELIVERED)
+            reading = block.slow.get(warmth.source, NOT_TOLD)
             point = self._recent_point(warmth.identity.subject, now_ns)
             self._compare(warmth, reading, now_ns, point)
         self._take_clock(block, self._recent_point(DEVICE, now_ns), host_ns)
