@@ -18,7 +18,7 @@ class AlarmLevel(IntEnum):
 
 
 @dataclass(frozen=True)
-class Condition:
+class Judgement:
     """What an alarm watches, judged at one moment.
 
     Parameters
@@ -46,16 +46,16 @@ class Condition:
     point: OperatingPoint | None = None
 
 
-WITHIN = Condition()
+WITHIN = Judgement()
 """Within limits, without a value."""
 
 
-NEVER_JUDGED = Condition(is_known=False, reason="waiting_for_data")
+NEVER_JUDGED = Judgement(is_known=False, reason="waiting_for_data")
 
 
-def unknown(reason: str, suppressed_by: str | None = None) -> Condition:
+def unknown(reason: str, suppressed_by: str | None = None) -> Judgement:
     """A judgement while the condition is unknown."""
-    return Condition(is_known=False, reason=reason, suppressed_by=suppressed_by)
+    return Judgement(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
 MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
@@ -174,7 +174,7 @@ class Limits:
         return "below_limit" if self.is_low(value) else "above_limit"
 
 
-def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Condition:
+def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
     """Compare a reading with limits.
 
     A reading at an implausible speed may be too low: it can raise an alarm but not clear it. A
@@ -193,7 +193,7 @@ def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Conditio
     level = limits.passed(value, held)
     if reading.quality.reason in MAYBE_TOO_LOW and (level or 0) < (held or 0):
         return unknown(reading.quality.reason)
-    return Condition(
+    return Judgement(
         level, value=value, limit=limits.of(level, value), reason=limits.reason(level, value)
     )
 
@@ -252,11 +252,11 @@ class DelayTimer:
     def step(self, wanted: bool, now_ns: int, on_delay_ns: int, off_delay_ns: int) -> "DelayTimer":
         """The timer after one more judgement; a clock that was set back adds no time."""
         if wanted == self.is_on:
-            return ON if wanted else RESTED
+            return ON if wanted else INACTIVE
         since_ns = now_ns if self.last_ns is None else self.last_ns
         opposed_ns = self.opposed_ns + max(0, now_ns - since_ns)
         if opposed_ns >= (on_delay_ns if wanted else off_delay_ns):
-            return ON if wanted else RESTED
+            return ON if wanted else INACTIVE
         return DelayTimer(self.is_on, opposed_ns, now_ns)
 
     def paused(self) -> "DelayTimer":
@@ -264,7 +264,7 @@ class DelayTimer:
         return self if self.last_ns is None else replace(self, last_ns=None)
 
 
-RESTED = DelayTimer()
+INACTIVE = DelayTimer()
 
 
 ON = DelayTimer(is_on=True)

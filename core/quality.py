@@ -107,7 +107,7 @@ def missing(reason: Reason) -> Reading:
     return Reading(None, bad(reason))
 
 
-NOT_TOLD = missing(Reason.NOT_MEASURED)
+NOT_MEASURED = missing(Reason.NOT_MEASURED)
 """Reading of a slow channel that a block does not have."""
 
 

@@ -6,7 +6,7 @@ from enum import StrEnum
 from functools import cached_property
 
 from core.condition.cells import OperatingPoint
-from core.limits import NEVER_JUDGED, RESTED, AlarmLevel, Condition, DelayTimer
+from core.limits import INACTIVE, NEVER_JUDGED, AlarmLevel, DelayTimer, Judgement
 
 
 class AlarmState(StrEnum):
@@ -119,12 +119,12 @@ class Alarm:
     raised_ns: int | None = None
     raised_at: OperatingPoint | None = None
     n_events: int = 0
-    condition: Condition = NEVER_JUDGED
+    condition: Judgement = NEVER_JUDGED
     suppressed_by: str | None = None
     shelf: Hold | None = None
     outage: Hold | None = None
     is_latched: bool = False
-    timers: tuple[DelayTimer, DelayTimer] = (RESTED, RESTED)
+    timers: tuple[DelayTimer, DelayTimer] = (INACTIVE, INACTIVE)
 
     @property
     def state(self) -> AlarmState:
@@ -148,7 +148,7 @@ class Alarm:
             and self.condition.is_known
             and self.condition.level is None
             and self.suppressed_by is None
-            and self.timers == (RESTED, RESTED)
+            and self.timers == (INACTIVE, INACTIVE)
         )
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, AlarmRule
 from core.alarms.kinds import LINK_LOST, Watch
-from core.alarms.life_cycle import advance, interrupted, restored
+from core.alarms.life_cycle import interrupted, restored, update
 from core.alarms.operation import Action, expire, operate
 from core.condition.cells import OperatingPoint
-from core.limits import Condition, unknown
+from core.limits import Judgement, unknown
 from core.quality import Reason
 
 
@@ -87,15 +87,15 @@ class AlarmBoard:
         """Look one up. Raises `KeyError` if there is no such alarm."""
         return self._alarms[id_]
 
-    def update(self, watch: Watch, condition: Condition, now_ns: int) -> None:
+    def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
         """Update an alarm; an inactive alarm that stays inactive is unchanged."""
         is_within = condition.level is None and condition.is_known
         if not (is_within and self._alarms[watch.id].is_settled_inactive):
             self.record(watch.id, condition, now_ns)
 
-    def record(self, id_: str, condition: Condition, now_ns: int) -> None:
+    def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
         """Update an alarm, also with the value of a condition within limits."""
-        self._note(id_, *advance(self._alarms[id_], condition, now_ns, self._rules[id_]))
+        self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def interrupt(self) -> None:
         """Stop delays where samples are missing, except that of a lost link."""
@@ -152,7 +152,7 @@ class AlarmBoard:
             elif alarm.level is not None or not alarm.is_acknowledged:
                 self._alarms[id_] = restored(replace(alarm, is_latched=False))
                 self._rules[id_] = AlarmRule()
-                self.record(id_, Condition(reason=NO_LONGER_WATCHED), host_ns)
+                self.record(id_, Judgement(reason=NO_LONGER_WATCHED), host_ns)
         for id_, alarm in remembered.items():
             self._alarms[id_] = _merged(alarm, newest.get(id_, alarm))
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from core.checks.sensor_checks import MAX_CLIPPED_SHARE
 from core.condition.operating_state import OperatingState
-from core.limits import WITHIN, AlarmLevel, Condition, Limits, judge, unknown
-from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, worst
+from core.limits import WITHIN, AlarmLevel, Judgement, Limits, judge, unknown
+from core.quality import NOT_MEASURED, Level, Quality, Reading, Reason, missing, worst
 from core.samples.device_clock import DeviceClock, StampFault
 
 COVERAGE = 1.96
@@ -18,9 +18,9 @@ SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 """Faults of a channel that only a whole segment shows."""
 
 
-def channel_condition(
+def channel_judgement(
     quality: Quality, segment_fault: Reason | None, clipped_percent: float | None = None
-) -> Condition:
+) -> Judgement:
     """Whether a waveform channel is OK.
 
     Parameters
@@ -37,21 +37,21 @@ def channel_condition(
         return WITHIN
     if fault is Reason.CLIPPED and clipped_percent is not None:
         limit = 100.0 * MAX_CLIPPED_SHARE
-        return Condition(AlarmLevel.ALERT, value=clipped_percent, limit=limit, reason=fault)
-    return Condition(AlarmLevel.ALERT, reason=fault)
+        return Judgement(AlarmLevel.ALERT, value=clipped_percent, limit=limit, reason=fault)
+    return Judgement(AlarmLevel.ALERT, reason=fault)
 
 
-def slow_channel_condition(reading: Reading) -> Condition:
+def slow_channel_judgement(reading: Reading) -> Judgement:
     """Whether a slow channel that an alarm depends on delivers a value."""
     if reading.value is None:
-        return Condition(AlarmLevel.ALERT, reason=reading.quality.reason)
+        return Judgement(AlarmLevel.ALERT, reason=reading.quality.reason)
     return WITHIN
 
 
 def offset_reading(clock: DeviceClock | None) -> Reading:
     """Absolute offset of a device's time stamps from the host's clock, s."""
     if clock is None or clock.offset_s is None:
-        return NOT_TOLD
+        return NOT_MEASURED
     return Reading(abs(clock.offset_s))
 
 
@@ -62,16 +62,16 @@ def drift_reading(clock: DeviceClock | None) -> Reading:
     return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
 
 
-def stamp_condition(fault: StampFault | None) -> Condition:
+def stamp_judgement(fault: StampFault | None) -> Judgement:
     """Whether a device's own time stamp could be used."""
-    return WITHIN if fault is None else Condition(AlarmLevel.ALERT, reason=fault)
+    return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
 
 
-def link_condition(is_connected: bool, reason: str | None) -> Condition:
+def link_judgement(is_connected: bool, reason: str | None) -> Judgement:
     """Whether samples of a unit arrive."""
     if is_connected:
         return WITHIN
-    return Condition(AlarmLevel.ALERT, reason=reason or "not connected")
+    return Judgement(AlarmLevel.ALERT, reason=reason or "not connected")
 
 
 CLOCK_READINGS = {"clock_offset": offset_reading, "clock_drift": drift_reading}
@@ -134,13 +134,13 @@ class VectorReference:
     vectors: Mapping[str, OrderVector]
 
 
-def vector_condition(
+def vector_judgement(
     readings: Mapping[str, Reading],
     place: str,
     reference: VectorReference | None,
     limits: Limits,
     held: AlarmLevel | None,
-) -> Condition:
+) -> Judgement:
     """Judge how far a 1× vector has moved from where it was when all was well.
 
     A crack, a loose part or a rub can turn the vector and leave its length as it was, so that the

@@ -7,13 +7,13 @@ lead to the same events however fast they are replayed.
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmRule, changed
-from core.limits import ON, RESTED, AlarmLevel, Condition, DelayTimer
+from core.limits import INACTIVE, ON, AlarmLevel, DelayTimer, Judgement
 
 Timers = tuple[DelayTimer, DelayTimer]
 
 
-def advance(
-    alarm: Alarm, condition: Condition, now_ns: int, rule: AlarmRule
+def update(
+    alarm: Alarm, condition: Judgement, now_ns: int, rule: AlarmRule
 ) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
     """Update an alarm by what is found now.
 
@@ -75,7 +75,7 @@ def shown_again(alarm: Alarm) -> Alarm:
 def restored(alarm: Alarm) -> Alarm:
     """The alarm after a restart: active if it was active; nothing is pending."""
     level = None if alarm.is_latched else alarm.level
-    alert, danger = (ON if (level or 0) >= each else RESTED for each in AlarmLevel)
+    alert, danger = (ON if (level or 0) >= each else INACTIVE for each in AlarmLevel)
     return replace(alarm, timers=(alert, danger))
 
 

@@ -7,9 +7,9 @@ from itertools import combinations
 from core.alarms.alarm import AlarmRule
 from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition, Limits, judge, unknown
+from core.limits import AlarmLevel, Judgement, Limits, judge, unknown
 from core.monitor.assessment import Assessment
-from core.quality import NOT_TOLD, Reading, Reason
+from core.quality import NOT_MEASURED, Reading, Reason
 from core.units import ns_from_s
 
 EVERY_STATE = frozenset(OperatingState)
@@ -125,12 +125,12 @@ class LimitRule:
         counts = point.state in self.states or point.state is OperatingState.UNKNOWN
         return (*possible, self.limits) if counts and self.limits is not None else possible
 
-    def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Condition:
+    def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
         """Compare a reading with the limits that hold at a point."""
         return worst_of([judge(reading, limits, held) for limits in self.at(point)], point)
 
 
-def worst_of(found: Iterable[Condition], point: OperatingPoint) -> Condition:
+def worst_of(found: Iterable[Judgement], point: OperatingPoint) -> Judgement:
     """The worst judgement by all limits that may hold; of equal ones, by the strictest limit.
 
     Where no limits hold, the alarm is suppressed and its condition unknown, so that it does not
@@ -145,11 +145,11 @@ def point_of(assessment: Assessment) -> OperatingPoint:
     """Operating condition of a result, doubted or not; a standstill is known without a state."""
     condition, readings = assessment.condition, assessment.readings
     state = OperatingState.UNKNOWN if condition is None else condition.state
-    speed = readings.get("speed_rpm", NOT_TOLD)
+    speed = readings.get("speed_rpm", NOT_MEASURED)
     if state is OperatingState.UNKNOWN and speed.quality.reason is Reason.STANDSTILL:
         state = OperatingState.STANDSTILL
     names = ("eccentricity_ratio", "attitude_angle_deg", "oil_temperature_c")
-    return OperatingPoint(state, *(readings.get(name, NOT_TOLD).value for name in names))
+    return OperatingPoint(state, *(readings.get(name, NOT_MEASURED).value for name in names))
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from core.alarms.judgements import (
     CLOCK_READINGS,
     SENSOR_FAULTS,
     VectorReference,
-    channel_condition,
-    link_condition,
-    slow_channel_condition,
-    stamp_condition,
-    vector_condition,
+    channel_judgement,
+    link_judgement,
+    slow_channel_judgement,
+    stamp_judgement,
+    vector_judgement,
 )
 from core.alarms.kinds import (
     DEVICE,
@@ -33,10 +33,10 @@ from core.alarms.operation import Action
 from core.alarms.rules import UnitRules, point_of, worst_of
 from core.condition.cells import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.limits import Condition, unknown
+from core.limits import Judgement, unknown
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from core.quality import NOT_TOLD, Quality, Reading, Reason, worst
+from core.quality import NOT_MEASURED, Quality, Reading, Reason, worst
 from core.samples.blocks import SampleBlock
 from core.stiffness.line_results import AMPLITUDES, DIRECTIONS
 from core.stiffness.polarity import is_reversed
@@ -134,16 +134,16 @@ class UnitAlarms:
         now_ns = block.stop_ns
         self._take_channels(block, now_ns)
         for watch in self._of_rule[SLOW_CHANNEL]:
-            reading = block.slow.get(watch.source, NOT_TOLD)
-            self._update(watch, slow_channel_condition(reading), now_ns)
+            reading = block.slow.get(watch.source, NOT_MEASURED)
+            self._update(watch, slow_channel_judgement(reading), now_ns)
         for warmth in self._limits_of_rule[OIL_TEMPERATURE]:
-            reading = block.slow.get(warmth.source, NOT_TOLD)
+            reading = block.slow.get(warmth.source, NOT_MEASURED)
             point = self._recent_point(warmth.identity.subject, now_ns)
             self._compare(warmth, reading, now_ns, point)
         self._take_clock(block, self._recent_point(DEVICE, now_ns), host_ns)
         return self._board.drain_news()
 
-    def films(self, conditions: Mapping[str, Condition], now_ns: int) -> list[AlarmNews]:
+    def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
         """Update the alarms about films.
 
         Parameters
@@ -263,12 +263,12 @@ class UnitAlarms:
 
     def _vector_condition(
         self, watch: LimitWatch, assessment: Assessment, point: OperatingPoint, alarm: Alarm
-    ) -> Condition:
+    ) -> Judgement:
         """Compare a 1× vector with the reference of the present state."""
         reference = self.reference(assessment.bearing, point.state)
         held, readings = alarm.condition.level, assessment.readings
         found = (
-            vector_condition(readings, watch.source, reference, limits, held)
+            vector_judgement(readings, watch.source, reference, limits, held)
             for limits in watch.limits.at(point)
         )
         return worst_of(found, point)
@@ -284,7 +284,7 @@ class UnitAlarms:
         point, seen_ns = self._points.get(subject, self._unit_point)
         return point if abs(now_ns - seen_ns) <= POINT_HOLDS_NS else NOWHERE_KNOWN
 
-    def _update(self, watch: Watch, condition: Condition, now_ns: int) -> None:
+    def _update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
         """Update the alarm of a channel, the device or its link."""
         if condition.level is not None:
             subject = self._bearing_of.get(watch.source, watch.source)
@@ -318,24 +318,24 @@ class UnitAlarms:
         are_inactive = all(self._board.alarm(watch.id).is_settled_inactive for watch in watches)
         self._inactive_with = block.channel_quality if are_inactive else None
 
-    def _channel_condition(self, channel: str, block: SampleBlock) -> Condition:
+    def _channel_condition(self, channel: str, block: SampleBlock) -> Judgement:
         rows = self._rows_of[channel]
         if not rows:
             return unknown(Reason.NOT_MEASURED)
         quality = worst(block.channel_quality[row] for row in rows)
         clipped_percent = self._clipped_percent.get(channel) or None
-        return channel_condition(quality, self._segment_faults.get(channel), clipped_percent)
+        return channel_judgement(quality, self._segment_faults.get(channel), clipped_percent)
 
     def _take_clock(self, block: SampleBlock, point: OperatingPoint, host_ns: int) -> None:
         for rule, reading_of in CLOCK_READINGS.items():
             for watch in self._limits_of_rule[rule]:
                 self._compare(watch, reading_of(block.clock), host_ns, point)
         for stamps in self._of_rule[TIME_STAMPS]:
-            self._update(stamps, stamp_condition(block.stamp_fault), host_ns)
+            self._update(stamps, stamp_judgement(block.stamp_fault), host_ns)
 
     def _take_link(self, host_ns: int) -> None:
         for watch in self._of_rule[LINK]:
-            self._update(watch, link_condition(*self._link), host_ns)
+            self._update(watch, link_judgement(*self._link), host_ns)
 
     def _compare(
         self, watch: LimitWatch, reading: Reading, now_ns: int, point: OperatingPoint
@@ -357,6 +357,6 @@ def _judged(watch: LimitWatch, assessment: Assessment) -> list[tuple[int, Readin
     return found or [(assessment.time_ns, assessment.readings[source])]
 
 
-def _at(point: OperatingPoint, condition: Condition) -> Condition:
+def _at(point: OperatingPoint, condition: Judgement) -> Judgement:
     """A judgement with the operating condition under which a limit was passed."""
     return condition if condition.level is None else replace(condition, point=point)

@@ -6,7 +6,7 @@ from core.change.attribution import Attribution, Cause
 from core.change.decision import Decision
 from core.change.settings import ChangeLimits
 from core.change.verdict import JUDGED, Verdict
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def film_finding(decision: Decision, is_compared: bool, version: int | None) -> 
     )
 
 
-def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Condition:
+def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
     """What an alarm of the film's change makes of it: what is not judged has not returned."""
     if finding.verdict not in JUDGED:
         return unknown(finding.verdict.name.lower())
@@ -77,4 +77,4 @@ def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Condition:
     reason = "ok"
     if finding.level is not None:
         reason = CHANGED[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
-    return Condition(finding.level, value=finding.change, limit=limit, reason=reason)
+    return Judgement(finding.level, value=finding.change, limit=limit, reason=reason)

@@ -14,7 +14,7 @@ from core.alarms.kinds import LINK_LOST
 from core.alarms.operation import Action
 from core.alarms.statistics import ChatterRule, ChatterWatch
 from core.alarms.unit_alarms import UnitAlarms
-from core.limits import Condition
+from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from service.alarms.count import AlarmCount, count_of
@@ -33,7 +33,7 @@ TICK_S = 0.5
 
 NO_MEMORIES: Mapping[str, AlarmMemory] = MappingProxyType({})
 
-NO_FILMS: Mapping[str, Condition] = MappingProxyType({})
+NO_FILMS: Mapping[str, Judgement] = MappingProxyType({})
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
 """Kinds that are judged also while no samples arrive."""
@@ -141,7 +141,7 @@ class AlarmEngine:
         self,
         block: SampleBlock,
         assessments: Sequence[Assessment],
-        films: Mapping[str, Condition] = NO_FILMS,
+        films: Mapping[str, Judgement] = NO_FILMS,
     ) -> list[AlarmNews]:
         """Take in a block and what it has taught; the news is to be stored with it.
 

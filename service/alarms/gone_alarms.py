@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity
 from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from service.alarms.told_alarms import ToldAlarms
 from service.settings.alarm_kinds import ANALYSIS_GONE
 
@@ -26,7 +26,7 @@ def gone_alarms(units: Iterable[str]) -> ToldAlarms:
 def judge(alarms: ToldAlarms, silent: Sequence[str], heard: Sequence[str], after_s: float) -> None:
     """Take in which units were heard of lately, and which were not."""
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
-    gone = Condition(AlarmLevel.DANGER, reason=reason)
+    gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (heard, WITHIN)):
         for unit in units:
             alarms.tell(identity_of(unit).id, condition)

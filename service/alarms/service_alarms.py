@@ -10,7 +10,7 @@ from core.alarms.board import AlarmBoard
 from core.alarms.kinds import LimitWatch
 from core.alarms.operation import Action
 from core.condition.cells import NOWHERE_KNOWN
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from core.quality import Reading
 from core.samples.account import SampleAccount
 from core.units import NS_PER_S
@@ -151,13 +151,13 @@ class ServiceAlarms:
             judge = judges.get(name, partial(self._by_reading, name))
             self._update(name, judge(health), now_ns)
 
-    def _by_reading(self, name: str, health: ServiceHealth) -> Condition:
+    def _by_reading(self, name: str, health: ServiceHealth) -> Judgement:
         """Judge the reading of a kind: a value, or the words of a trouble."""
         found: float | str | None = getattr(health, SERVICE_KINDS[name].reading or "")
         if found is None:
             return WITHIN
         if isinstance(found, str):
-            return Condition(LEVELS.get(name, AlarmLevel.ALERT), reason=found)
+            return Judgement(LEVELS.get(name, AlarmLevel.ALERT), reason=found)
         return self._compared(name, found)
 
     def _count_losses(self, health: ServiceHealth, now_ns: int) -> None:
@@ -169,38 +169,38 @@ class ServiceAlarms:
             if unit not in self._inherited:
                 self._update(loss_key(unit), condition, now_ns)
 
-    def _store(self, health: ServiceHealth) -> Condition:
+    def _store(self, health: ServiceHealth) -> Judgement:
         found = self._compared("results_not_stored", health.store_behind_s)
         if found.level is None:
             return found
         return replace(found, reason=health.store_error or "the store does not answer")
 
-    def _disk(self, health: ServiceHealth) -> Condition:
+    def _disk(self, health: ServiceHealth) -> Judgement:
         watch = self._watches["disk_nearly_full"]
         return health.disk(self._board.alarm(watch.id).condition.level)
 
-    def _lost(self, health: ServiceHealth) -> Condition:
+    def _lost(self, health: ServiceHealth) -> Judgement:
         n_more = health.n_unstored - self._n_unstored
         self._n_unstored = health.n_unstored
         if n_more <= 0:
             return WITHIN
         reason = health.unstored_reason or "given_up"
-        return Condition(AlarmLevel.DANGER, value=float(health.n_unstored), reason=reason)
+        return Judgement(AlarmLevel.DANGER, value=float(health.n_unstored), reason=reason)
 
-    def _damaged(self, health: ServiceHealth) -> Condition:
+    def _damaged(self, health: ServiceHealth) -> Judgement:
         n_more = health.n_recordings_damaged - self._n_damaged
         self._n_damaged = health.n_recordings_damaged
         if n_more <= 0:
             return WITHIN
         n_all = float(health.n_recordings_damaged)
-        return Condition(AlarmLevel.ALERT, value=n_all, reason="damaged_or_missing")
+        return Judgement(AlarmLevel.ALERT, value=n_all, reason="damaged_or_missing")
 
-    def _compared(self, key: str, value: float) -> Condition:
+    def _compared(self, key: str, value: float) -> Judgement:
         watch = self._watches[key]
         if not isinstance(watch, LimitWatch):
             raise TypeError(f"{key} has no limits")
         held = self._board.alarm(watch.id).condition.level
         return watch.limits.judge(Reading(value), NOWHERE_KNOWN, held)
 
-    def _update(self, key: str, condition: Condition, now_ns: int) -> None:
+    def _update(self, key: str, condition: Judgement, now_ns: int) -> None:
         self._board.update(self._watches[key], condition, now_ns)

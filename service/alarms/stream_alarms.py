@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from core.alarms.alarm import AlarmIdentity
 from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from service.alarms.told_alarms import ToldAlarms
 from service.settings.alarm_kinds import MESSAGES_REFUSED, STREAM
 
@@ -29,7 +29,7 @@ def stream_alarms(units: Iterable[str]) -> ToldAlarms:
 def refuse(alarms: ToldAlarms, unit: str, reason: str) -> None:
     """Note that a message of a unit was refused."""
     words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
-    alarms.tell_once(_refused(unit).id, Condition(AlarmLevel.ALERT, reason=words))
+    alarms.tell_once(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
 
 
 def _refused(unit: str) -> AlarmIdentity:

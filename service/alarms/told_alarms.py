@@ -6,7 +6,7 @@ from core.alarms.alarm import Alarm, AlarmNews
 from core.alarms.board import AlarmBoard
 from core.alarms.kinds import Watch
 from core.alarms.operation import Action
-from core.limits import WITHIN, Condition
+from core.limits import WITHIN, Judgement
 
 
 class ToldAlarms:
@@ -15,7 +15,7 @@ class ToldAlarms:
     def __init__(self, watches: Iterable[Watch]) -> None:
         self._watches = {watch.id: watch for watch in watches}
         self._board = AlarmBoard(self._watches.values())
-        self._found: dict[str, Condition] = {}
+        self._found: dict[str, Judgement] = {}
         self._once: set[str] = set()
 
     @property
@@ -30,12 +30,12 @@ class ToldAlarms:
         """Look one up. Raises `KeyError` if there is no such alarm."""
         return self._board.alarm(id_)
 
-    def tell(self, id_: str, condition: Condition) -> None:
+    def tell(self, id_: str, condition: Judgement) -> None:
         """Note what is found; it lasts until something else is told."""
         self._found[id_] = condition
         self._once.discard(id_)
 
-    def tell_once(self, id_: str, condition: Condition) -> None:
+    def tell_once(self, id_: str, condition: Judgement) -> None:
         """Note what has happened, and is over already."""
         self.tell(id_, condition)
         self._once.add(id_)

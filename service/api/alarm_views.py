@@ -3,7 +3,7 @@
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState, Hold
 from core.alarms.kinds import FILM_KINDS
 from core.condition.cells import CellGrid, OperatingPoint
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.api.alarm_models import (
     AlarmCountModel,
     AlarmEventModel,
@@ -144,7 +144,7 @@ def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | 
     )
 
 
-def _condition(condition: Condition) -> ConditionName:
+def _condition(condition: Judgement) -> ConditionName:
     return "within_limits" if condition.level is None else "active"
 
 

@@ -16,7 +16,7 @@ from core.change.film_judge import FilmJudge, FilmNews
 from core.change.film_memory import FilmMemory
 from core.change.film_rules import FilmRules
 from core.change.film_watch import FilmWatch
-from core.limits import Condition
+from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from service.films.actions import Action, step_of
@@ -126,7 +126,7 @@ class FilmKeeper:
         films.newest.update({told.reading.bearing: told for told in news})
         return seen, news
 
-    def conditions(self, news: Sequence[FilmNews]) -> dict[str, Condition]:
+    def conditions(self, news: Sequence[FilmNews]) -> dict[str, Judgement]:
         """What alarms make of it, by alarm."""
         return {
             alarm_id(told.reading.unit, told.reading.bearing, direction): alarm_condition(

@@ -14,7 +14,7 @@ from core.alarms.alarm import (
 )
 from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.audit.entry import Deed
 from service.settings.alarm_kinds import ALARM_KINDS
 from service.store.audit_deeds import alarm_deeds
@@ -162,7 +162,7 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
             is_acknowledged=bool(found["is_acknowledged"]),
             raised_ns=found["raised_ns"],
             n_events=found["n_events"],
-            condition=Condition(
+            condition=Judgement(
                 level=_level(found["condition_level"]),
                 is_known=bool(found["is_known"]),
                 value=found["value"],

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmRule
-from core.alarms.life_cycle import advance
+from core.alarms.life_cycle import update
 from core.alarms.operation import Action, operate
-from core.limits import Condition
+from core.limits import Judgement
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.quality import GOOD, Reading
@@ -56,8 +56,8 @@ class Life:
     )
     events: list[AlarmEvent] = field(default_factory=list)
 
-    def find(self, condition: Condition, now_ns: int) -> list[str]:
-        self.alarm, events = advance(self.alarm, condition, now_ns, self.rule)
+    def find(self, condition: Judgement, now_ns: int) -> list[str]:
+        self.alarm, events = update(self.alarm, condition, now_ns, self.rule)
         self.events += events
         return [event.change.value for event in events]
 

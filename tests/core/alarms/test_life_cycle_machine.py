@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmEvent, AlarmIdentity, AlarmRule, AlarmState
-from core.alarms.life_cycle import advance, interrupted, restored
+from core.alarms.life_cycle import interrupted, restored, update
 from core.alarms.operation import (
     Acknowledge,
     ActionRefusedError,
@@ -21,7 +21,7 @@ from core.alarms.operation import (
     expire,
     operate,
 )
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 
 IDENTITY = AlarmIdentity("U1", "UJB", "order1_shaft_x")
 
@@ -79,7 +79,7 @@ class LifeCycle(RuleBasedStateMachine):
     def judged(self, level: AlarmLevel | None, step: int, suppressed: str | None) -> None:
         self.now += step
         self._hide_by_design(suppressed)
-        self._advance(Condition(level, suppressed_by=suppressed))
+        self._advance(Judgement(level, suppressed_by=suppressed))
         self._model_sees(level, known=True)
         self._show_by_design(suppressed)
 
@@ -200,8 +200,8 @@ class LifeCycle(RuleBasedStateMachine):
         assert [e.state_before for e in self.events] == states[:-1]
         assert self.alarm.state is states[-1]
 
-    def _advance(self, condition: Condition) -> None:
-        self.alarm, events = advance(self.alarm, condition, self.now, self.rule)
+    def _advance(self, condition: Judgement) -> None:
+        self.alarm, events = update(self.alarm, condition, self.now, self.rule)
         self.events += events
 
     def _operate(self, action: object) -> None:

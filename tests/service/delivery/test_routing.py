@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule, AlarmState
-from core.alarms.life_cycle import advance
+from core.alarms.life_cycle import update
 from core.alarms.operation import (
     Acknowledge,
     ReturnToService,
@@ -17,13 +17,13 @@ from core.alarms.operation import (
     Unshelve,
     operate,
 )
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 
 T0 = 1_767_225_600_000_000_000
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
-DANGER = Condition(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
-WELL = Condition(value=3.0)
-STANDS = Condition(value=3.0, suppressed_by="standstill")
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
+WELL = Judgement(value=3.0)
+STANDS = Judgement(value=3.0, suppressed_by="standstill")
 
 SHELVE, UNSHELVE = Shelve("A. Name", "cable", T0 + 10**15), Unshelve("A. Name")
 ANY = AlarmLevel.ALERT
@@ -39,8 +39,8 @@ class Life:
     def go(self, *steps: Any) -> None:
         for step in steps:
             self.now_ns += 10**9
-            if isinstance(step, Condition):
-                self.alarm, events = advance(self.alarm, step, self.now_ns, AlarmRule())
+            if isinstance(step, Judgement):
+                self.alarm, events = update(self.alarm, step, self.now_ns, AlarmRule())
             else:
                 asked = step if not callable(step) else step(self.alarm)
                 self.alarm, events = operate(self.alarm, asked, self.now_ns)

@@ -18,8 +18,8 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
-from core.alarms.life_cycle import advance
-from core.limits import AlarmLevel, Condition
+from core.alarms.life_cycle import update
+from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.samples.account import Gap
 from service import recorder as recording
@@ -193,7 +193,7 @@ async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothin
 def news_of(subject: str) -> AlarmNews:
     """That a channel has failed."""
     identity = AlarmIdentity("U1", subject, "channel_not_ok")
-    return AlarmNews(*advance(Alarm(identity), Condition(AlarmLevel.ALERT), at(0), AlarmRule()))
+    return AlarmNews(*update(Alarm(identity), Judgement(AlarmLevel.ALERT), at(0), AlarmRule()))
 
 
 def without_coverage(found: Assessment) -> Assessment:

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
-from core.alarms.life_cycle import advance
+from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_finding import alarm_condition
 from service.security.people import create_key
@@ -41,7 +41,7 @@ def raised(service: Any, machine: Any) -> AlarmNews:
     condition = alarm_condition(told.findings[0], rules.change)
     assert condition.level is not None
     alarm = Alarm(AlarmIdentity("U1", "UJB", "stiffness_x"))
-    news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
+    news = AlarmNews(*update(alarm, condition, machine.time_ns, AlarmRule()))
     service.evidence.see([news])
     service.store.append([], [], [news])
     return news
