@@ -11,7 +11,6 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from service.api.alarm_names import AlarmChangeName, AlarmStateName
-from service.settings.alarm_kinds import ALARM_KINDS, AlarmKindName
 
 RATES = "/api/v1/alarms/rates"
 LINK = "U1:link:link_lost"
@@ -33,7 +32,6 @@ async def lose_link(service: Any, n_times: int, every_s: float) -> None:
 
 
 def test_the_words_of_the_api_are_those_of_alarms() -> None:
-    assert set(get_args(AlarmKindName)) == set(ALARM_KINDS)
     assert set(get_args(AlarmChangeName)) == {change.value for change in AlarmChange}
     assert set(get_args(AlarmStateName)) == {state.value for state in AlarmState}
 
