@@ -28,9 +28,9 @@ from acquisition.simulated.plant.rotor import (
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
 from acquisition.simulated.plant.unit import SimulatedUnit
 from core.arrays import FloatArray
-from core.machine.bracket import BracketDynamics
+from core.machine.channel import Channel, Measurand
 from core.machine.response import Response
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.unit import Bearing, BracketDynamics, Unit
 from core.monitor.settings import AnalysisSettings
 from core.samples.blocks import SampleBlock
 from core.samples.ring import Ring

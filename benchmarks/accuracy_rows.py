@@ -20,8 +20,9 @@ from acquisition.simulated.plant.scenario import (
     VortexRope,
 )
 from benchmarks.accuracy_plant import IDEAL, REALISTIC, Run, Transducers
+from core.machine.channel import Measurand
 from core.machine.response import HighPass, Response
-from core.machine.unit import BearingAccuracy, Measurand
+from core.machine.unit import BearingAccuracy
 from core.stiffness.evidence import LineLimits
 from service.validation import paper
 

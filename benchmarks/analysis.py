@@ -20,8 +20,8 @@ import scipy.signal
 
 from benchmarks.accuracy_plant import RATE_HZ, machine
 from core.arrays import FloatArray
-from core.machine.bracket import BracketDynamics
-from core.machine.unit import BearingAccuracy, Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import BearingAccuracy, BracketDynamics, Unit
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock

@@ -18,7 +18,8 @@ from acquisition.simulated.plant.unit import SimulatedUnit
 from core.change.film_reading import FilmReading, film_reading
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.machine.unit import Bearing, Channel, Estimator, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings

@@ -1,4 +1,4 @@
-"""Levels, limits, zones and delays: what alarms and changes of films are judged by."""
+"""Levels, limits, zones and delays, by which alarms and changes of films are judged."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,23 +18,23 @@ class AlarmLevel(IntEnum):
 
 
 @dataclass(frozen=True)
-class Condition:
-    """What is found at one moment of what an alarm watches.
+class Judgement:
+    """What an alarm watches, judged at one moment.
 
     Parameters
     ----------
     level
-        Which limit is passed; None if none is. While nothing is known, that which was known last.
+        Level whose limit is passed, if any. While the condition is unknown, the last known level.
     is_known
-        Whether it could be judged at all; if not, it is neither active nor returned.
+        Whether the condition could be judged; if not, it is neither active nor returned.
     value, limit
-        What was compared with what, where there are numbers.
+        Value and the limit that it was compared with, where there are numbers.
     reason
-        Why it is so, in a word; "ok" if all is well.
+        Why, in a word; "ok" if no limit is passed.
     suppressed_by
-        Why, by design, the alarm counts for nothing now; None if it counts.
+        Why the alarm is suppressed by design; None if it is not.
     point
-        Under which operating condition, where that is known of a level.
+        Operating condition under which a limit was passed, if known.
     """
 
     level: AlarmLevel | None = None
@@ -46,40 +46,40 @@ class Condition:
     point: OperatingPoint | None = None
 
 
-WITHIN = Condition()
-"""All is well, and there is no number to it."""
+WITHIN = Judgement()
+"""Within limits, without a value."""
 
 
-NEVER_JUDGED = Condition(is_known=False, reason="waiting_for_data")
+NEVER_JUDGED = Judgement(is_known=False, reason="waiting_for_data")
 
 
-def unknown(reason: str, suppressed_by: str | None = None) -> Condition:
-    """Build the condition of which nothing is known now."""
-    return Condition(is_known=False, reason=reason, suppressed_by=suppressed_by)
+def unknown(reason: str, suppressed_by: str | None = None) -> Judgement:
+    """A judgement while the condition is unknown."""
+    return Judgement(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
 MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
-"""Doubts about a reading that may have made it too low: it was read beside its line."""
+"""Reasons of doubt with which a reading may be too low, as it was read beside its line."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Beyond which values an alarm becomes active; in the unit of the quantity.
+    """Limits beyond which an alarm becomes active, in the unit of the quantity.
 
     Parameters
     ----------
     alert, danger
-        Above which values; None where there is no such level.
+        Upper limits; None if there is no such level.
     deadband
-        How far inside a limit the value must come back for its level to be left.
+        How far inside a limit a value must be for its level to end.
     alert_below, danger_below
-        Below which values.
+        Lower limits.
 
     Raises
     ------
     ValueError
-        If there is no limit at all, or one is not a number above zero, danger does not lie outside
-        alert, or the deadband is negative, or so wide that a value could be left by no level.
+        If there is no limit, a limit is not a number above zero, danger does not lie outside alert,
+        or the deadband is negative or so wide that no value would end a level.
     """
 
     alert: float | None = None
@@ -127,17 +127,13 @@ class Limits:
             return self._lowest_high
         return (self._lowest_high - self._highest_low) / 2.0
 
-    @cached_property
-    def lowest(self) -> float:
-        """The upper limit that is passed first; infinite if there is none."""
-        return math.inf if self._lowest_high is None else self._lowest_high
-
     def is_within(self, value: float) -> bool:
         """Whether a value passes no limit."""
-        return value <= self.lowest and (self._highest_low is None or value >= self._highest_low)
+        high, low = self._lowest_high, self._highest_low
+        return (high is None or value <= high) and (low is None or value >= low)
 
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
-        """The worst level whose limit a value is beyond, or not yet clearly inside again."""
+        """The worst level whose limit a value passes; a held level ends inside its deadband."""
         levels = [
             level
             for level, high, low in zip(
@@ -178,18 +174,17 @@ class Limits:
         return "below_limit" if self.is_low(value) else "above_limit"
 
 
-def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Condition:
+def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
     """Compare a reading with limits.
 
-    A reading at a speed that something contradicts may be too low: it can raise an alarm but not
-    clear it. A shaft that does not turn has no
-    vibration to be judged: its alarms are suppressed, not returned, for it may be the speed that
-    is wrong.
+    A reading at an implausible speed may be too low: it can raise an alarm but not clear it. A
+    shaft at standstill has no vibration: its alarms are suppressed and do not return, since the
+    speed itself may be wrong.
 
     Parameters
     ----------
     held
-        The level of the condition before.
+        Level of the judgement before.
     """
     value = reading.value
     if value is None:
@@ -198,7 +193,7 @@ def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Conditio
     level = limits.passed(value, held)
     if reading.quality.reason in MAYBE_TOO_LOW and (level or 0) < (held or 0):
         return unknown(reading.quality.reason)
-    return Condition(
+    return Judgement(
         level, value=value, limit=limits.of(level, value), reason=limits.reason(level, value)
     )
 
@@ -208,7 +203,7 @@ ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
 
 @dataclass(frozen=True)
 class ZoneLimits(Limits):
-    """Zones as limits: C is an alert, D a danger; what is within says whether it is A or B.
+    """Zones as limits: C is an alert, D a danger; A and B are within limits.
 
     Parameters
     ----------
@@ -273,20 +268,20 @@ class DelayTimer:
             a clock that was put back adds nothing.
         """
         if wanted == self.is_on:
-            return ON if wanted else RESTED
+            return ON if wanted else INACTIVE
         if elapsed_ns is None:
             elapsed_ns = 0 if self.last_ns is None else max(0, now_ns - self.last_ns)
         opposed_ns = self.opposed_ns + elapsed_ns
         if opposed_ns >= (on_delay_ns if wanted else off_delay_ns):
-            return ON if wanted else RESTED
+            return ON if wanted else INACTIVE
         return DelayTimer(self.is_on, opposed_ns, now_ns)
 
     def paused(self) -> "DelayTimer":
-        """The timer when nothing is known: what is pending stays pending, and no time passes."""
+        """The timer while the condition is unknown: pending, with no time passing."""
         return self if self.last_ns is None else replace(self, last_ns=None)
 
 
-RESTED = DelayTimer()
+INACTIVE = DelayTimer()
 
 
 ON = DelayTimer(is_on=True)

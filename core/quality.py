@@ -1,4 +1,4 @@
-"""How far a value may be believed: good, uncertain or bad, and why (after OPC UA)."""
+"""Quality of a value after OPC UA: good, uncertain or bad, with the reason."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ GOOD = Quality(Level.GOOD, Reason.OK)
 
 
 def uncertain(reason: Reason) -> Quality:
-    """Quality of a value that is shown but should be doubted."""
+    """Quality of a value that is shown with doubt."""
     return Quality(Level.UNCERTAIN, reason)
 
 
@@ -83,7 +83,7 @@ class Reading:
         differs from one result to the next; the systematic part stays as long as transducers and
         bracket do, and cancels in a channel's own trend.
     interval_95
-        Holds the truth with 95 %, where that is known.
+        Coverage interval of 95 %, where it is known.
 
     Raises
     ------
@@ -103,12 +103,12 @@ class Reading:
 
 
 def missing(reason: Reason) -> Reading:
-    """Build the reading that says why there is no number."""
+    """A reading without a number, and why."""
     return Reading(None, bad(reason))
 
 
-NOT_TOLD = missing(Reason.NOT_MEASURED)
-"""What a slow channel reads that a block says nothing of."""
+NOT_MEASURED = missing(Reason.NOT_MEASURED)
+"""Reading of a slow channel that a block does not have."""
 
 
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
@@ -117,7 +117,7 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
     Parameters
     ----------
     weights
-        Of the readings, such as their numbers of samples; equal if not given.
+        Weight of each reading, such as its number of samples; equal if not given.
     """
     weights = [1.0] * len(readings) if weights is None else weights
     counted = [
@@ -137,12 +137,12 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
 def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
     """Mean of the usable readings, or the newest reading if that one is unusable.
 
-    For readings of minutes that are shown as the present: what has just failed has no mean.
+    For readings of minutes that are shown as the present: a channel that has just failed has none.
 
     Parameters
     ----------
     is_grazed
-        Whether the newest reading is missing for a few clipped samples alone: the others stand.
+        Whether the newest reading is missing only for a few clipped samples: the mean stands.
     """
     newest = readings[-1]
     usable = [reading for reading in readings if reading.value is not None]

@@ -2,7 +2,8 @@
 
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.checks.sensor_checks import SensorLimits
-from core.machine.unit import Bearing, BearingAccuracy, Channel, GapAccuracy, Unit
+from core.machine.channel import Channel
+from core.machine.unit import Bearing, BearingAccuracy, GapAccuracy, Unit
 from core.monitor.settings import AnalysisSettings
 from core.stiffness.dynamic_settings import DynamicSettings
 from core.stiffness.usable_lines import LineSelection

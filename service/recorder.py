@@ -12,7 +12,7 @@ from typing import TypeVar
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import AlarmNews
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import NO_SPECTRUM

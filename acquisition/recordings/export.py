@@ -21,7 +21,7 @@ from acquisition.recordings.manifest import Manifest
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.tables import foreign_errors_of
 from core.arrays import SampleArray
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.quality import Level
 from core.units import NS_PER_S
 

@@ -23,7 +23,7 @@ from acquisition.recordings.limits import (
     MAX_SAMPLES,
     MAX_SLOW_CHANNELS,
 )
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"

@@ -1,11 +1,12 @@
-"""`Alarm`: what is known of one alarm, and the words of its life cycle."""
+"""`Alarm` and `AlarmEvent`: one alarm at one moment, and one line of its history."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
 from core.condition.cells import OperatingPoint
-from core.limits import NEVER_JUDGED, RESTED, AlarmLevel, Condition, DelayTimer
+from core.limits import INACTIVE, NEVER_JUDGED, AlarmLevel, DelayTimer, Judgement
 
 
 class AlarmState(StrEnum):
@@ -20,88 +21,42 @@ class AlarmState(StrEnum):
     OUT_OF_SERVICE = "out_of_service"
 
 
-class AlarmKind(StrEnum):
-    """What is wrong, in a word that is part of the alarm's identity."""
-
-    CHANNEL_NOT_OK = "channel_not_ok"
-    SHAFT_X = "order1_shaft_x"
-    SHAFT_Y = "order1_shaft_y"
-    CHANGE_SHAFT_X = "order1_change_shaft_x"
-    CHANGE_SHAFT_Y = "order1_change_shaft_y"
-    CHANGE_BEARING_X = "order1_change_bearing_x"
-    CHANGE_BEARING_Y = "order1_change_bearing_y"
-    OVERALL_SHAFT_X = "overall_shaft_x"
-    OVERALL_SHAFT_Y = "overall_shaft_y"
-    OVERALL_BEARING_X = "overall_bearing_x"
-    OVERALL_BEARING_Y = "overall_bearing_y"
-    ZONE_SHAFT_X = "zone_shaft_x"
-    ZONE_SHAFT_Y = "zone_shaft_y"
-    ZONE_SHAFT = "zone_shaft"
-    ZONE_BEARING_X = "zone_bearing_x"
-    ZONE_BEARING_Y = "zone_bearing_y"
-    ECCENTRICITY = "eccentricity_ratio"
-    GAP_X = "gap_x"
-    GAP_Y = "gap_y"
-    OPPOSITE_GAP_X = "opposite_gap_x"
-    OPPOSITE_GAP_Y = "opposite_gap_y"
-    OIL_TEMPERATURE = "oil_temperature"
-    STIFFNESS_X = "stiffness_x"
-    STIFFNESS_Y = "stiffness_y"
-    CLOCK_OFFSET = "clock_offset"
-    CLOCK_DRIFT = "clock_drift"
-    TIME_STAMPS = "time_stamps"
-    LINK_LOST = "link_lost"
-    SAMPLES_LOST = "samples_lost"
-    RESULTS_NOT_STORED = "results_not_stored"
-    RESULTS_LOST = "results_lost"
-    BLOCKS_WAITING = "blocks_waiting"
-    ANALYSIS_LATE = "analysis_late"
-    CAPTURES_NOT_KEPT = "captures_not_kept"
-    SAMPLES_NOT_RECORDED = "samples_not_recorded"
-    RECORDINGS_DAMAGED = "recordings_damaged"
-    QUESTIONS_REFUSED = "questions_refused"
-    DISK_NEARLY_FULL = "disk_nearly_full"
-    STORED_DATA_DAMAGED = "stored_data_damaged"
-    MESSAGES_REFUSED = "messages_refused"
-    STREAM_AWAY = "stream_away"
-    ANALYSIS_GONE = "analysis_gone"
-
-
 PLANT = "plant"
-"""In the place of a unit: what concerns all of them. No unit may be called so."""
+"""Unit of alarms about the service. No unit may have this name."""
 
 
 @dataclass(frozen=True)
 class AlarmIdentity:
-    """Which alarm: the same for as long as the plant calls its parts by the same names.
+    """Identity of an alarm, the same as long as the plant file names its parts alike.
 
     Parameters
     ----------
     unit
-        `PLANT` where it is about the service itself.
+        Unit, or `PLANT` for alarms about the service.
     subject
-        Channel or bearing that it is about; "device" or "link" where it is about the whole unit,
-        "store", "service" or "captures" where it is about the service.
+        Id of a channel or bearing, or the subject of its kind, such as "device".
+    kind
+        Name of an `AlarmKind`.
     """
 
     unit: str
     subject: str
-    kind: AlarmKind
+    kind: str
 
     @cached_property
     def id(self) -> str:
-        """All of it in one word, fit for a URL."""
+        """Id in one word, fit for a URL."""
         return f"{self.unit}:{self.subject}:{self.kind}"
 
 
 @dataclass(frozen=True)
 class Hold:
-    """That somebody has taken an alarm off the list, and why.
+    """Who has taken an alarm off the list, and why.
 
     Parameters
     ----------
     until_ns
-        When that ends by itself, host time; None if never.
+        When it ends by itself, host time; None if never.
     """
 
     actor: str
@@ -112,12 +67,12 @@ class Hold:
 
 @dataclass(frozen=True)
 class AlarmRule:
-    """How long a condition must last, and whether what it raised stays.
+    """Delays and latch of an alarm.
 
     Parameters
     ----------
     on_delay_ns, off_delay_ns
-        Known time without interruption before a level counts, or counts no longer.
+        Known time without contradiction before a level counts, or ceases to.
     is_latching
         Whether the alarm stays active after its condition has gone, until it is reset.
     """
@@ -134,27 +89,27 @@ class Alarm:
     Parameters
     ----------
     level
-        Of the alarm itself, after delays and latch; None if it is not active.
+        Level after delays and latch; None if the alarm is not active.
     occurrence
-        How often it was raised or rose in level; the number that is acknowledged.
+        Number of times that it was raised or rose in level; acknowledged by this number.
     is_acknowledged
-        Whether somebody has seen this occurrence.
+        Whether this occurrence is acknowledged.
     raised_ns
-        When this occurrence began.
+        Start of this occurrence.
     raised_at
-        Under which operating condition; None where that was not known.
+        Operating condition at that time, if known.
     n_events
-        How many events it has had; the newest has this number.
+        Number of its events, and of the newest event.
     condition
-        What was found last.
+        Newest judgement.
     suppressed_by
-        Why it counts for nothing by design; None if it counts.
+        Why it is suppressed by design; None if it is not.
     shelf, outage
-        Whether somebody has shelved it, or taken it out of service.
+        Who has shelved it or taken it out of service, if anyone.
     is_latched
-        Whether only its latch keeps it at its level.
+        Whether only its latch holds its level.
     timers
-        Of alert and danger.
+        Delays of alert and danger.
     """
 
     identity: AlarmIdentity
@@ -164,16 +119,16 @@ class Alarm:
     raised_ns: int | None = None
     raised_at: OperatingPoint | None = None
     n_events: int = 0
-    condition: Condition = NEVER_JUDGED
+    condition: Judgement = NEVER_JUDGED
     suppressed_by: str | None = None
     shelf: Hold | None = None
     outage: Hold | None = None
     is_latched: bool = False
-    timers: tuple[DelayTimer, DelayTimer] = (RESTED, RESTED)
+    timers: tuple[DelayTimer, DelayTimer] = (INACTIVE, INACTIVE)
 
     @property
     def state(self) -> AlarmState:
-        """State of the life cycle; what hides an alarm most thoroughly names it."""
+        """State of the life cycle: out of service, shelved or suppressed come before all others."""
         if self.outage is not None:
             return AlarmState.OUT_OF_SERVICE
         if self.shelf is not None:
@@ -186,12 +141,120 @@ class Alarm:
         return AlarmState.ACKNOWLEDGED if self.is_acknowledged else AlarmState.UNACKNOWLEDGED
 
     @cached_property
-    def is_resting(self) -> bool:
-        """Whether it would not be changed by one more condition that is known and within limits."""
+    def is_settled_inactive(self) -> bool:
+        """Whether one more condition that is known and within limits leaves it unchanged."""
         return (
             self.level is None
             and self.condition.is_known
             and self.condition.level is None
             and self.suppressed_by is None
-            and self.timers == (RESTED, RESTED)
+            and self.timers == (INACTIVE, INACTIVE)
         )
+
+
+class AlarmChange(StrEnum):
+    """What happened to an alarm."""
+
+    RAISED = "raised"
+    ESCALATED = "escalated"
+    EASED = "eased"
+    RETURNED = "returned"
+    LATCHED = "latched"
+    RESET = "reset"
+    ACKNOWLEDGED = "acknowledged"
+    SHELVED = "shelved"
+    UNSHELVED = "unshelved"
+    SUPPRESSED = "suppressed"
+    UNSUPPRESSED = "unsuppressed"
+    TAKEN_OUT_OF_SERVICE = "taken_out_of_service"
+    RETURNED_TO_SERVICE = "returned_to_service"
+    COMMENTED = "commented"
+    CONDITION_UNKNOWN = "condition_unknown"
+    CONDITION_KNOWN = "condition_known"
+
+
+ANNOUNCED = (AlarmChange.RAISED, AlarmChange.ESCALATED)
+"""The changes that begin a new occurrence."""
+
+
+@dataclass(frozen=True)
+class AlarmEvent:
+    """A transition of an alarm, or another entry of its history.
+
+    Parameters
+    ----------
+    number
+        Number among this alarm's events, from 1 without gaps.
+    level
+        Level after the event, or before it if the alarm has returned or was reset.
+    time_ns
+        Time of the samples that decided; host time of an action or of the link.
+    occurrence
+        Occurrence of the alarm that it belongs to.
+    actor
+        Person who acted; empty if none did.
+    reason
+        Why, in a word or in the words of the actor.
+    raised_at
+        Operating condition when that occurrence was raised, if known.
+    """
+
+    identity: AlarmIdentity
+    number: int
+    change: AlarmChange
+    level: AlarmLevel | None
+    state_before: AlarmState
+    state_after: AlarmState
+    time_ns: int
+    occurrence: int
+    value: float | None = None
+    limit: float | None = None
+    actor: str = ""
+    reason: str = ""
+    raised_at: OperatingPoint | None = None
+
+
+@dataclass(frozen=True)
+class AlarmNews:
+    """An alarm with its newest events.
+
+    Parameters
+    ----------
+    peer
+        Network address of the client that asked for them, if known.
+    command
+        Id of the command that asked for them; it is answered by being stored with them.
+    """
+
+    alarm: Alarm
+    events: Sequence[AlarmEvent]
+    peer: str | None = None
+    command: str | None = None
+
+
+def changed(
+    before: Alarm,
+    after: Alarm,
+    change: AlarmChange,
+    time_ns: int,
+    actor: str = "",
+    reason: str = "",
+) -> tuple[Alarm, AlarmEvent]:
+    """The alarm after a change, with the number of its events counted up, and the event."""
+    after = replace(after, n_events=before.n_events + 1)
+    event = AlarmEvent(
+        identity=after.identity,
+        number=after.n_events,
+        change=change,
+        level=after.level if after.level is not None else before.level,
+        state_before=before.state,
+        state_after=after.state,
+        time_ns=time_ns,
+        occurrence=after.occurrence,
+        value=after.condition.value,
+        limit=after.condition.limit,
+        actor=actor,
+        reason=reason,
+        raised_at=after.raised_at,
+    )
+    return after, event

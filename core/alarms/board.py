@@ -1,34 +1,33 @@
-"""All alarms of a unit, and what is kept of them across a restart."""
+"""`AlarmBoard`: alarms with their rules, and what is kept of a unit's alarms across a restart."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from core.alarms.alarm import Alarm, AlarmKind, AlarmRule
-from core.alarms.event import AlarmEvent, AlarmNews
-from core.alarms.kinds import Watch
-from core.alarms.life_cycle import advance, interrupted, restored
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, AlarmRule
+from core.alarms.kinds import LINK_LOST, Watch
+from core.alarms.life_cycle import interrupted, restored, update
 from core.alarms.operation import Action, expire, operate
 from core.condition.cells import OperatingPoint
-from core.limits import Condition, unknown
+from core.limits import Judgement, unknown
 from core.quality import Reason
 
 
 @dataclass(frozen=True)
 class AlarmMemory:
-    """The alarms of a unit at one moment, so that they go on elsewhere as if nothing were.
+    """State of the alarms of a unit, from which another process continues.
 
     Parameters
     ----------
     alarms
         With their delays.
     segment_faults
-        What only segments show of channels, by channel.
+        Faults of channels that only segments show, by channel.
     points
-        Newest operating condition of each bearing, and when that was.
+        Newest operating condition of each bearing with its time, by bearing.
     stop
-        Epoch and index up to which blocks were taken in.
+        Epoch and index up to which blocks were judged.
     is_connected, link_reason
-        What was said of the link last.
+        State of the link.
     """
 
     alarms: tuple[Alarm, ...]
@@ -39,13 +38,13 @@ class AlarmMemory:
     link_reason: str | None
 
     def link_by(self, alarm: Alarm) -> tuple[bool, str | None]:
-        """Whether samples arrive as far as is known, and why not.
+        """Whether samples arrive, and why not.
 
         Parameters
         ----------
         alarm
-            About the link, by its newest event. What came of it since all this was remembered
-            counts more: a link that was lost then stays lost until samples come.
+            Alarm about the link after its newest event. If it was raised or returned since this
+            state was kept, it counts more: a link that was lost stays lost until samples arrive.
         """
         kept = next((a for a in self.alarms if a.identity == alarm.identity), Alarm(alarm.identity))
         if is_same_occurrence(kept, alarm):
@@ -60,17 +59,14 @@ def is_same_occurrence(one: Alarm, other: Alarm) -> bool:
 
 RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 
-JUDGED_WITHOUT_DATA = (AlarmKind.LINK_LOST,)
-"""Kinds whose condition is known whether samples arrive or not."""
-
 
 class AlarmBoard:
-    """Owns some alarms. News come in the order in which things happened.
+    """Owns some alarms and their rules. News is in the order in which things happened.
 
     Parameters
     ----------
     watched
-        What may raise an alarm.
+        The alarms, each inactive at first.
     """
 
     def __init__(self, watched: Iterable[Watch]) -> None:
@@ -91,80 +87,77 @@ class AlarmBoard:
         """Look one up. Raises `KeyError` if there is no such alarm."""
         return self._alarms[id_]
 
-    def find(self, watch: Watch, condition: Condition, now_ns: int) -> None:
-        """Take in what is found; of what rests and goes on resting, that is nothing."""
-        alarm = self._alarms[watch.id]
-        if condition.level is None and condition.is_known and alarm.is_resting:
-            return
-        self.advance(watch.id, condition, now_ns)
+    def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
+        """Update an alarm; an inactive alarm that stays inactive is unchanged."""
+        is_within = condition.level is None and condition.is_known
+        if not (is_within and self._alarms[watch.id].is_settled_inactive):
+            self.record(watch.id, condition, now_ns)
 
-    def advance(self, id_: str, condition: Condition, now_ns: int) -> None:
-        """Take in what is found, and remember it even if nothing comes of it."""
-        self._note(id_, *advance(self._alarms[id_], condition, now_ns, self._rules[id_]))
+    def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
+        """Update an alarm, also with the value of a condition within limits."""
+        self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def interrupt(self) -> None:
-        """Let delays stand still where samples are missing."""
+        """Stop delays where samples are missing, except that of a lost link."""
         self._alarms = {
-            id_: alarm if alarm.identity.kind in JUDGED_WITHOUT_DATA else interrupted(alarm)
+            id_: alarm if alarm.identity.kind == LINK_LOST else interrupted(alarm)
             for id_, alarm in self._alarms.items()
         }
 
     def pause(self) -> None:
-        """Let all delays stand still up to now: time has not passed as the clock says."""
+        """Stop all delays up to now: the clock was set and does not show how much time passed."""
         self._alarms = {id_: interrupted(alarm) for id_, alarm in self._alarms.items()}
 
     def expire(self, host_ns: int) -> None:
-        """Bring back what was shelved until now."""
+        """End the shelving of alarms whose time is up."""
         for id_, alarm in self._alarms.items():
             if alarm.shelf is not None:
                 self._note(id_, *expire(alarm, host_ns))
 
     def operate(self, id_: str, action: Action, host_ns: int) -> None:
-        """Do what somebody asks for.
+        """Apply an action of a person.
 
         Raises
         ------
         KeyError
             If there is no such alarm.
         ActionRefusedError
-            If it does not fit the alarm as it is now.
+            If the action does not fit the state of the alarm.
         """
         self._note(id_, *operate(self._alarms[id_], action, host_ns))
 
-    def restore(self, alarms: Iterable[Alarm], host_ns: int) -> None:
-        """Go on where the service stopped: what was active is, and its condition is unknown.
+    def restore(self, stored: Iterable[Alarm], host_ns: int, kept: Iterable[Alarm] = ()) -> None:
+        """Continue after a restart: active alarms stay active, their conditions are unknown.
 
-        An alarm that nothing watches any more returns; it stays on the list until acknowledged.
-        """
-        for stored in alarms:
-            id_ = stored.identity.id
-            if id_ in self._rules:
-                self._alarms[id_] = restored(stored)
-                if stored.identity.kind not in JUDGED_WITHOUT_DATA:
-                    self.advance(id_, unknown(RESTARTED, stored.suppressed_by), host_ns)
-            elif stored.level is not None or not stored.is_acknowledged:
-                self._alarms[id_] = restored(replace(stored, is_latched=False))
-                self._rules[id_] = AlarmRule()
-                self.advance(id_, Condition(reason=NO_LONGER_WATCHED), host_ns)
-
-    def resume(self, kept: Iterable[Alarm], stored: Iterable[Alarm]) -> None:
-        """Go on as if nothing had been: from alarms as they were kept, with their delays.
+        An alarm without a rule returns to normal, and stays on the list until acknowledged.
 
         Parameters
         ----------
-        kept
-            All of them watched.
         stored
-            As they were after their newest events, which may be newer: what people did since, and
-            what became of a link while no block came with which more could be kept.
+            Alarms after their newest events.
+        kept
+            Alarms of which every sample since is known: condition and delays continue. Their
+            stored form may be newer, by actions of people or, without samples, by the link.
+            Alarms without a rule are left out.
         """
+        remembered = {a.identity.id: a for a in kept if a.identity.id in self._rules}
         newest = {alarm.identity.id: alarm for alarm in stored}
-        for alarm in kept:
-            id_ = alarm.identity.id
-            self._alarms[id_] = _gone_on(alarm, newest.get(id_, alarm))
+        for id_, alarm in newest.items():
+            if id_ in remembered:
+                continue
+            if id_ in self._rules:
+                self._alarms[id_] = restored(alarm)
+                if alarm.identity.kind != LINK_LOST:
+                    self.record(id_, unknown(RESTARTED, alarm.suppressed_by), host_ns)
+            elif alarm.level is not None or not alarm.is_acknowledged:
+                self._alarms[id_] = restored(replace(alarm, is_latched=False))
+                self._rules[id_] = AlarmRule()
+                self.record(id_, Judgement(reason=NO_LONGER_WATCHED), host_ns)
+        for id_, alarm in remembered.items():
+            self._alarms[id_] = _merged(alarm, newest.get(id_, alarm))
 
-    def told(self) -> list[AlarmNews]:
-        """Hand over the news since the last call."""
+    def drain_news(self) -> list[AlarmNews]:
+        """Return and forget the news since the last call."""
         news, self._news = self._news, []
         return news
 
@@ -174,10 +167,10 @@ class AlarmBoard:
             self._news.append(AlarmNews(alarm, events))
 
 
-def _gone_on(kept: Alarm, stored: Alarm) -> Alarm:
-    """An alarm as it was kept, with what its newest events have made of it since."""
+def _merged(kept: Alarm, stored: Alarm) -> Alarm:
+    """A kept alarm with the changes of newer events."""
     if stored.n_events <= kept.n_events:
         return kept
-    if stored.identity.kind in JUDGED_WITHOUT_DATA and not is_same_occurrence(kept, stored):
+    if stored.identity.kind == LINK_LOST and not is_same_occurrence(kept, stored):
         return restored(stored)
     return replace(stored, condition=kept.condition, timers=kept.timers)

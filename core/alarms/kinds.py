@@ -1,312 +1,262 @@
-"""What each kind of alarm watches: rule, reading and channel of a bearing or unit."""
+"""`ALARM_KINDS`: the kinds of alarms of a unit, and the alarms that rules make of it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
-from core.alarms.alarm import AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.condition_limits import ConditionLimits
-from core.alarms.rules import BearingRules, ClockRules, LimitRule, UnitRules, ZoneRule
-from core.checks.sensor_checks import MAX_CLIPPED_SHARE
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.alarms.alarm import AlarmIdentity, AlarmRule
+from core.alarms.rules import BearingRules, LimitRule, UnitRules
 from core.machine.unit import Bearing, Unit
-from core.quality import Level, Quality, Reading, Reason, missing
-from core.samples.device_clock import DeviceClock, StampFault
+
+CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
+"""Kinds that are known by name beyond this table."""
+
+CHANNEL, BEARING, DEVICE, LINK = "channel", "bearing", "device", "link"
+"""Subjects of alarms: a channel or bearing, named by its id; the device or the link of a unit."""
+
+
+@dataclass(frozen=True)
+class AlarmKind:
+    """One kind of alarm. Rules, API, plant file, mail and dashboard read its fields here.
+
+    Parameters
+    ----------
+    name
+        Part of the identity of an alarm. It is stored and never changes.
+    label
+        Words for people, beginning with a capital.
+    unit
+        Unit of the alarm's value; None if it has no value.
+    subject
+        `CHANNEL` or `BEARING` if the alarm is about one of them, else the subject itself.
+    rule
+        Field of `BearingRules` or `UnitRules` that holds its rule.
+    reading
+        Reading of an assessment that is compared with limits; for a 1× vector, its place.
+    applies
+        Whether a bearing has what the alarm watches.
+    advice
+        What to do about it, for alarms about the way of samples into padwatch.
+    """
+
+    name: str
+    label: str
+    unit: str | None
+    subject: str
+    rule: str
+    reading: str | None = None
+    applies: Callable[[Bearing], bool] = lambda bearing: True  # noqa: ARG005
+    advice: str = field(default="", kw_only=True)
+
+
+def kind_table(*kinds: AlarmKind) -> Mapping[str, AlarmKind]:
+    """Kinds by name, in the given order."""
+    return MappingProxyType({kind.name: kind for kind in kinds})
+
+
+def _on_bearing(rule: str, unit: str, *kinds: tuple[str, str, str]) -> Iterable[AlarmKind]:
+    """Kinds of one rule, by name, label and reading."""
+    return (AlarmKind(name, label, unit, BEARING, rule, found) for name, label, found in kinds)
+
+
+ALARM_KINDS = kind_table(
+    AlarmKind(CHANNEL_NOT_OK, "Channel not OK", "%", CHANNEL, "channel"),
+    *_on_bearing(
+        "shaft_order1",
+        "µm 0-pk",
+        ("order1_shaft_x", "Shaft vibration 1×, x", "order1_shaft_x_um_pk"),
+        ("order1_shaft_y", "Shaft vibration 1×, y", "order1_shaft_y_um_pk"),
+    ),
+    *_on_bearing(
+        "shaft_overall",
+        "µm pk-pk",
+        ("overall_shaft_x", "Shaft vibration, broad-band, x", "overall_shaft_x_um_pp"),
+        ("overall_shaft_y", "Shaft vibration, broad-band, y", "overall_shaft_y_um_pp"),
+    ),
+    *_on_bearing(
+        "bearing_overall",
+        "mm/s rms",
+        ("overall_bearing_x", "Bearing velocity, x", "overall_bearing_x_mm_s_rms"),
+        ("overall_bearing_y", "Bearing velocity, y", "overall_bearing_y_mm_s_rms"),
+    ),
+    *_on_bearing("eccentricity", "1", ("eccentricity_ratio", "Eccentricity", "eccentricity_ratio")),
+    *_on_bearing(
+        "gap",
+        "µm",
+        ("gap_x", "Probe gap x", "gap_x_um"),
+        ("gap_y", "Probe gap y", "gap_y_um"),
+    ),
+    AlarmKind(
+        "opposite_gap_x",
+        "Gap of the probe opposite x",
+        "µm",
+        BEARING,
+        "gap",
+        "opposite_gap_x_um",
+        lambda bearing: bearing.opposite_x is not None,
+    ),
+    AlarmKind(
+        "opposite_gap_y",
+        "Gap of the probe opposite y",
+        "µm",
+        BEARING,
+        "gap",
+        "opposite_gap_y_um",
+        lambda bearing: bearing.opposite_y is not None,
+    ),
+    *_on_bearing(
+        "shaft_zones",
+        "µm pk-pk",
+        ("zone_shaft_x", "Vibration zone of the shaft, x", "overall_shaft_x_um_pp"),
+        ("zone_shaft_y", "Vibration zone of the shaft, y", "overall_shaft_y_um_pp"),
+    ),
+    *_on_bearing(
+        "orbit_zones",
+        "µm 0-pk",
+        ("zone_shaft", "Vibration zone of the shaft", "overall_shaft_um_pk"),
+    ),
+    *_on_bearing(
+        "bearing_zones",
+        "mm/s rms",
+        ("zone_bearing_x", "Vibration zone of the bearing, x", "overall_bearing_x_mm_s_rms"),
+        ("zone_bearing_y", "Vibration zone of the bearing, y", "overall_bearing_y_mm_s_rms"),
+    ),
+    *_on_bearing(
+        "shaft_change",
+        "µm 0-pk",
+        ("order1_change_shaft_x", "Shaft 1× vector moved, x", "shaft_x"),
+        ("order1_change_shaft_y", "Shaft 1× vector moved, y", "shaft_y"),
+    ),
+    *_on_bearing(
+        "bearing_change",
+        "µm 0-pk",
+        ("order1_change_bearing_x", "Bearing 1× vector moved, x", "bearing_x"),
+        ("order1_change_bearing_y", "Bearing 1× vector moved, y", "bearing_y"),
+    ),
+    AlarmKind(
+        "oil_temperature",
+        "Oil temperature",
+        "°C",
+        BEARING,
+        "oil_temperature",
+        "oil_temperature_c",
+        lambda bearing: bearing.oil_temperature is not None,
+    ),
+    AlarmKind("stiffness_x", "Film stiffness changed, x", "1", BEARING, "films"),
+    AlarmKind("stiffness_y", "Film stiffness changed, y", "1", BEARING, "films"),
+    AlarmKind(
+        "clock_offset",
+        "Device clock off",
+        "s",
+        DEVICE,
+        "clock_offset",
+        advice="Set the clock of the device, or its time server.",
+    ),
+    AlarmKind(
+        "clock_drift",
+        "Device clock drifts",
+        "ppm",
+        DEVICE,
+        "clock_drift",
+        advice="Compare the sampling rate in the plant file with the device’s own.",
+    ),
+    AlarmKind(
+        "time_stamps",
+        "Wrong time stamps",
+        None,
+        DEVICE,
+        "time_stamps",
+        advice="Look at the clock of the device: its time jumps, repeats or runs backwards.",
+    ),
+    AlarmKind(
+        LINK_LOST,
+        "Link lost",
+        None,
+        LINK,
+        "link",
+        advice="Find out why the device does not answer; padwatch connects again by itself.",
+    ),
+)
+"""All kinds of a unit's alarms. Alarms of one bearing are judged in this order."""
+
+FILM_KINDS = tuple(kind.name for kind in ALARM_KINDS.values() if kind.rule == "films")
+"""Kinds of alarms about the film, in the order of a film's findings: x, y."""
+
+FAST = ("shaft_order1", "shaft_overall", "bearing_overall")
+"""Rules about what may change within seconds. Zones are for steady operation (ISO 20816-1)."""
+
+VECTORS = ("shaft_change", "bearing_change")
+"""Rules that compare 1× vectors with references."""
+
+WAVEFORM_CHANNEL, SLOW_CHANNEL = "channel", "slow_channel"
+"""Rules of the kind "channel_not_ok", by what the channel delivers."""
+
+OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
 
 
 @dataclass(frozen=True)
 class Watch:
-    """One alarm to be, and how long its condition must last.
+    """An alarm that a unit or the service can have.
 
     Parameters
     ----------
     source
-        Channel or reading that it looks at.
+        What is judged: a channel, a reading, the place of a vector, or the subject itself.
+    group
+        Name of its rule, by which alarms are judged together.
     """
 
     identity: AlarmIdentity
     rule: AlarmRule
     source: str
+    group: str = ""
 
     @cached_property
     def id(self) -> str:
-        """Of the alarm."""
+        """Id of the alarm."""
         return self.identity.id
 
 
 @dataclass(frozen=True)
 class LimitWatch(Watch):
-    """One that compares a value with limits.
+    """An alarm that compares a value with limits."""
 
-    Parameters
-    ----------
-    is_fast
-        Whether it looks at what is known of just now, and not at averages over minutes.
-    """
-
-    limits: ConditionLimits
-    is_fast: bool = False
+    limits: LimitRule = field(kw_only=True)
 
 
-READINGS: dict[str, dict[AlarmKind, str]] = {
-    "shaft_order1": {
-        AlarmKind.SHAFT_X: "order1_shaft_x_um_pk",
-        AlarmKind.SHAFT_Y: "order1_shaft_y_um_pk",
-    },
-    "shaft_overall": {
-        AlarmKind.OVERALL_SHAFT_X: "overall_shaft_x_um_pp",
-        AlarmKind.OVERALL_SHAFT_Y: "overall_shaft_y_um_pp",
-    },
-    "bearing_overall": {
-        AlarmKind.OVERALL_BEARING_X: "overall_bearing_x_mm_s_rms",
-        AlarmKind.OVERALL_BEARING_Y: "overall_bearing_y_mm_s_rms",
-    },
-    "eccentricity": {AlarmKind.ECCENTRICITY: "eccentricity_ratio"},
-    "gap": {
-        AlarmKind.GAP_X: "gap_x_um",
-        AlarmKind.GAP_Y: "gap_y_um",
-        AlarmKind.OPPOSITE_GAP_X: "opposite_gap_x_um",
-        AlarmKind.OPPOSITE_GAP_Y: "opposite_gap_y_um",
-    },
-    "shaft_zones": {
-        AlarmKind.ZONE_SHAFT_X: "overall_shaft_x_um_pp",
-        AlarmKind.ZONE_SHAFT_Y: "overall_shaft_y_um_pp",
-    },
-    "orbit_zones": {AlarmKind.ZONE_SHAFT: "overall_shaft_um_pk"},
-    "bearing_zones": {
-        AlarmKind.ZONE_BEARING_X: "overall_bearing_x_mm_s_rms",
-        AlarmKind.ZONE_BEARING_Y: "overall_bearing_y_mm_s_rms",
-    },
-}
-"""The alarms of each rule of a bearing, and the reading that each of them looks at."""
-
-FAST = ("shaft_order1", "shaft_overall", "bearing_overall")
-"""Rules about what may change within seconds. Zones are for steady operation (ISO 20816-1)."""
-
-CHANGES: dict[str, dict[AlarmKind, str]] = {
-    "shaft_change": {
-        AlarmKind.CHANGE_SHAFT_X: "shaft_x",
-        AlarmKind.CHANGE_SHAFT_Y: "shaft_y",
-    },
-    "bearing_change": {
-        AlarmKind.CHANGE_BEARING_X: "bearing_x",
-        AlarmKind.CHANGE_BEARING_Y: "bearing_y",
-    },
-}
-"""Likewise of the rules about vectors; the place whose vector it is."""
-
-OPPOSITE = {AlarmKind.OPPOSITE_GAP_X: "opposite_x", AlarmKind.OPPOSITE_GAP_Y: "opposite_y"}
-"""Alarms that need a probe which not every bearing has."""
+def watch(
+    identity: AlarmIdentity, rule: AlarmRule | LimitRule, source: str, group: str = ""
+) -> Watch:
+    """The alarm that a rule makes."""
+    if isinstance(rule, LimitRule):
+        return LimitWatch(identity, rule.rule, source, group, limits=rule)
+    return Watch(identity, rule, source, group)
 
 
-def reading_watches(unit: str, bearing: Bearing, rules: BearingRules) -> tuple[LimitWatch, ...]:
-    """The alarms that compare a reading of a bearing with limits."""
-    return _watches(unit, bearing, rules, READINGS)
+def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
+    """The alarms that rules make of a unit, each of them once."""
+    watches: list[Watch] = []
 
+    def add(kind: AlarmKind, subject: str, source: str, group: str, owner: object) -> None:
+        rule: AlarmRule | LimitRule | None = getattr(owner, group)
+        if rule is not None:
+            watches.append(watch(AlarmIdentity(unit.id, subject, kind.name), rule, source, group))
 
-def change_watches(unit: str, bearing: Bearing, rules: BearingRules) -> tuple[LimitWatch, ...]:
-    """The alarms that compare a 1× vector with its reference."""
-    return _watches(unit, bearing, rules, CHANGES)
-
-
-def _watches(
-    unit: str, bearing: Bearing, rules: BearingRules, catalogue: dict[str, dict[AlarmKind, str]]
-) -> tuple[LimitWatch, ...]:
-    watches = []
-    for name, sources in catalogue.items():
-        rule: LimitRule | ZoneRule | None = getattr(rules, name)
-        for kind, source in sources.items():
-            is_there = kind not in OPPOSITE or getattr(bearing, OPPOSITE[kind]) is not None
-            if rule is not None and is_there:
-                identity = AlarmIdentity(unit, bearing.id, kind)
-                watches.append(
-                    LimitWatch(identity, rule.rule, source, rule.by_condition, name in FAST)
-                )
-    return tuple(watches)
-
-
-DEVICE, LINK = "device", "link"
-"""Subjects of alarms about the whole unit."""
-
-
-@dataclass(frozen=True)
-class WatchList:
-    """All alarms of a unit.
-
-    Parameters
-    ----------
-    channels
-        One for each waveform channel, in their order.
-    slow_channels
-        Of those that a limit depends on.
-    readings
-        By bearing, to be compared with its readings.
-    changes
-        By bearing, to compare its 1× vectors with their references.
-    temperatures
-        To be compared with slow channels.
-    films
-        Of each bearing and direction; `core.change` judges them.
-    """
-
-    channels: tuple[Watch, ...]
-    slow_channels: tuple[Watch, ...]
-    readings: dict[str, tuple[LimitWatch, ...]]
-    changes: dict[str, tuple[LimitWatch, ...]]
-    temperatures: tuple[LimitWatch, ...]
-    films: tuple[Watch, ...]
-    offset: LimitWatch | None
-    drift: LimitWatch | None
-    stamps: Watch | None
-    link: Watch | None
-
-    @property
-    def all(self) -> list[Watch]:
-        """Each of them once."""
-        of_bearings = [
-            watch
-            for bearing, watches in self.readings.items()
-            for watch in (*watches, *self.changes[bearing])
-        ]
-        of_unit = [w for w in (self.offset, self.drift, self.stamps, self.link) if w is not None]
-        return [
-            *self.channels,
-            *self.slow_channels,
-            *of_bearings,
-            *self.temperatures,
-            *self.films,
-            *of_unit,
-        ]
-
-
-def watch_list(unit: Unit, rules: UnitRules) -> WatchList:
-    """The alarms that rules make of a unit."""
-    temperatures = tuple(_temperatures(unit, rules))
-    sources = dict.fromkeys(watch.source for watch in temperatures)
-    of_bearings = [(b, rules.bearings.get(b.id, BearingRules())) for b in unit.bearings]
-    return WatchList(
-        channels=tuple(_channel(unit, channel.id, rules.channel) for channel in unit.channels),
-        slow_channels=tuple(_channel(unit, source, rules.slow_channel) for source in sources),
-        readings={b.id: reading_watches(unit.id, b, found) for b, found in of_bearings},
-        changes={b.id: change_watches(unit.id, b, found) for b, found in of_bearings},
-        temperatures=temperatures,
-        films=_films(unit, rules.films),
-        offset=_offset(unit, rules.clock),
-        drift=_drift(unit, rules.clock),
-        stamps=_stamps(unit, rules.clock),
-        link=_link(unit, rules.link),
-    )
-
-
-def _identity(unit: Unit, subject: str, kind: AlarmKind) -> AlarmIdentity:
-    return AlarmIdentity(unit.id, subject, kind)
-
-
-def _channel(unit: Unit, channel: str, rule: AlarmRule) -> Watch:
-    return Watch(_identity(unit, channel, AlarmKind.CHANNEL_NOT_OK), rule, channel)
-
-
-def _limit(unit: Unit, subject: str, kind: AlarmKind, rule: LimitRule, source: str) -> LimitWatch:
-    return LimitWatch(_identity(unit, subject, kind), rule.rule, source, rule.by_condition)
-
-
-def _offset(unit: Unit, clock: ClockRules | None) -> LimitWatch | None:
-    return _limit(unit, DEVICE, AlarmKind.CLOCK_OFFSET, clock.offset, DEVICE) if clock else None
-
-
-def _drift(unit: Unit, clock: ClockRules | None) -> LimitWatch | None:
-    return _limit(unit, DEVICE, AlarmKind.CLOCK_DRIFT, clock.drift, DEVICE) if clock else None
-
-
-def _stamps(unit: Unit, clock: ClockRules | None) -> Watch | None:
-    identity = _identity(unit, DEVICE, AlarmKind.TIME_STAMPS)
-    return Watch(identity, clock.stamps, DEVICE) if clock else None
-
-
-def _link(unit: Unit, rule: AlarmRule | None) -> Watch | None:
-    return Watch(_identity(unit, LINK, AlarmKind.LINK_LOST), rule, LINK) if rule else None
-
-
-def _films(unit: Unit, rule: AlarmRule | None) -> tuple[Watch, ...]:
-    if rule is None:
-        return ()
-    return tuple(
-        Watch(_identity(unit, bearing.id, kind), rule, bearing.id)
-        for bearing in unit.bearings
-        for kind in (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
-    )
-
-
-def _temperatures(unit: Unit, rules: UnitRules) -> list[LimitWatch]:
-    watches = []
-    for bearing in unit.bearings:
-        found = rules.bearings.get(bearing.id)
-        if found is None or found.oil_temperature is None or bearing.oil_temperature is None:
-            continue
-        kind, channel = AlarmKind.OIL_TEMPERATURE, bearing.oil_temperature
-        watches.append(_limit(unit, bearing.id, kind, found.oil_temperature, channel))
+    not_ok = ALARM_KINDS[CHANNEL_NOT_OK]
+    for channel in unit.channels:
+        add(not_ok, channel.id, channel.id, not_ok.rule, rules)
+    of_bearings = [(each, rules.bearings.get(each.id, BearingRules())) for each in unit.bearings]
+    for source in dict.fromkeys(b.oil_temperature for b, own in of_bearings if own.oil_temperature):
+        if source is not None:
+            add(not_ok, source, source, SLOW_CHANNEL, rules)
+    for bearing, own in of_bearings:
+        slow = {OIL_TEMPERATURE: bearing.oil_temperature}
+        for kind in ALARM_KINDS.values():
+            if kind.subject == BEARING and kind.applies(bearing):
+                source = slow.get(kind.rule) or kind.reading or bearing.id
+                add(kind, bearing.id, source, kind.rule, own if hasattr(own, kind.rule) else rules)
+    for kind in ALARM_KINDS.values():
+        if kind.subject in (DEVICE, LINK):
+            add(kind, kind.subject, kind.subject, kind.rule, rules)
     return watches
-
-
-COVERAGE = 1.96
-"""Standard uncertainties on each side of a value that hold the truth with 95 %."""
-
-NO_CLOCK, NO_DRIFT = missing(Reason.NOT_MEASURED), missing(Reason.WAITING_FOR_DATA)
-
-SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
-"""What only a whole segment shows of a channel."""
-
-
-def channel_condition(
-    quality: Quality, segment_fault: Reason | None, clipped_percent: float | None = None
-) -> Condition:
-    """Whether a waveform channel may be believed.
-
-    Parameters
-    ----------
-    quality
-        Of its newest samples.
-    segment_fault
-        What the newest segment has shown, if anything.
-    clipped_percent
-        Of the samples of that segment.
-    """
-    fault = segment_fault if quality.level is Level.GOOD else quality.reason
-    if fault is None:
-        return WITHIN
-    if fault is Reason.CLIPPED and clipped_percent is not None:
-        limit = 100.0 * MAX_CLIPPED_SHARE
-        return Condition(AlarmLevel.ALERT, value=clipped_percent, limit=limit, reason=fault)
-    return Condition(AlarmLevel.ALERT, reason=fault)
-
-
-def slow_channel_condition(reading: Reading) -> Condition:
-    """Whether a slow channel that an alarm depends on delivers a value."""
-    if reading.value is None:
-        return Condition(AlarmLevel.ALERT, reason=reading.quality.reason)
-    return WITHIN
-
-
-def offset_reading(clock: DeviceClock | None) -> Reading:
-    """How far a device's time stamps are off the host's clock, s, either way."""
-    if clock is None or clock.offset_s is None:
-        return NO_CLOCK
-    return Reading(abs(clock.offset_s))
-
-
-def drift_reading(clock: DeviceClock | None) -> Reading:
-    """How much a device surely samples faster or slower than it says, parts per million."""
-    if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
-        return NO_DRIFT
-    return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
-
-
-def stamp_condition(fault: StampFault | None) -> Condition:
-    """Whether a device's own time stamp could be used."""
-    return WITHIN if fault is None else Condition(AlarmLevel.ALERT, reason=fault)
-
-
-def link_condition(is_connected: bool, reason: str | None) -> Condition:
-    """Whether samples of a unit arrive."""
-    if is_connected:
-        return WITHIN
-    return Condition(AlarmLevel.ALERT, reason=reason or "not connected")

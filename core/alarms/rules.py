@@ -1,11 +1,77 @@
-"""What is watched on a unit, and by which rules."""
+"""Rules of alarms: limits by operating condition, delays, and what is watched on a unit."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 from core.alarms.alarm import AlarmRule
-from core.alarms.condition_limits import EVERY_STATE, ConditionLimits, Region, States
-from core.limits import Limits
+from core.condition.cells import OperatingPoint
+from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Judgement, Limits, judge, unknown
+from core.monitor.assessment import Assessment
+from core.quality import NOT_MEASURED, Reading, Reason
 from core.units import ns_from_s
+
+EVERY_STATE = frozenset(OperatingState)
+
+States = frozenset[OperatingState]
+
+Range = tuple[float, float]
+"""From the first, up to but not including the second."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """Operating states and ranges of the other conditions; None where any value will do.
+
+    A condition cell is a region whose ranges are the cell's bounds.
+
+    Parameters
+    ----------
+    attitude_deg
+        Within 0 to 360.
+
+    Raises
+    ------
+    ValueError
+        If there is no state, or a range ends where it begins or before.
+    """
+
+    states: States = EVERY_STATE
+    eccentricity_ratio: Range | None = None
+    oil_temperature_c: Range | None = None
+    attitude_deg: Range | None = None
+
+    def __post_init__(self) -> None:
+        if not self.states:
+            raise ValueError("limits that count in no operating state")
+        for low, high in filter(None, self.ranges):
+            if low >= high:
+                raise ValueError(f"a range from {low:g} to {high:g} must rise")
+
+    def holds(self, point: OperatingPoint) -> bool | None:
+        """Whether a point lies in it; None where that is not known."""
+        is_inside = point.state in self.states
+        is_known = is_inside or point.state is not OperatingState.UNKNOWN
+        inside: list[bool | None] = [is_inside if is_known else None]
+        attitude = None if point.attitude_deg is None else point.attitude_deg % 360.0
+        values = (point.eccentricity_ratio, point.oil_temperature_c, attitude)
+        for bounds, value in zip(self.ranges, values, strict=True):
+            if bounds is not None:
+                inside.append(None if value is None else bounds[0] <= value < bounds[1])
+        return None if None in inside and False not in inside else all(inside)
+
+    def overlaps(self, other: "Region") -> bool:
+        """Whether a point may lie in both."""
+        both = zip(self.ranges, other.ranges, strict=True)
+        return bool(self.states & other.states) and all(
+            one is None or two is None or (one[0] < two[1] and two[0] < one[1]) for one, two in both
+        )
+
+    @property
+    def ranges(self) -> tuple[Range | None, Range | None, Range | None]:
+        """Of eccentricity ratio, oil temperature and attitude angle."""
+        return self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg
 
 
 def rule_of(on_delay_s: float, off_delay_s: float, *, is_latching: bool = False) -> AlarmRule:
@@ -15,38 +81,80 @@ def rule_of(on_delay_s: float, off_delay_s: float, *, is_latching: bool = False)
 
 @dataclass(frozen=True)
 class LimitRule:
-    """A value beyond a limit.
+    """Limits of a value by operating condition. Where none hold, the alarm is suppressed by design.
+
+    Where the condition is not known nothing is suppressed, and all limits that may hold count.
 
     Parameters
     ----------
+    limits
+        Hold in the given states, outside of all tables; None if only tables hold, as for zones.
     states
-        Operating states in which it counts.
+        Operating states in which `limits` count.
     tables
         Regions of the condition in which other limits hold instead.
+
+    Raises
+    ------
+    ValueError
+        If there are no limits at all, no states, or two tables overlap.
     """
 
-    limits: Limits
+    limits: Limits | None
     rule: AlarmRule
     states: States = EVERY_STATE
     tables: tuple[tuple[Region, Limits], ...] = ()
 
-    @property
-    def by_condition(self) -> ConditionLimits:
-        """The limits with the conditions under which they hold."""
-        return ConditionLimits(self.tables, (Region(self.states), self.limits))
+    def __post_init__(self) -> None:
+        if not (self.states and (self.tables or self.limits)):
+            raise ValueError("no limits for any operating state")
+        for (one, _), (other, _) in combinations(self.tables, 2):
+            if one.overlaps(other):
+                states = ", ".join(s.name.lower() for s in sorted(one.states & other.states))
+                raise ValueError(f"two limits for the operating state {states}")
+
+    def at(self, point: OperatingPoint) -> Sequence[Limits]:
+        """The limits that hold at a point, or may hold; empty where none do."""
+        possible = []
+        for region, limits in self.tables:
+            holds = region.holds(point)
+            if holds:
+                return (limits,)
+            if holds is None:
+                possible.append(limits)
+        counts = point.state in self.states or point.state is OperatingState.UNKNOWN
+        return (*possible, self.limits) if counts and self.limits is not None else possible
+
+    def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
+        """Compare a reading with the limits that hold at a point."""
+        return worst_of([judge(reading, limits, held) for limits in self.at(point)], point)
 
 
-@dataclass(frozen=True)
-class ZoneRule:
-    """A value in a zone that is not for long operation; zones differ by condition."""
+def worst_of(found: Iterable[Judgement], point: OperatingPoint) -> Judgement:
+    """The worst judgement by all limits that may hold; of equal ones, by the strictest limit.
 
-    by_condition: ConditionLimits
-    rule: AlarmRule
+    Where no limits hold, the alarm is suppressed and its condition unknown, so that it does not
+    return to normal by being suppressed.
+    """
+    by_limit = sorted(found, key=lambda c: float("inf") if c.limit is None else c.limit)
+    word = point.state.name.lower()
+    return max(by_limit, key=lambda c: c.level or 0, default=unknown(word, word))
+
+
+def point_of(assessment: Assessment) -> OperatingPoint:
+    """Operating condition of a result, doubted or not; a standstill is known without a state."""
+    condition, readings = assessment.condition, assessment.readings
+    state = OperatingState.UNKNOWN if condition is None else condition.state
+    speed = readings.get("speed_rpm", NOT_MEASURED)
+    if state is OperatingState.UNKNOWN and speed.quality.reason is Reason.STANDSTILL:
+        state = OperatingState.STANDSTILL
+    names = ("eccentricity_ratio", "attitude_angle_deg", "oil_temperature_c")
+    return OperatingPoint(state, *(readings.get(name, NOT_MEASURED).value for name in names))
 
 
 @dataclass(frozen=True)
 class BearingRules:
-    """What is watched on one bearing; None if it is not.
+    """Rules of one bearing; None where nothing is watched.
 
     Parameters
     ----------
@@ -77,49 +185,44 @@ class BearingRules:
     gap: LimitRule | None = None
     shaft_change: LimitRule | None = None
     bearing_change: LimitRule | None = None
-    shaft_zones: ZoneRule | None = None
-    orbit_zones: ZoneRule | None = None
-    bearing_zones: ZoneRule | None = None
-
-
-@dataclass(frozen=True)
-class ClockRules:
-    """What is watched of a device's clock.
-
-    Parameters
-    ----------
-    offset
-        Of its stamps against the host, s.
-    drift
-        Of its sampling against the host, parts per million.
-    stamps
-        That its stamps fit the sample index.
-    """
-
-    offset: LimitRule = field(default_factory=lambda: LimitRule(Limits(2.0), rule_of(30.0, 30.0)))
-    drift: LimitRule = field(default_factory=lambda: LimitRule(Limits(200.0), rule_of(60.0, 60.0)))
-    stamps: AlarmRule = field(default_factory=lambda: rule_of(0.0, 600.0))
+    shaft_zones: LimitRule | None = None
+    orbit_zones: LimitRule | None = None
+    bearing_zones: LimitRule | None = None
 
 
 @dataclass(frozen=True)
 class UnitRules:
-    """What is watched on a unit.
+    """Rules of one unit; None where nothing is watched, such as clock and link of a replay.
 
     Parameters
     ----------
+    channel
+        Of each waveform channel.
     slow_channel
         Of slow channels that a limit needs; another device may deliver them, and later.
     bearings
         By bearing; one that is not there has no limits.
     films
-        Of changes of each film's stiffness, which are decided elsewhere; None if they are not.
-    clock, link
-        None if the device's clock or its link is not judged, as in a replay.
+        Of changes of each film's stiffness, which `core.change` decides.
+    clock_offset
+        Of the device's stamps against the host, s.
+    clock_drift
+        Of the device's sampling against the host, parts per million.
+    time_stamps
+        That the device's stamps fit the sample index.
+    link
+        That samples arrive.
     """
 
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
     slow_channel: AlarmRule = field(default_factory=lambda: rule_of(5.0, 10.0))
     bearings: dict[str, BearingRules] = field(default_factory=dict)
     films: AlarmRule | None = None
-    clock: ClockRules | None = field(default_factory=ClockRules)
+    clock_offset: LimitRule | None = field(
+        default_factory=lambda: LimitRule(Limits(2.0), rule_of(30.0, 30.0))
+    )
+    clock_drift: LimitRule | None = field(
+        default_factory=lambda: LimitRule(Limits(200.0), rule_of(60.0, 60.0))
+    )
+    time_stamps: AlarmRule | None = field(default_factory=lambda: rule_of(0.0, 600.0))
     link: AlarmRule | None = field(default_factory=lambda: rule_of(10.0, 0.0))

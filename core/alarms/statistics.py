@@ -4,8 +4,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import Alarm, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
 
@@ -15,14 +14,14 @@ SHOWN_NS = 600 * NS_PER_S
 
 @dataclass(frozen=True)
 class ChatterRule:
-    """What counts as chattering, and as fleeting.
+    """When an alarm is chattering or fleeting.
 
     Parameters
     ----------
     n_activations
-        So many within the window are chattering.
+        Activations within the window that make an alarm chattering.
     window_ns
-        What is active for less is fleeting.
+        Length of the window; an alarm that is active for less is fleeting.
 
     Raises
     ------
@@ -55,12 +54,12 @@ class ChatterWatch:
         self._chattered: dict[str, int] = {}
 
     def note(self, event: AlarmEvent, seen_ns: int) -> None:
-        """Take in an event.
+        """Count an event.
 
         Parameters
         ----------
         seen_ns
-            When it was seen, host time; its own time may be that of samples long past.
+            Host time at which it was seen; its own time may be that of samples long past.
         """
         if event.change not in ANNOUNCED:
             return
@@ -83,7 +82,7 @@ STALE_NS = DAY_NS
 """An alarm that is active for longer is stale."""
 
 N_FLOOD = 10
-"""More alarms than this in ten minutes are a flood: nobody can follow them."""
+"""More alarms than this in ten minutes are a flood: too many for an operator (ISA-18.2)."""
 
 N_MOST_FREQUENT = 10
 
@@ -92,7 +91,7 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class Frequent:
-    """An alarm that came often: how often, and as which share of all."""
+    """One of the most frequent alarms: how often it was announced, and its share of all."""
 
     alarm: str
     n_alarms: int
@@ -106,8 +105,7 @@ class AlarmFigures:
     Parameters
     ----------
     n_alarms
-        How often something was announced: an alarm that was raised or rose to danger, or that came
-        back from where it was hidden.
+        Announcements: alarms that were raised, rose to danger, or came back from being hidden.
     per_day, per_10_min
         On average.
     most_in_10_min
@@ -119,7 +117,7 @@ class AlarmFigures:
     most_frequent
         At most `N_MOST_FREQUENT`, the most frequent first.
     chattering
-        How often each alarm was raised within the window of too many others of its own.
+        By alarm: activations that lie, with enough others, within one window.
     n_fleeting
         Alarms that returned within the window.
     """
@@ -136,7 +134,7 @@ class AlarmFigures:
 
 
 def is_announced(event: AlarmEvent) -> bool:
-    """Whether an event calls for somebody: something new on the list, or back on it."""
+    """Whether an event calls an operator: an alarm that is new on the list, or back on it."""
     return event.state_after is AlarmState.UNACKNOWLEDGED and (
         event.change in ANNOUNCED or event.state_before in HIDDEN
     )
@@ -145,12 +143,12 @@ def is_announced(event: AlarmEvent) -> bool:
 def figures_of(
     events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
 ) -> AlarmFigures:
-    """Count what happened.
+    """Figures of the events of some time.
 
     Parameters
     ----------
     events
-        In the order in which they happened; those of other times are left out.
+        In the order in which they happened; events of other times are left out.
     start_ns, end_ns
         From the first, up to but not including the second.
 

@@ -15,7 +15,7 @@ from core.baseline.history import DIRECTIONS, CodeArray, ReadingOutcome, Stiffne
 from core.change.evidence import NO_EVIDENCE, Comparison, Finding, GatheredEvidence
 from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits
 from core.condition.cells import FilmConditions
-from core.limits import RESTED, AlarmLevel, DelayTimer
+from core.limits import INACTIVE, AlarmLevel, DelayTimer
 from core.units import NS_PER_S
 
 
@@ -119,8 +119,8 @@ class Decision:
     deviation: float | None = None
     deviation_std: float | None = None
     evidence: GatheredEvidence = NO_EVIDENCE
-    alert: DelayTimer = RESTED
-    danger: DelayTimer = RESTED
+    alert: DelayTimer = INACTIVE
+    danger: DelayTimer = INACTIVE
     last_ns: int | None = None
     last_counted_ns: int | None = None
 

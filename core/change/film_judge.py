@@ -17,7 +17,7 @@ from core.change.settings import ChangeLimits, FilmRules
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 from core.condition.cells import FilmConditions
 from core.condition.operating_state import OilSettling, Operation
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 
 
 @dataclass(frozen=True)
@@ -74,15 +74,15 @@ def film_finding(decision: Decision, is_compared: bool, version: int | None) -> 
     )
 
 
-def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Condition:
-    """Condition of the film's alarm: a film that could not be judged has not returned to normal."""
+def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
+    """Judgement of the film's alarm: a film that could not be judged has not returned to normal."""
     if finding.verdict not in JUDGED:
         return unknown(finding.verdict.name.lower())
     limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
     reason = "ok"
     if finding.level is not None:
         reason = ALARM_REASONS[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
-    return Condition(finding.level, value=finding.change, limit=limit, reason=reason)
+    return Judgement(finding.level, value=finding.change, limit=limit, reason=reason)
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ import numpy as np
 from core.arrays import FloatArray
 from core.condition.probe_axes import Growth, ProbeAxis
 from core.condition.shaft_centre import locate_shaft
-from core.machine.unit import Bearing, GapAccuracy, Measurand, Unit
-from core.quality import NOT_TOLD, Reading, Reason, current_mean, missing
+from core.machine.channel import Measurand
+from core.machine.unit import Bearing, GapAccuracy, Unit
+from core.quality import NOT_MEASURED, Reading, Reason, current_mean, missing
 from core.spectra.segments import Segment
 from core.uncertainty import SHAFT_GAIN, Budget, mean_budget, numbers, systematic_line, with_budgets
 
@@ -110,7 +111,7 @@ def probe_axis(
 def _mean_slow(segments: Sequence[Segment], channel: str | None) -> tuple[Reading, FloatArray]:
     if channel is None:
         return missing(Reason.NOT_MEASURED), np.empty(0)
-    parts = [segment.slow.get(channel, NOT_TOLD) for segment in segments]
+    parts = [segment.slow.get(channel, NOT_MEASURED) for segment in segments]
     return current_mean(parts), numbers(parts)
 
 

@@ -1,8 +1,4 @@
-"""How a transducer and its amplifier change a signal, frequency by frequency.
-
-Every response is one at the frequencies for which the transducer is made; its sensitivity is not
-part of it.
-"""
+"""Frequency response of a transducer and its amplifier, relative to its sensitivity."""
 
 import math
 from dataclasses import dataclass

@@ -1,15 +1,17 @@
-"""The machine as the numerics see it: which channel measures what, on which bearing."""
+"""The unit as the numerics see it: which channel measures what, on which bearing."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
-from core.machine.bracket import BracketDynamics
-from core.machine.response import Response
+import numpy as np
+
+from core.arrays import ComplexArray, FloatArray
+from core.machine.channel import Channel
 
 
 class Estimator(StrEnum):
-    """Where a stiffness may come from. The names appear in settings, API and store."""
+    """Estimators of stiffness. The names appear in settings, API and store."""
 
     DYNAMIC = "dynamic"
     TRANSFER_ORDER1 = "transfer_order1"
@@ -29,83 +31,50 @@ PREFERENCE = (
 equation (5) includes damping and grows with bearing noise."""
 
 
-MAX_SLOW_ROLL_FRACTION = 0.25
-"""Share of the rated speed up to which unbalance forces (under 1/16) leave the surface alone."""
+MIN_NATURAL_HZ = 15.0
+"""Lowest natural frequency of a bracket; those of Brito et al., Table 1, have 24 to 26 Hz."""
 
 
 @dataclass(frozen=True)
-class SlowRollVector:
-    """What one probe read at 1× at slow roll.
+class BracketDynamics:
+    """Isotropic spring, effective mass and damper between bearing and foundation.
 
     Parameters
     ----------
-    probe
-        Serial number or mark of the probe; another probe, or this one moved, sees another surface.
-    phasor_um_pk
-        Displacement along the axis, relative to the mark on the shaft: its phase is that of the
-        reading when the mark passes the key-phase pick-up.
-    taken_ns
-        UTC.
+    mass_kg
+        Effective mass m_b of bracket and bearing; None if not known, which leaves its inertia out.
+    damping_n_s_per_m
+        Structural damping c_b; usually not known and zero.
     """
 
-    channel: str
-    probe: str
-    phasor_um_pk: complex
-    speed_rpm: float
-    taken_ns: int
+    stiffness_n_per_m: float
+    mass_kg: float | None = None
+    damping_n_s_per_m: float = 0.0
 
-
-class Measurand(StrEnum):
-    """What a waveform channel measures, and therefore its engineering unit."""
-
-    GAP_UM = "gap_um"
-    DISPLACEMENT_UM = "displacement_um"
-    VELOCITY_MM_S = "velocity_mm_s"
-    ACCELERATION_M_S2 = "acceleration_m_s2"
-    KEY_PHASE_V = "key_phase_v"
+    def __post_init__(self) -> None:
+        if not self.stiffness_n_per_m > 0.0:
+            raise ValueError(f"bracket stiffness must be above 0 N/m, got {self.stiffness_n_per_m}")
 
     @property
-    def n_integrations(self) -> int:
-        """How many integrations turn it into displacement: 2 for acceleration, 1 for velocity."""
-        return {Measurand.ACCELERATION_M_S2: 2, Measurand.VELOCITY_MM_S: 1}.get(self, 0)
+    def max_mass_kg(self) -> float:
+        """The mass, or the largest that a bracket of that stiffness can have."""
+        if self.mass_kg is not None:
+            return self.mass_kg
+        return self.stiffness_n_per_m / (2.0 * math.pi * MIN_NATURAL_HZ) ** 2
 
+    def dynamic_stiffness_n_per_m(self, frequency_hz: FloatArray) -> ComplexArray:
+        """Force that the film exerts per absolute displacement of the bracket, (n_lines,).
 
-@dataclass(frozen=True)
-class Channel:
-    """A waveform channel.
-
-    Parameters
-    ----------
-    direction
-        +1 if a growing reading means motion along the positive bearing axis, -1 if against it. A
-        probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1. Of a
-        key-phase, -1 if its pulses fall.
-    response
-        How the transducer changes the signal with frequency; none if it does not.
-    delay_s
-        What the channel is read late by, against the others.
-    line_floor
-        Amplitude of a line, 0-to-peak in the channel's unit, that the transducer's own noise has.
-    unit_per_count
-        The channel's unit per count of its converter; zero where it is not known.
-    ok_limits
-        Lowest and highest mean of a healthy transducer, in the channel's unit.
-    probe
-        Serial number or mark of the probe that is there; empty where it is not known.
-    slow_roll
-        Runout of the shaft under it, where it was measured.
-    """
-
-    id: str
-    measurand: Measurand
-    direction: int = 1
-    response: Response | None = None
-    delay_s: float = 0.0
-    line_floor: float = 0.0
-    unit_per_count: float = 0.0
-    ok_limits: tuple[float, float] = (-math.inf, math.inf)
-    probe: str = ""
-    slow_roll: SlowRollVector | None = None
+        ``k_b - m_b ω² + iω c_b``: the bracket's row of Brito et al., equation (6), in which the
+        forces on the rotor do not appear.
+        """
+        omega = 2.0 * np.pi * frequency_hz
+        stiffness: ComplexArray = (
+            self.stiffness_n_per_m
+            - (self.mass_kg or 0.0) * omega**2
+            + 1j * omega * self.damping_n_s_per_m
+        )
+        return stiffness
 
 
 @dataclass(frozen=True)
@@ -268,7 +237,7 @@ class Unit:
     key_phase
         Waveform channel with one pulse a turn, where there is one.
     rated_power_mw
-        What changes of load are compared with; None if it is not known.
+        Rated power, which changes of load are compared with; None if not known.
     """
 
     id: str
@@ -282,3 +251,34 @@ class Unit:
     has_vortex: bool = True
     key_phase: str | None = None
     rated_power_mw: float | None = None
+
+
+def require_same_machine(here: Unit, there: Unit) -> None:
+    """Refuse a description that differs in more than references, clearances and brackets.
+
+    Raises
+    ------
+    ValueError
+        With the name of the first field that differs, and both values.
+    """
+    before, after = _fixed_parts(here), _fixed_parts(there)
+    for name, value in before.items():
+        if after[name] != value:
+            raise ValueError(f"{name} is {after[name]!r}, is {value!r} here")
+
+
+def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:
+    """Ids of the bearings whose gap references differ."""
+    pairs = zip(here.bearings, there.bearings, strict=True)
+    return [
+        b.id
+        for b, new in pairs
+        if (b.gap_reference_um, b.opposite_reference_um)
+        != (new.gap_reference_um, new.opposite_reference_um)
+    ]
+
+
+def _fixed_parts(unit: Unit) -> dict[str, object]:
+    """The fields that cannot change while the unit is monitored, by name."""
+    fixed: dict[str, object] = {field.name: getattr(unit, field.name) for field in fields(unit)}
+    return fixed | {"bearings": tuple((b.id, b.channels) for b in unit.bearings)}

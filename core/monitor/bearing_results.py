@@ -11,12 +11,12 @@ from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
 from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import position_results, slow_channels, slow_results
-from core.machine.transducers import line_floor_um_pk
+from core.machine.channel import line_floor_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.overall_results import overall_results, phase_results
 from core.monitor.settings import AnalysisSettings
 from core.quality import (
-    NOT_TOLD,
+    NOT_MEASURED,
     Level,
     Quality,
     Reading,
@@ -169,7 +169,9 @@ class BearingResults:
         """Whether speed and load stood still over the averaging window."""
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
-        powers = [segment.slow.get(power, NOT_TOLD) for segment in self._segments] if power else []
+        powers = (
+            [segment.slow.get(power, NOT_MEASURED) for segment in self._segments] if power else []
+        )
         return stationarity(
             _numbers(speeds),
             _numbers(powers),

@@ -4,8 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 
 from core.condition.probe_axes import Growth
-from core.machine.adoption import bearings_with_new_references, require_same_machine
-from core.machine.unit import Unit
+from core.machine.unit import Unit, bearings_with_new_references, require_same_machine
 from core.monitor.assessment import Assessment
 from core.monitor.monitor_state import MonitorState
 from core.samples.account import Gap, SampleAccount

@@ -9,12 +9,12 @@ from core.arrays import FloatArray
 from core.checks.sensor_checks import stationarity
 from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import position_results, slow_channels, slow_results
-from core.machine.transducers import line_floor_um_pk
+from core.machine.channel import line_floor_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import Evidence
 from core.monitor.overall_results import OVERALL_NAMES, SHAFTS
 from core.monitor.settings import AnalysisSettings
-from core.quality import NOT_TOLD, Level, Quality, Reading, Reason, missing, uncertain, worst
+from core.quality import NOT_MEASURED, Level, Quality, Reading, Reason, missing, uncertain, worst
 from core.spectra.recent import RecentReadings
 from core.spectra.segments import ORDER1, VORTEX
 from core.spectra.vector_polls import Poll
@@ -172,7 +172,7 @@ class VectorResults:
     def _steadiness(self) -> Quality:
         power = self._unit.power_channel
         speeds = [poll.speed.rpm.value for poll in self._polls]
-        powers = [poll.slow.get(power, NOT_TOLD).value for poll in self._polls] if power else []
+        powers = [poll.slow.get(power, NOT_MEASURED).value for poll in self._polls] if power else []
         return stationarity(
             _numbers(speeds),
             _numbers(powers),

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.quality import NOT_TOLD, Level, Quality, Reading, mean_reading, worst
+from core.quality import NOT_MEASURED, Level, Quality, Reading, mean_reading, worst
 from core.samples.account import Gap, SampleAccount
 from core.samples.blocks import Rejection, SampleBlock
 from core.samples.misfit import BlockMisfitError
@@ -129,7 +129,7 @@ class Ring:
                 for qualities in zip(*(s.channel_quality for s in stretches), strict=True)
             ),
             slow={
-                id_: mean_reading([s.slow.get(id_, NOT_TOLD) for s in stretches], n_samples)
+                id_: mean_reading([s.slow.get(id_, NOT_MEASURED) for s in stretches], n_samples)
                 for id_ in reference.slow
             },
         )

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.machine.transducers import displacement_factor
-from core.machine.unit import Measurand, Unit
+from core.machine.channel import Measurand, displacement_factor
+from core.machine.unit import Unit
 from core.spectra.lines import SegmentSettings
 from core.units import hz_from_rpm
 

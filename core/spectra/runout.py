@@ -8,7 +8,7 @@ import cmath
 from dataclasses import dataclass
 from enum import StrEnum
 
-from core.machine.unit import MAX_SLOW_ROLL_FRACTION, SlowRollVector
+from core.machine.channel import MAX_SLOW_ROLL_FRACTION, SlowRollVector
 
 
 class RunoutVerdict(StrEnum):

@@ -15,8 +15,8 @@ from core.checks.sensor_checks import (
     quietest_rms,
     signal_quality,
 )
-from core.machine.transducers import displacement_factor
-from core.machine.unit import Channel, Unit
+from core.machine.channel import Channel, displacement_factor
+from core.machine.unit import Unit
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import average

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray, SampleArray
-from core.machine.transducers import displacement_factor
+from core.machine.channel import displacement_factor
 from core.machine.unit import Unit
 from core.quality import Level, Quality, Reading, Reason, bad
 from core.samples.blocks import SampleBlock

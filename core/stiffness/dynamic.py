@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.machine.bracket import BracketDynamics
+from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import BEARING_X, CrossSpectrum
 from core.spectra.spectral_statistics import (

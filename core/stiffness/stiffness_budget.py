@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from core.machine.bracket import BracketDynamics
-from core.machine.unit import BearingAccuracy
+from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.spectra.cross_spectrum import CrossSpectrum
 from core.stiffness.dynamic import DynamicStiffness
 from core.stiffness.transfer import LineTransfer, motion_across

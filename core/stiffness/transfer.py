@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.machine.bracket import BracketDynamics
+from core.machine.unit import BracketDynamics
 from core.spectra.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 
 

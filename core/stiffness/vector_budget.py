@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.machine.bracket import BracketDynamics
-from core.machine.unit import BearingAccuracy
+from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.stiffness.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, RUNOUT
 from core.uncertainty import SHAFT_GAIN, Budget, effective_number, random_line, systematic_line
 

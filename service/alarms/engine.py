@@ -7,14 +7,14 @@ from types import MappingProxyType
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import Alarm, AlarmKind
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.board import AlarmMemory
-from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.judgements import VectorReference
+from core.alarms.kinds import LINK_LOST
 from core.alarms.operation import Action
 from core.alarms.statistics import ChatterRule, ChatterWatch
 from core.alarms.unit_alarms import UnitAlarms
-from core.alarms.vector_change import VectorReference
-from core.limits import Condition
+from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from service.alarms.count import AlarmCount, count_of
@@ -25,6 +25,7 @@ from service.alarms.told_alarms import ToldAlarms
 from service.audit.acting import acting
 from service.heartbeats import UNHEARD, Pulse
 from service.recorder import Findings
+from service.settings.alarm_kinds import MESSAGES_REFUSED
 
 log = structlog.get_logger()
 
@@ -32,9 +33,9 @@ TICK_S = 0.5
 
 NO_MEMORIES: Mapping[str, AlarmMemory] = MappingProxyType({})
 
-NO_FILMS: Mapping[str, Condition] = MappingProxyType({})
+NO_FILMS: Mapping[str, Judgement] = MappingProxyType({})
 
-WITHOUT_LINK = (AlarmKind.LINK_LOST, AlarmKind.MESSAGES_REFUSED)
+WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
 """Kinds that are judged also while no samples arrive."""
 
 Board = UnitAlarms | ServiceAlarms | ToldAlarms
@@ -140,7 +141,7 @@ class AlarmEngine:
         self,
         block: SampleBlock,
         assessments: Sequence[Assessment],
-        films: Mapping[str, Condition] = NO_FILMS,
+        films: Mapping[str, Judgement] = NO_FILMS,
     ) -> list[AlarmNews]:
         """Take in a block and what it has taught; the news is to be stored with it.
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 
-from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity
 from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from service.alarms.told_alarms import ToldAlarms
+from service.settings.alarm_kinds import ANALYSIS_GONE
 
 SHARED = "shared work"
 """In the place of a unit: reports and commands about these alarms. No unit can be called so."""
@@ -14,7 +15,7 @@ SHARED = "shared work"
 
 def is_shared(alarm: Alarm) -> bool:
     """Whether an alarm belongs to whoever does the shared work."""
-    return alarm.identity.kind is AlarmKind.ANALYSIS_GONE
+    return alarm.identity.kind == ANALYSIS_GONE
 
 
 def gone_alarms(units: Iterable[str]) -> ToldAlarms:
@@ -25,7 +26,7 @@ def gone_alarms(units: Iterable[str]) -> ToldAlarms:
 def judge(alarms: ToldAlarms, silent: Sequence[str], heard: Sequence[str], after_s: float) -> None:
     """Take in which units were heard of lately, and which were not."""
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
-    gone = Condition(AlarmLevel.DANGER, reason=reason)
+    gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (heard, WITHIN)):
         for unit in units:
             alarms.tell(identity_of(unit).id, condition)
@@ -33,4 +34,4 @@ def judge(alarms: ToldAlarms, silent: Sequence[str], heard: Sequence[str], after
 
 def identity_of(unit: str) -> AlarmIdentity:
     """The alarm about a unit that nobody analyses."""
-    return AlarmIdentity(PLANT, unit, AlarmKind.ANALYSIS_GONE)
+    return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from core.samples.account import SampleAccount
 from service.bus import Bus
 from service.capture.captures import Captures
@@ -15,11 +15,11 @@ from service.soundness import Soundness
 from service.space.watch import SpaceWatch
 from service.waveforms.keeper import WaveformKeeper
 
-DiskJudge = Callable[[AlarmLevel | None], Condition]
+DiskJudge = Callable[[AlarmLevel | None], Judgement]
 """What is to be said of the fullest disk, by the level that it had before."""
 
 
-def enough_room(held: AlarmLevel | None) -> Condition:
+def enough_room(held: AlarmLevel | None) -> Judgement:
     """Say so where nobody looks at the disks."""
     del held
     return WITHIN

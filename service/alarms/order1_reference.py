@@ -1,6 +1,6 @@
 """A reference vector of 1× taken from the running machine."""
 
-from core.alarms.vector_change import OrderVector, VectorReference
+from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reading, Reason

@@ -1,16 +1,8 @@
 """From the plant file's settings to the rules of a unit."""
 
-from core.alarms.condition_limits import ConditionLimits
-from core.alarms.rules import (
-    BearingRules,
-    ClockRules,
-    LimitRule,
-    UnitRules,
-    ZoneRule,
-    rule_of,
-)
+from core.alarms.judgements import OrderVector, VectorReference
+from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.statistics import ChatterRule
-from core.alarms.vector_change import OrderVector, VectorReference
 from core.limits import Limits, ZoneLimits
 from core.units import ns_from_s
 from service.origin import Origin
@@ -20,8 +12,6 @@ from service.settings.limits import GapLimitSettings, LimitSettings, states_of
 from service.settings.units import UnitSettings
 from service.settings.zones import VectorReferenceSettings, ZoneSettings, ZoneTableSettings
 
-CLOCK_DELAYS_S = {"offset": 30.0, "drift": 60.0}
-
 ZONE_DEADBAND = 0.05
 """Of the boundary between A and B, where no deadband is given."""
 
@@ -29,11 +19,14 @@ ZONE_DEADBAND = 0.05
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
     """What is watched on a unit; of a replay neither the link nor the clock."""
     is_live = origin is Origin.LIVE
+    is_judged = is_live and alarms.clock == "judged"
     return UnitRules(
         channel=rule_of(alarms.channel_on_delay_s, alarms.channel_off_delay_s),
         slow_channel=rule_of(alarms.slow_channel_on_delay_s, alarms.channel_off_delay_s),
         bearings={bearing.id: _bearing(bearing) for bearing in unit.bearing},
-        clock=_clock(alarms) if is_live and alarms.clock == "judged" else None,
+        clock_offset=_clock_limit(alarms.max_clock_offset_s, 30.0) if is_judged else None,
+        clock_drift=_clock_limit(alarms.max_clock_drift_ppm, 60.0) if is_judged else None,
+        time_stamps=rule_of(0.0, 600.0) if is_judged else None,
         link=rule_of(alarms.link_lost_after_s, 0.0) if is_live else None,
     )
 
@@ -93,24 +86,17 @@ def _values(found: LimitSettings) -> Limits:
     return Limits(found.alert, found.danger, found.deadband, *below)
 
 
-def _zones(found: ZoneSettings | None) -> ZoneRule | None:
+def _zones(found: ZoneSettings | None) -> LimitRule | None:
     if found is None:
         return None
     tables = tuple((table.region(table.states), _table(table)) for table in found.table)
     rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
-    return ZoneRule(ConditionLimits(tables), rule)
+    return LimitRule(None, rule, tables=tables)
 
 
 def _table(table: ZoneTableSettings) -> ZoneLimits:
     deadband = ZONE_DEADBAND * table.a_b if table.deadband is None else table.deadband
     return ZoneLimits.between(table.a_b, table.b_c, table.c_d, deadband)
-
-
-def _clock(alarms: AlarmSettings) -> ClockRules:
-    return ClockRules(
-        offset=_clock_limit(alarms.max_clock_offset_s, CLOCK_DELAYS_S["offset"]),
-        drift=_clock_limit(alarms.max_clock_drift_ppm, CLOCK_DELAYS_S["drift"]),
-    )
 
 
 def _clock_limit(limit: float, delay_s: float) -> LimitRule:

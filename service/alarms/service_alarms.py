@@ -3,21 +3,25 @@
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
-from core.alarms.alarm import Alarm, AlarmKind
+from core.alarms.alarm import Alarm, AlarmNews
 from core.alarms.board import AlarmBoard
-from core.alarms.event import AlarmNews
 from core.alarms.kinds import LimitWatch
 from core.alarms.operation import Action
 from core.condition.cells import NOWHERE_KNOWN
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from core.quality import Reading
 from core.samples.account import SampleAccount
 from core.units import NS_PER_S
 from service.alarms.health import LookAtHealth, ServiceHealth
 from service.alarms.service_rules import LOSS_MINUTES, ServiceRules, loss_key, service_watches
+from service.settings.alarm_kinds import SERVICE_KINDS
 
 LOSS_NS = 60 * LOSS_MINUTES * NS_PER_S
+LEVELS = {"stored_data_damaged": AlarmLevel.DANGER, "stream_away": AlarmLevel.DANGER}
+"""Levels of alarms about a trouble; of others, an alert."""
+
 LOOK_EVERY_NS = 10 * NS_PER_S
 
 
@@ -106,7 +110,7 @@ class ServiceAlarms:
             If it does not fit the alarm as it is now.
         """
         self._board.operate(id_, action, host_ns)
-        return self._board.told()
+        return self._board.drain_news()
 
     def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
         """Go on where the service stopped.
@@ -120,7 +124,7 @@ class ServiceAlarms:
             for unit in self._losses
             if self._board.alarm(self._watches[loss_key(unit)].id).level is not None
         }
-        return self._board.told()
+        return self._board.drain_news()
 
     def pause(self) -> None:
         """Let all delays stand still up to now."""
@@ -134,39 +138,27 @@ class ServiceAlarms:
                 self._judge(health, host_ns)
             self._count_losses(health, host_ns)
         self._board.expire(host_ns)
-        return self._board.told()
+        return self._board.drain_news()
 
     def _judge(self, health: ServiceHealth, now_ns: int) -> None:
-        self._find(AlarmKind.RESULTS_NOT_STORED, self._store(health), now_ns)
-        self._find(AlarmKind.RESULTS_LOST, self._lost(health), now_ns)
-        for kind, value in (
-            (AlarmKind.BLOCKS_WAITING, health.waiting_share),
-            (AlarmKind.ANALYSIS_LATE, health.analysis_delay_s),
-        ):
-            self._find(kind, self._compared(kind, value), now_ns)
-        self._find(
-            AlarmKind.CAPTURES_NOT_KEPT,
-            _unless_well(health.captures_error, AlarmLevel.ALERT),
-            now_ns,
-        )
-        self._find(
-            AlarmKind.SAMPLES_NOT_RECORDED,
-            _unless_well(health.recording_error, AlarmLevel.ALERT),
-            now_ns,
-        )
-        self._find(AlarmKind.RECORDINGS_DAMAGED, self._damaged(health), now_ns)
-        self._find(
-            AlarmKind.QUESTIONS_REFUSED, _unless_well(health.refused, AlarmLevel.ALERT), now_ns
-        )
-        self._find(AlarmKind.DISK_NEARLY_FULL, self._disk(health), now_ns)
-        self._find(
-            AlarmKind.STORED_DATA_DAMAGED,
-            _unless_well(health.stored_trouble, AlarmLevel.DANGER),
-            now_ns,
-        )
-        self._find(
-            AlarmKind.STREAM_AWAY, _unless_well(health.stream_trouble, AlarmLevel.DANGER), now_ns
-        )
+        judges = {
+            "results_not_stored": self._store,
+            "results_lost": self._lost,
+            "recordings_damaged": self._damaged,
+            "disk_nearly_full": self._disk,
+        }
+        for name in filter(SERVICE_KINDS.__contains__, self._watches):
+            judge = judges.get(name, partial(self._by_reading, name))
+            self._update(name, judge(health), now_ns)
+
+    def _by_reading(self, name: str, health: ServiceHealth) -> Judgement:
+        """Judge the reading of a kind: a value, or the words of a trouble."""
+        found: float | str | None = getattr(health, SERVICE_KINDS[name].reading or "")
+        if found is None:
+            return WITHIN
+        if isinstance(found, str):
+            return Judgement(LEVELS.get(name, AlarmLevel.ALERT), reason=found)
+        return self._compared(name, found)
 
     def _count_losses(self, health: ServiceHealth, now_ns: int) -> None:
         for unit, account in health.accounts.items():
@@ -175,44 +167,40 @@ class ServiceAlarms:
             if condition.level is not None or seen.reaches_back(now_ns):
                 self._inherited.discard(unit)
             if unit not in self._inherited:
-                self._find(loss_key(unit), condition, now_ns)
+                self._update(loss_key(unit), condition, now_ns)
 
-    def _store(self, health: ServiceHealth) -> Condition:
-        found = self._compared(AlarmKind.RESULTS_NOT_STORED, health.store_behind_s)
+    def _store(self, health: ServiceHealth) -> Judgement:
+        found = self._compared("results_not_stored", health.store_behind_s)
         if found.level is None:
             return found
         return replace(found, reason=health.store_error or "the store does not answer")
 
-    def _disk(self, health: ServiceHealth) -> Condition:
-        watch = self._watches[AlarmKind.DISK_NEARLY_FULL]
+    def _disk(self, health: ServiceHealth) -> Judgement:
+        watch = self._watches["disk_nearly_full"]
         return health.disk(self._board.alarm(watch.id).condition.level)
 
-    def _lost(self, health: ServiceHealth) -> Condition:
+    def _lost(self, health: ServiceHealth) -> Judgement:
         n_more = health.n_unstored - self._n_unstored
         self._n_unstored = health.n_unstored
         if n_more <= 0:
             return WITHIN
         reason = health.unstored_reason or "given_up"
-        return Condition(AlarmLevel.DANGER, value=float(health.n_unstored), reason=reason)
+        return Judgement(AlarmLevel.DANGER, value=float(health.n_unstored), reason=reason)
 
-    def _damaged(self, health: ServiceHealth) -> Condition:
+    def _damaged(self, health: ServiceHealth) -> Judgement:
         n_more = health.n_recordings_damaged - self._n_damaged
         self._n_damaged = health.n_recordings_damaged
         if n_more <= 0:
             return WITHIN
         n_all = float(health.n_recordings_damaged)
-        return Condition(AlarmLevel.ALERT, value=n_all, reason="damaged_or_missing")
+        return Judgement(AlarmLevel.ALERT, value=n_all, reason="damaged_or_missing")
 
-    def _compared(self, key: str, value: float) -> Condition:
+    def _compared(self, key: str, value: float) -> Judgement:
         watch = self._watches[key]
         if not isinstance(watch, LimitWatch):
             raise TypeError(f"{key} has no limits")
         held = self._board.alarm(watch.id).condition.level
         return watch.limits.judge(Reading(value), NOWHERE_KNOWN, held)
 
-    def _find(self, key: str, condition: Condition, now_ns: int) -> None:
-        self._board.find(self._watches[key], condition, now_ns)
-
-
-def _unless_well(trouble: str | None, level: AlarmLevel) -> Condition:
-    return WITHIN if trouble is None else Condition(level, reason=trouble)
+    def _update(self, key: str, condition: Judgement, now_ns: int) -> None:
+        self._board.update(self._watches[key], condition, now_ns)

@@ -1,20 +1,14 @@
-"""What is watched of the service itself, and by which limits."""
+"""Rules of the alarms about the service itself."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from core.alarms.alarm import PLANT, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.condition_limits import ConditionLimits
-from core.alarms.kinds import LimitWatch, Watch
-from core.alarms.rules import rule_of
+from core.alarms.alarm import PLANT, AlarmIdentity, AlarmRule
+from core.alarms.kinds import Watch, watch
+from core.alarms.rules import LimitRule, rule_of
 from core.limits import Limits
-from service.alarms.stream_alarms import STREAM
+from service.settings.alarm_kinds import MESSAGES_REFUSED, SAMPLES_LOST, SERVICE_KINDS, UNIT
 from service.settings.alarms import AlarmSettings
-
-STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
-"""Subjects of alarms about the service; lost samples have their unit's name."""
-
-RECORDINGS = "recordings"
 
 FULL_SHARE = 0.9
 """Of the queue: about to make acquisition wait."""
@@ -22,10 +16,12 @@ FULL_SHARE = 0.9
 LOSS_MINUTES = 10
 """Time over which lost samples are counted, and for which lost results are told."""
 
+AT_ONCE, STEADY = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
+
 
 @dataclass(frozen=True)
 class ServiceRules:
-    """Limits of the service.
+    """Rules of the service's own alarms.
 
     Parameters
     ----------
@@ -37,60 +33,55 @@ class ServiceRules:
         How long samples may wait in it, s.
     loss
         Share of a unit's samples that may get lost in ten minutes.
+    at_once, steady, lasting
+        Of alarms without limits: without delay, delayed, and lasting for ten minutes.
     """
 
-    store_behind: Limits = field(default_factory=lambda: Limits(10.0))
-    waiting: Limits = field(default_factory=lambda: Limits(0.5, FULL_SHARE, 0.1))
-    delay: Limits = field(default_factory=lambda: Limits(5.0, deadband=1.0))
-    loss: Limits = field(default_factory=lambda: Limits(0.05))
+    store_behind: LimitRule = field(default_factory=lambda: LimitRule(Limits(10.0), AT_ONCE))
+    waiting: LimitRule = field(
+        default_factory=lambda: LimitRule(Limits(0.5, FULL_SHARE, 0.1), STEADY)
+    )
+    delay: LimitRule = field(default_factory=lambda: LimitRule(Limits(5.0, deadband=1.0), STEADY))
+    loss: LimitRule = field(default_factory=lambda: LimitRule(Limits(0.05), AT_ONCE))
+    at_once: AlarmRule = AT_ONCE
+    steady: AlarmRule = STEADY
+    lasting: AlarmRule = field(default_factory=lambda: rule_of(0.0, 60.0 * LOSS_MINUTES))
 
 
 def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
-    """Limits as the plant file has them."""
-    share = alarms.max_waiting_share
+    """Rules as the plant file has them."""
+    share, delay_s = alarms.max_waiting_share, alarms.max_analysis_delay_s
+    waiting = Limits(share, FULL_SHARE if share < FULL_SHARE else None, share / 5)
     return ServiceRules(
-        store_behind=Limits(max(alarms.store_failing_after_s, 0.1)),
-        waiting=Limits(share, FULL_SHARE if share < FULL_SHARE else None, share / 5),
-        delay=Limits(alarms.max_analysis_delay_s, deadband=alarms.max_analysis_delay_s / 5),
-        loss=Limits(alarms.max_samples_lost_share),
+        store_behind=LimitRule(Limits(max(alarms.store_failing_after_s, 0.1)), AT_ONCE),
+        waiting=LimitRule(waiting, STEADY),
+        delay=LimitRule(Limits(delay_s, deadband=delay_s / 5), STEADY),
+        loss=LimitRule(Limits(alarms.max_samples_lost_share), AT_ONCE),
     )
 
 
 def service_watches(units: Iterable[str], rules: ServiceRules) -> dict[str, Watch]:
-    """The alarms about the service, by kind; those about lost samples by unit."""
-    soon, steady = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
-    lasting = rule_of(0.0, 60.0 * LOSS_MINUTES)
-    watches: list[Watch] = [
-        _limit(STORE, AlarmKind.RESULTS_NOT_STORED, soon, rules.store_behind),
-        Watch(_identity(STORE, AlarmKind.RESULTS_LOST), lasting, STORE),
-        _limit(SERVICE, AlarmKind.BLOCKS_WAITING, steady, rules.waiting),
-        _limit(SERVICE, AlarmKind.ANALYSIS_LATE, steady, rules.delay),
-        Watch(_identity(CAPTURES, AlarmKind.CAPTURES_NOT_KEPT), soon, CAPTURES),
-        Watch(_identity(RECORDINGS, AlarmKind.SAMPLES_NOT_RECORDED), soon, RECORDINGS),
-        Watch(_identity(RECORDINGS, AlarmKind.RECORDINGS_DAMAGED), lasting, RECORDINGS),
-        Watch(_identity(SERVICE, AlarmKind.QUESTIONS_REFUSED), steady, SERVICE),
-        Watch(_identity(DISK, AlarmKind.DISK_NEARLY_FULL), steady, DISK),
-        Watch(_identity(STORE, AlarmKind.STORED_DATA_DAMAGED), soon, STORE),
-        Watch(_identity(STREAM, AlarmKind.STREAM_AWAY), steady, STREAM),
-    ]
-    found = {watch.identity.kind.value: watch for watch in watches}
-    lost = {unit: _limit(unit, AlarmKind.SAMPLES_LOST, soon, rules.loss) for unit in units}
-    return found | {loss_key(unit): watch for unit, watch in lost.items()}
+    """The alarms about the service, by kind; those about lost samples by unit.
+
+    Refused messages and units without analysis are judged elsewhere, by unit.
+    """
+    subjects = {
+        kind.name: (kind.subject, kind)
+        for kind in SERVICE_KINDS.values()
+        if kind.subject != UNIT and kind.name != MESSAGES_REFUSED
+    }
+    subjects |= {loss_key(unit): (unit, SERVICE_KINDS[SAMPLES_LOST]) for unit in units}
+    return {
+        key: watch(AlarmIdentity(PLANT, subject, kind.name), getattr(rules, kind.rule), subject)
+        for key, (subject, kind) in subjects.items()
+    }
 
 
 def loss_key(unit: str) -> str:
-    """Where the alarm about lost samples of a unit stands among the watches."""
-    return f"{AlarmKind.SAMPLES_LOST}:{unit}"
+    """Key of the alarm about lost samples of a unit among the watches."""
+    return f"{SAMPLES_LOST}:{unit}"
 
 
 def told_by(identity: AlarmIdentity) -> str:
     """Unit whose process tells of an alarm: of lost samples, the one that analyses their unit."""
-    return identity.subject if identity.kind is AlarmKind.SAMPLES_LOST else identity.unit
-
-
-def _identity(subject: str, kind: AlarmKind) -> AlarmIdentity:
-    return AlarmIdentity(PLANT, subject, kind)
-
-
-def _limit(subject: str, kind: AlarmKind, rule: AlarmRule, limits: Limits) -> LimitWatch:
-    return LimitWatch(_identity(subject, kind), rule, subject, ConditionLimits.single(limits))
+    return identity.subject if identity.kind == SAMPLES_LOST else identity.unit

@@ -6,8 +6,8 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from acquisition.clock import Clock
+from core.alarms.alarm import AlarmNews
 from core.alarms.board import AlarmMemory
-from core.alarms.event import AlarmNews
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.statistics import SHOWN_NS
 from core.alarms.unit_alarms import UnitAlarms

@@ -2,14 +2,12 @@
 
 from collections.abc import Iterable
 
-from core.alarms.alarm import AlarmIdentity, AlarmKind
+from core.alarms.alarm import AlarmIdentity
 from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
-from core.limits import WITHIN, AlarmLevel, Condition
+from core.limits import WITHIN, AlarmLevel, Judgement
 from service.alarms.told_alarms import ToldAlarms
-
-STREAM = "stream"
-"""Subject of alarms about the stream and what it carries."""
+from service.settings.alarm_kinds import MESSAGES_REFUSED, STREAM
 
 REFUSED_FOR_S = 600.0
 """How long an alarm stands after the last message that was refused."""
@@ -31,8 +29,8 @@ def stream_alarms(units: Iterable[str]) -> ToldAlarms:
 def refuse(alarms: ToldAlarms, unit: str, reason: str) -> None:
     """Note that a message of a unit was refused."""
     words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
-    alarms.tell_once(_refused(unit).id, Condition(AlarmLevel.ALERT, reason=words))
+    alarms.tell_once(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
 
 
 def _refused(unit: str) -> AlarmIdentity:
-    return AlarmIdentity(unit, STREAM, AlarmKind.MESSAGES_REFUSED)
+    return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)

@@ -6,12 +6,12 @@ from pydantic import Field
 
 from service.api.alarm_names import (
     AlarmChangeName,
-    AlarmKindName,
     AlarmLevelName,
     AlarmStateName,
 )
 from service.api.film_models import CellModel, FilmConditionModel, OperatingStateName
 from service.api.models import ApiModel, Time
+from service.settings.alarm_kinds import AlarmKindName
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 

@@ -5,7 +5,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 
-from core.alarms.alarm import AlarmKind
 from core.alarms.operation import (
     Acknowledge,
     Action,
@@ -26,7 +25,6 @@ from service.api.alarm_models import (
     AlarmListModel,
     AlarmModel,
 )
-from service.api.alarm_names import AlarmKindName
 from service.api.alarm_requests import (
     AcknowledgeModel,
     ActorModel,
@@ -52,6 +50,7 @@ from service.api.tables import Format, table_content, table_response
 from service.api.times import ns_from_datetime, require_order
 from service.load.allowance import Allowance
 from service.security.roles import Permission
+from service.settings.alarm_kinds import AlarmKindName
 from service.store.port import AlarmQuery
 from service.store.value_range import ValueRange
 
@@ -273,7 +272,7 @@ async def event_query(
         limit=limit,
         alarm=alarm,
         unit=unit,
-        kind=None if kind is None else AlarmKind(kind),
+        kind=kind,
         start_ns=max(start_ns, 0),
         end_ns=min(max(end_ns, 0), everything.end_ns),
         states=states_named(state),

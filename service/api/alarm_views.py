@@ -1,8 +1,9 @@
 """Alarms in the words of the API."""
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState, Hold
+from core.alarms.kinds import FILM_KINDS
 from core.condition.cells import CellGrid, OperatingPoint
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.api.alarm_models import (
     AlarmCountModel,
     AlarmEventModel,
@@ -18,45 +19,9 @@ from service.api.film_conditions import STATE_NAMES, cell_of, condition_model
 from service.api.film_models import FilmConditionModel
 from service.api.ports import AlarmBoard, FilmBoard
 from service.api.times import rfc3339
-from service.films.keeper import KINDS
 from service.origin import Origin
+from service.settings.alarm_kinds import value_unit
 from service.store.port import StoredEvent
-
-VALUE_UNITS = {
-    AlarmKind.CHANNEL_NOT_OK: "%",
-    AlarmKind.SHAFT_X: "µm 0-pk",
-    AlarmKind.SHAFT_Y: "µm 0-pk",
-    AlarmKind.CHANGE_SHAFT_X: "µm 0-pk",
-    AlarmKind.CHANGE_SHAFT_Y: "µm 0-pk",
-    AlarmKind.CHANGE_BEARING_X: "µm 0-pk",
-    AlarmKind.CHANGE_BEARING_Y: "µm 0-pk",
-    AlarmKind.OVERALL_SHAFT_X: "µm pk-pk",
-    AlarmKind.OVERALL_SHAFT_Y: "µm pk-pk",
-    AlarmKind.OVERALL_BEARING_X: "mm/s rms",
-    AlarmKind.OVERALL_BEARING_Y: "mm/s rms",
-    AlarmKind.ZONE_SHAFT_X: "µm pk-pk",
-    AlarmKind.ZONE_SHAFT_Y: "µm pk-pk",
-    AlarmKind.ZONE_SHAFT: "µm 0-pk",
-    AlarmKind.ZONE_BEARING_X: "mm/s rms",
-    AlarmKind.ZONE_BEARING_Y: "mm/s rms",
-    AlarmKind.ECCENTRICITY: "1",
-    AlarmKind.GAP_X: "µm",
-    AlarmKind.GAP_Y: "µm",
-    AlarmKind.OPPOSITE_GAP_X: "µm",
-    AlarmKind.OPPOSITE_GAP_Y: "µm",
-    AlarmKind.OIL_TEMPERATURE: "°C",
-    AlarmKind.STIFFNESS_X: "1",
-    AlarmKind.STIFFNESS_Y: "1",
-    AlarmKind.CLOCK_OFFSET: "s",
-    AlarmKind.CLOCK_DRIFT: "ppm",
-    AlarmKind.SAMPLES_LOST: "1",
-    AlarmKind.RESULTS_NOT_STORED: "s",
-    AlarmKind.RESULTS_LOST: "findings",
-    AlarmKind.BLOCKS_WAITING: "1",
-    AlarmKind.ANALYSIS_LATE: "s",
-    AlarmKind.DISK_NEARLY_FULL: "1",
-    AlarmKind.RECORDINGS_DAMAGED: "recordings",
-}
 
 LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
     AlarmLevel.ALERT: "alert",
@@ -94,7 +59,7 @@ def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmMode
         id=identity.id,
         unit=identity.unit,
         subject=identity.subject,
-        kind=identity.kind.value,
+        kind=identity.kind,
         state=alarm.state.value,
         level=_level(alarm.level),
         is_active=alarm.level is not None,
@@ -108,7 +73,7 @@ def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmMode
         condition_reason=str(condition.reason) if is_judged else unseen,
         value=condition.value,
         limit=condition.limit,
-        value_unit=VALUE_UNITS.get(identity.kind),
+        value_unit=value_unit(identity.kind),
         film=_film(films, identity),
         suppressed_by=alarm.suppressed_by,
         shelf=_hold(alarm.shelf),
@@ -118,7 +83,7 @@ def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmMode
 
 def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | None:
     """Condition of the newest reading of a film, if the alarm is about one."""
-    if identity.kind not in KINDS.values():
+    if identity.kind not in FILM_KINDS:
         return None
     news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
     if news is None or rules is None:
@@ -150,7 +115,7 @@ def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
         alarm=identity.id,
         unit=identity.unit,
         subject=identity.subject,
-        kind=identity.kind.value,
+        kind=identity.kind,
         number=event.number,
         change=event.change.value,
         level=_level(event.level),
@@ -160,7 +125,7 @@ def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
         occurrence=event.occurrence,
         value=event.value,
         limit=event.limit,
-        value_unit=VALUE_UNITS.get(identity.kind),
+        value_unit=value_unit(identity.kind),
         actor=event.actor,
         reason=str(event.reason),
         raised_at=_raised_at(event.raised_at, grid),
@@ -179,7 +144,7 @@ def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | 
     )
 
 
-def _condition(condition: Condition) -> ConditionName:
+def _condition(condition: Judgement) -> ConditionName:
     return "within_limits" if condition.level is None else "active"
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from core.arrays import SampleArray
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.quality import Level, Quality, Reading, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.channel_models import (

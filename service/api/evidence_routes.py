@@ -9,7 +9,6 @@ import structlog
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
 
-from core.alarms.alarm import AlarmKind
 from service.api.access.declared import needs
 from service.api.access.gate import identity_of
 from service.api.alarm_routes import AlarmId
@@ -24,6 +23,7 @@ from service.evidence.document import Evidence
 from service.evidence.report.page import POLICY
 from service.evidence.tables import TableError
 from service.security.roles import Permission
+from service.settings.alarm_kinds import ALARM_KINDS
 
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 
@@ -143,7 +143,7 @@ def _desk(context: Context) -> EvidenceDesk:
 def _known(context: Context, alarm: str) -> str:
     """Refuse what cannot be an alarm; alarms of an older plant file still have their evidence."""
     match = ID.fullmatch(alarm)
-    if match is None or match[3] not in {kind.value for kind in AlarmKind}:
+    if match is None or match[3] not in ALARM_KINDS:
         try:
             context.alarms.alarm(alarm)
         except LookupError as error:

@@ -3,8 +3,8 @@
 import asyncio
 
 from core.alarms.alarm import Alarm
+from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
-from core.alarms.vector_change import VectorReference
 from service.alarms.engine import AlarmEngine
 from service.api.elsewhere import NotCarriedOutError
 from service.films.actions import Action as BaselineAction

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Protocol
 
 from core.alarms.alarm import Alarm
+from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
 from core.alarms.statistics import ChatterRule
-from core.alarms.vector_change import VectorReference
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass, field
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.samples.blocks import SampleBlock
 from service.capture.file import CaptureFile
 from service.capture.span import Span

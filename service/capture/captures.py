@@ -9,7 +9,7 @@ from pathlib import Path
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.alarm import AlarmEvent, AlarmNews
 from core.samples.blocks import SampleBlock
 from service.capture.capture import Capture
 from service.capture.file import CaptureError, CaptureFile, MakeWriter

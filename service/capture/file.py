@@ -11,7 +11,7 @@ from typing import Any
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import checksum_of
 from acquisition.recordings.writer import RecordingWriter
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.samples.blocks import SampleBlock
 from service.api.times import rfc3339
 from service.capture.folders import ALARM, aside, capture_folder

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recordings.writer import INCOMPLETE
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.units import NS_PER_S
 from service.continuous.names import unit_of
 

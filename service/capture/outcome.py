@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 
 
 @dataclass(frozen=True)

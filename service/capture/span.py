@@ -2,35 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-from core.alarms.alarm import AlarmKind, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmState
+from core.alarms.kinds import FILM_KINDS
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
-
-WITHOUT_SAMPLES = (
-    AlarmKind.CLOCK_OFFSET,
-    AlarmKind.CLOCK_DRIFT,
-    AlarmKind.TIME_STAMPS,
-    AlarmKind.LINK_LOST,
-    AlarmKind.SAMPLES_LOST,
-    AlarmKind.RESULTS_NOT_STORED,
-    AlarmKind.RESULTS_LOST,
-    AlarmKind.BLOCKS_WAITING,
-    AlarmKind.ANALYSIS_LATE,
-    AlarmKind.CAPTURES_NOT_KEPT,
-    AlarmKind.SAMPLES_NOT_RECORDED,
-    AlarmKind.RECORDINGS_DAMAGED,
-    AlarmKind.DISK_NEARLY_FULL,
-    AlarmKind.STORED_DATA_DAMAGED,
-    AlarmKind.QUESTIONS_REFUSED,
-    AlarmKind.MESSAGES_REFUSED,
-    AlarmKind.STREAM_AWAY,
-    AlarmKind.ANALYSIS_GONE,
-)
-"""Kinds of alarms that no sample can explain."""
-
-FILMS = (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
-"""Kinds of alarms that stand on all samples of an averaging window."""
+from service.settings.alarm_kinds import SAMPLED_KINDS
 
 
 @dataclass(frozen=True)
@@ -57,16 +33,16 @@ class CaptureSettings:
         """How much before an alarm is kept at most, so that what follows it fits in too."""
         return max(self.pre_s, min(self.window_s, self.max_s - self.post_s))
 
-    def pre_of(self, kind: AlarmKind) -> float:
+    def pre_of(self, kind: str) -> float:
         """How much is kept before an alarm of a kind."""
-        return self.longest_pre_s if kind in FILMS else self.pre_s
+        return self.longest_pre_s if kind in FILM_KINDS else self.pre_s
 
 
 def is_captured(event: AlarmEvent) -> bool:
     """Whether samples are kept around an event: a new occurrence that nothing hides."""
     return (
         event.change in ANNOUNCED
-        and event.identity.kind not in WITHOUT_SAMPLES
+        and event.identity.kind in SAMPLED_KINDS
         and event.state_after is AlarmState.UNACKNOWLEDGED
     )
 

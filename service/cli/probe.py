@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import ByteOrder
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit

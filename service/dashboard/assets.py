@@ -2,10 +2,13 @@
 
 import gzip
 import hashlib
+import json
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+
+from service.settings.alarm_kinds import ALARM_KINDS
 
 MEDIA_TYPES = {
     "html": "text/html; charset=utf-8",
@@ -36,14 +39,15 @@ class Asset:
 
 @cache
 def pages() -> dict[str, Asset]:
-    """Read the dashboard's own files.
+    """Read the dashboard's own files, and make those that hold tables of the program.
 
     Returns
     -------
     dict of str to Asset
         By path below ``static/``, for example ``charts/trend.js``.
     """
-    return dict(_below(files("service.dashboard") / "static", ""))
+    kinds = Asset(_alarm_kinds().encode(), MEDIA_TYPES["js"])
+    return dict(_below(files("service.dashboard") / "static", "")) | {"alarm_kinds.js": kinds}
 
 
 @cache
@@ -51,6 +55,15 @@ def plotly() -> Asset:
     """Read the chart library out of the installed plotly package."""
     script = files("plotly") / "package_data" / "plotly.min.js"
     return Asset(script.read_bytes(), MEDIA_TYPES["js"])
+
+
+def _alarm_kinds() -> str:
+    """JavaScript module with the kinds of alarms, by name."""
+    table = {
+        name: {key: getattr(kind, key) for key in ("label", "subject", "rule", "advice")}
+        for name, kind in ALARM_KINDS.items()
+    }
+    return f"export const ALARM_KINDS = {json.dumps(table, ensure_ascii=False, indent=2)};\n"
 
 
 def _below(folder: Traversable, prefix: str) -> list[tuple[str, Asset]]:

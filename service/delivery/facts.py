@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import AlarmIdentity, AlarmKind
-from core.alarms.kinds import READINGS
+from core.alarms.alarm import AlarmIdentity
+from core.alarms.kinds import ALARM_KINDS, FILM_KINDS
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
@@ -12,14 +12,6 @@ from service.live import LiveView
 
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
 """What a film's stiffness depends on, as far as it is measured."""
-
-MEASURED = {kind: name for sources in READINGS.values() for kind, name in sources.items()} | {
-    AlarmKind.OIL_TEMPERATURE: "oil_temperature_c"
-}
-"""The quantity that an alarm's value is a reading of."""
-
-FILMS = (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y)
-"""In the order of a film's findings."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +80,11 @@ class Around:
         )
 
     def _uncertainty(self, identity: AlarmIdentity, assessment: Assessment) -> float | None:
-        if identity.kind in FILMS:
+        if identity.kind in FILM_KINDS:
             news = self._newest_film(identity.unit, identity.subject)
-            return news.findings[FILMS.index(identity.kind)].change_std if news else None
-        measured = assessment.readings.get(MEASURED.get(identity.kind, ""))
+            return news.findings[FILM_KINDS.index(identity.kind)].change_std if news else None
+        kind = ALARM_KINDS.get(identity.kind)
+        measured = assessment.readings.get(kind.reading or "") if kind else None
         return measured.u_random if measured else None
 
 

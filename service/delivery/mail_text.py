@@ -5,19 +5,7 @@ from collections.abc import Iterator
 
 from service.delivery.message import Message
 from service.delivery.network import printable
-
-KINDS = {
-    "channel_not_ok": "channel not OK",
-    "order1_shaft_x": "shaft vibration 1×, x",
-    "order1_shaft_y": "shaft vibration 1×, y",
-    "oil_temperature": "oil temperature",
-    "stiffness_x": "film stiffness changed, x",
-    "stiffness_y": "film stiffness changed, y",
-    "clock_offset": "device clock off",
-    "clock_drift": "device clock drifts",
-    "time_stamps": "wrong time stamps",
-    "link_lost": "link lost",
-}
+from service.settings.alarm_kinds import kind_words
 
 CHANGES = {"escalated": "rose to danger", "eased": "eased to alert"}
 
@@ -33,7 +21,7 @@ def subject(message: Message) -> str:
     if message["type"] == "test":
         return printable(f"[padwatch] {message['plant']}: test message")
     priority = (message["priority"] or "").upper() if message["is_active"] else "over"
-    words = f"{_place(message)} {kind_words(message)} {change_words(message)}"
+    words = f"{_place(message)} {kind_words(message['kind'])} {change_words(message)}"
     return printable(f"[padwatch] {message['plant']}: {priority}, {words}")
 
 
@@ -41,12 +29,6 @@ def text(message: Message) -> str:
     """The whole mail."""
     lines = _test(message) if message["type"] == "test" else _alarm(message)
     return "\n".join(lines) + "\n"
-
-
-def kind_words(message: Message) -> str:
-    """What is wrong."""
-    kind: str = message["kind"]
-    return KINDS.get(kind, kind.replace("_", " "))
 
 
 def change_words(message: Message) -> str:
@@ -79,7 +61,7 @@ def _change(value: float, limit: float | None, std: float | None) -> str:
 
 def _alarm(message: Message) -> Iterator[str]:
     rows = [
-        ("What", f"{kind_words(message)}: {change_words(message)}"),
+        ("What", f"{kind_words(message['kind'])}: {change_words(message)}"),
         ("Priority", message["priority"]),
         ("Where", f"{message['plant']}, {_place(message)}{_unit_name(message)}"),
         ("When", message["time"]),

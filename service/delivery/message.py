@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from core.alarms.alarm import Alarm
-from core.alarms.event import AlarmEvent
-from service.api.alarm_views import LEVEL_NAMES, VALUE_UNITS
+from core.alarms.alarm import Alarm, AlarmEvent
+from core.alarms.kinds import FILM_KINDS
+from service.api.alarm_views import LEVEL_NAMES
 from service.api.times import rfc3339
-from service.delivery.facts import FILMS, Fact, LookAround, Surroundings
+from service.delivery.facts import Fact, LookAround, Surroundings
+from service.settings.alarm_kinds import value_unit
 
 FORMAT = 1
 """Raised when a key changes its meaning or goes; new ones may come at any time."""
@@ -96,7 +97,7 @@ def _what(event: AlarmEvent, is_active: bool) -> Message:
         "alarm": identity.id,
         "unit": identity.unit,
         "subject": identity.subject,
-        "kind": identity.kind.value,
+        "kind": identity.kind,
         "number": event.number,
         "change": event.change.value,
         "priority": None if event.level is None else LEVEL_NAMES[event.level],
@@ -115,8 +116,8 @@ def _numbers(event: AlarmEvent, found: Surroundings) -> Message:
         "value": _finite(event.value),
         "uncertainty": _finite(found.uncertainty),
         "limit": _finite(event.limit),
-        "value_unit": VALUE_UNITS.get(kind),
-        "value_is": "ln_change" if kind in FILMS else "reading",
+        "value_unit": value_unit(kind),
+        "value_is": "ln_change" if kind in FILM_KINDS else "reading",
         "operating_state": found.state,
         "condition": {fact.name: _fact(fact) for fact in found.condition},
     }

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from core.alarms.alarm import Alarm, AlarmKind, AlarmState
-from core.alarms.event import AlarmChange, AlarmEvent
+from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
 from service.delivery.message import Composer, dumps
 from service.store.outbox_port import Letter
@@ -30,7 +29,7 @@ class Route:
     receiver: str
     changes: frozenset[AlarmChange]
     units: frozenset[str] | None = None
-    kinds: frozenset[AlarmKind] | None = None
+    kinds: frozenset[str] | None = None
     lowest: AlarmLevel = AlarmLevel.ALERT
 
     def covers(self, event: AlarmEvent) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from acquisition.recordings.manifest import MANIFEST
-from core.alarms.event import ANNOUNCED, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, AlarmEvent
 from service.capture.span import is_captured
 from service.evidence.capture_link import CapturePart, linked
 from service.evidence.clock_words import compact

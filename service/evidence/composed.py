@@ -4,7 +4,7 @@ import hashlib
 from typing import Any
 
 from core.change.settings import FilmRules
-from service.api.alarm_views import LEVEL_NAMES, VALUE_UNITS
+from service.api.alarm_views import LEVEL_NAMES
 from service.api.times import rfc3339
 from service.evidence.bearing_part import Direction
 from service.evidence.configuration import canonical, without_secrets
@@ -13,6 +13,7 @@ from service.evidence.document import FORMAT, VERSION, AlarmPart, Evidence, Unit
 from service.evidence.maker import Maker
 from service.evidence.part import finite
 from service.evidence.snapshot import BearingSnapshot, Snapshot
+from service.settings.alarm_kinds import value_unit
 from service.settings.plant import PlantFile
 
 
@@ -56,7 +57,7 @@ def _alarm(snapshot: Snapshot) -> AlarmPart:
         id=identity.id,
         unit=identity.unit,
         subject=identity.subject,
-        kind=identity.kind.value,
+        kind=identity.kind,
         occurrence=event.occurrence,
         change=event.change.value,
         level=None if event.level is None else LEVEL_NAMES[event.level],
@@ -65,7 +66,7 @@ def _alarm(snapshot: Snapshot) -> AlarmPart:
         time_ns=event.time_ns,
         value=finite(event.value),
         limit=finite(event.limit),
-        value_unit=VALUE_UNITS.get(identity.kind),
+        value_unit=value_unit(identity.kind),
         reason=str(event.reason),
     )
 
@@ -85,7 +86,7 @@ def _unit(snapshot: Snapshot, plant: PlantFile) -> UnitPart | None:
 
 
 def _direction(snapshot: Snapshot) -> Direction | None:
-    kind = snapshot.event.identity.kind.value
+    kind = snapshot.event.identity.kind
     if kind.endswith("_x"):
         return "x"
     return "y" if kind.endswith("_y") else None

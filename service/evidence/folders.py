@@ -5,7 +5,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from service.evidence.clock_words import compact
 from service.evidence.files import write_whole
 
@@ -45,9 +45,7 @@ def place_of(root: Path, event: AlarmEvent) -> Place:
     """Where the bundle of an event belongs."""
     own, moment = event.identity, compact(event.time_ns)
     name = f"{moment}-{own.subject}-{own.kind}-{event.occurrence}"
-    return Place(
-        root / own.unit / name, own.unit, own.subject, own.kind.value, event.occurrence, moment
-    )
+    return Place(root / own.unit / name, own.unit, own.subject, own.kind, event.occurrence, moment)
 
 
 def places(root: Path, unit: str | None = None) -> list[Place]:

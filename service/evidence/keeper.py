@@ -11,7 +11,7 @@ from pathlib import Path
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.event import ANNOUNCED, AlarmEvent, AlarmNews
+from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
 from service.capture.captures import Captures
 from service.capture.outcome import Outcome
 from service.evidence.capture_link import link, link_all, note_lost

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules

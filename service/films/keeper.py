@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import AlarmIdentity, AlarmKind
+from core.alarms.alarm import AlarmIdentity
+from core.alarms.kinds import FILM_KINDS
 from core.baseline.baseline import BearingBaseline
 from core.baseline.history import DIRECTIONS
 from core.change.film_judge import FilmJudge, FilmMemory, FilmNews, alarm_condition
 from core.change.film_watch import FilmWatch
 from core.change.settings import FilmRules
-from core.limits import Condition
+from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from service.films.actions import Action, step_of
@@ -30,7 +31,7 @@ log = structlog.get_logger()
 MAX_LEARN_S = 900.0
 """Longest that learning one bearing from its whole history may take."""
 
-KINDS = dict(zip(DIRECTIONS, (AlarmKind.STIFFNESS_X, AlarmKind.STIFFNESS_Y), strict=True))
+KINDS = dict(zip(DIRECTIONS, FILM_KINDS, strict=True))
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class FilmKeeper:
         films.newest.update({told.reading.bearing: told for told in news})
         return seen, news
 
-    def conditions(self, news: Sequence[FilmNews]) -> dict[str, Condition]:
+    def conditions(self, news: Sequence[FilmNews]) -> dict[str, Judgement]:
         """What alarms make of it, by alarm."""
         return {
             alarm_id(told.reading.unit, told.reading.bearing, direction): alarm_condition(

@@ -7,7 +7,8 @@ import numpy as np
 from core.arrays import FloatArray
 from core.condition.shaft_centre import locate_shaft
 from core.condition.shaft_readings import probe_axis
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.quality import Reading, Reason, missing
 from core.spectra.orbit import Ellipse, ellipse_of, marks_of, order_phasors, trace_of
 from core.units import hz_from_rpm, rpm_from_hz

@@ -5,8 +5,8 @@ from uuid import uuid4
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
+from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action, ActionRefusedError
-from core.alarms.vector_change import VectorReference
 from core.units import ns_from_s
 from service.api.elsewhere import NotCarriedOutError
 from service.audit.acting import acting

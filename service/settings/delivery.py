@@ -7,8 +7,8 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import Field, StringConstraints, model_validator
 
-from core.alarms.alarm import AlarmKind
-from core.alarms.event import AlarmChange
+from core.alarms.alarm import AlarmChange
+from service.settings.alarm_kinds import AlarmKindName
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 
 TimeOfDay = Annotated[str, StringConstraints(pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$")]
@@ -80,7 +80,7 @@ class _ReceiverSettings(Settings):
     units: tuple[str, ...] | None = None
     """Units whose alarms it is told of; all unless given; example: ["U1"]."""
 
-    kinds: tuple[AlarmKind, ...] | None = None
+    kinds: tuple[AlarmKindName, ...] | None = None
     """Kinds of alarms that it is told of; all unless given. Example: ["link_lost"]."""
 
     changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = TOLD

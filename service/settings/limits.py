@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from core.alarms.condition_limits import Region, States
+from core.alarms.rules import Region, States
 from core.condition.operating_state import OperatingState
 from service.settings.base import MisfitError, Settings, refuse_twice
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AwareDatetime, Field, StringConstraints
 
-from core.machine.unit import SlowRollVector
+from core.machine.channel import SlowRollVector
 from core.units import NS_PER_S
 from service.settings.base import Settings
 

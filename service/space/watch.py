@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.clock import Clock
-from core.limits import WITHIN, AlarmLevel, Condition, judge, unknown
+from core.limits import WITHIN, AlarmLevel, Judgement, judge, unknown
 from core.quality import Reading
 from service.heartbeats import UNHEARD, Pulse
 from service.space.disk import DiskSpace, Measure, measure_disk
@@ -84,7 +84,7 @@ class SpaceWatch:
                 first[space.device] = self._seen(name, space)
         self.disks = tuple(first.values())
 
-    def condition(self, held: AlarmLevel | None) -> Condition:
+    def condition(self, held: AlarmLevel | None) -> Judgement:
         """What is to be said of the fullest disk.
 
         Parameters
@@ -108,15 +108,15 @@ class SpaceWatch:
         growth.note(space, now_s)
         return DiskView(name, space, growth.days_until_full(space, now_s))
 
-    def _judged(self, disk: DiskView, held: AlarmLevel | None) -> Condition:
+    def _judged(self, disk: DiskView, held: AlarmLevel | None) -> Judgement:
         limits = self._limits.of(disk.space.total_bytes)
         found = judge(Reading(disk.space.free_share), limits, held)
         if found.level is None:
             return found
-        return Condition(
+        return Judgement(
             found.level, value=found.value, limit=found.limit, reason=f"{disk.name}: {disk}"
         )
 
 
-def _urgency(condition: Condition) -> tuple[int, float]:
+def _urgency(condition: Judgement) -> tuple[int, float]:
     return int(condition.level or 0), -(condition.value or 0.0)

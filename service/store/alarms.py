@@ -3,12 +3,20 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
-from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.alarm import (
+    Alarm,
+    AlarmChange,
+    AlarmEvent,
+    AlarmIdentity,
+    AlarmNews,
+    AlarmState,
+    Hold,
+)
 from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.audit.entry import Deed
+from service.settings.alarm_kinds import ALARM_KINDS
 from service.store.audit_deeds import alarm_deeds
 from service.store.commands import answer_command
 from service.store.commands_port import DONE
@@ -108,7 +116,7 @@ def _alarm_row(alarm: Alarm) -> tuple[object, ...]:
     identity, condition = alarm.identity, alarm.condition
     shelf, outage = alarm.shelf, alarm.outage
     return (
-        *(identity.id, identity.unit, identity.subject, identity.kind.value),
+        *(identity.id, identity.unit, identity.subject, identity.kind),
         *(alarm.level, alarm.occurrence, alarm.is_acknowledged, alarm.raised_ns, alarm.n_events),
         *(condition.is_known, condition.level, condition.value, condition.limit),
         *(str(condition.reason), alarm.suppressed_by, alarm.is_latched),
@@ -125,7 +133,7 @@ def _hold_row(hold: Hold | None) -> tuple[str | None, str | None, int | None]:
 def _event_row(event: AlarmEvent) -> tuple[object, ...]:
     identity = event.identity
     return (
-        *(identity.id, event.number, identity.unit, identity.subject, identity.kind.value),
+        *(identity.id, event.number, identity.unit, identity.subject, identity.kind),
         *(event.change.value, event.level, event.state_before.value, event.state_after.value),
         *(event.time_ns, event.occurrence, event.value, event.limit, event.actor),
         *(str(event.reason), *_point_row(event.raised_at)),
@@ -154,7 +162,7 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
             is_acknowledged=bool(found["is_acknowledged"]),
             raised_ns=found["raised_ns"],
             n_events=found["n_events"],
-            condition=Condition(
+            condition=Judgement(
                 level=_level(found["condition_level"]),
                 is_known=bool(found["is_known"]),
                 value=found["value"],
@@ -195,7 +203,9 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
 
 
 def _identity(found: dict[str, Any]) -> AlarmIdentity:
-    return AlarmIdentity(found["unit"], found["subject"], AlarmKind(found["kind"]))
+    if found["kind"] not in ALARM_KINDS:
+        raise ValueError(f"unknown kind of alarm {found['kind']!r}")
+    return AlarmIdentity(found["unit"], found["subject"], found["kind"])
 
 
 def _level(number: int | None) -> AlarmLevel | None:

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from core.alarms.alarm import Alarm, Hold
-from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, Hold
 from service.audit.acting import acting
 from service.audit.entry import Deed, Source
 from service.films.versions import Versions, versions_after

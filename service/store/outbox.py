@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from service.store.database import Connect, Connection
 from service.store.outbox_port import DEAD, Backlog, Letter, LetterState, StoredLetter
 

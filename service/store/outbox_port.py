@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from core.alarms.alarm import Alarm
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import Alarm, AlarmEvent
 
 
 class LetterState(StrEnum):

@@ -5,8 +5,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from core.alarms.alarm import Alarm
-from core.alarms.event import AlarmEvent, AlarmNews
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews
 from core.change.film_judge import FilmNews
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from core.alarms.alarm import Alarm
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmNews
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from core.alarms.vector_change import VectorReference
+from core.alarms.judgements import VectorReference
 
 
 @dataclass(frozen=True)

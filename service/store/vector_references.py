@@ -2,7 +2,7 @@
 
 import json
 
-from core.alarms.vector_change import OrderVector, VectorReference
+from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import vector_deed

@@ -13,7 +13,7 @@ from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_set
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings

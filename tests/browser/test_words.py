@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from core.alarms.alarm import AlarmKind, AlarmState
-from core.alarms.event import AlarmChange
+from core.alarms.alarm import AlarmChange, AlarmState
 from core.change.cause import Cause
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
@@ -14,6 +13,7 @@ from core.machine.unit import Estimator
 from core.quality import Reason
 from core.spectra.runout import RunoutVerdict
 from core.spectra.speed import SpeedSource
+from service.settings.alarm_kinds import ALARM_KINDS
 
 STATIC = Path(__file__).parents[2] / "service" / "dashboard" / "static"
 SOURCE, FILM_WORDS = STATIC / "words.js", STATIC / "film_words.js"
@@ -37,12 +37,18 @@ def test_every_reason_has_words_and_a_sentence_and_nothing_else_has() -> None:
 
 @pytest.mark.parametrize(
     ("table", "codes"),
-    [("KINDS", AlarmKind), ("STATES", AlarmState), ("CHANGES", AlarmChange)],
+    [("STATES", AlarmState), ("CHANGES", AlarmChange)],
 )
 def test_every_code_of_an_alarm_has_words(table, codes) -> None:
     words = entries(table, ALARM_WORDS)
     assert words.keys() == {code.value for code in codes}
     assert all(4 < len(said) < 43 for said in words.values())
+
+
+def test_every_kind_of_alarm_has_a_label_of_its_own_that_fits_a_table() -> None:
+    labels = [kind.label for kind in ALARM_KINDS.values()]
+    assert len(set(labels)) == len(labels)
+    assert all(2 < len(label) < 41 and label[0].isupper() for label in labels)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import pytest
 from rigs.shaken_shaft import shaken
 
 from core.arrays import ComplexArray, FloatArray
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings

@@ -11,9 +11,8 @@ from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
 from core.limits import Limits
-from core.machine.bracket import BracketDynamics
 from core.machine.response import ResponseTable
-from core.machine.unit import BearingAccuracy
+from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.spectra.vector_settings import VectorSettings
 from core.stiffness.dynamic_settings import DynamicSettings
 from core.stiffness.evidence import LineLimits

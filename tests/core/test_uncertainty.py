@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from core.machine.bracket import BracketDynamics
-from core.machine.unit import BearingAccuracy
+from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, average
 from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
 from core.stiffness.transfer import line_transfer

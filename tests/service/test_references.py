@@ -9,7 +9,8 @@ import pytest
 import structlog
 
 from acquisition.clock import Clock
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import Reading, Reason, missing, uncertain

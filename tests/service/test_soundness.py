@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import AlarmKind
 from core.limits import AlarmLevel
 from core.monitor.assessment import Assessment
 from service.alarms.health import ServiceHealth
@@ -139,7 +138,7 @@ def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() 
     trouble[0] = None
     (returned,) = (e for news in alarms.tick(T0 + 10**9) for e in news.events)
 
-    assert raised.identity.kind is AlarmKind.STORED_DATA_DAMAGED
+    assert raised.identity.kind == "stored_data_damaged"
     assert (raised.level, str(raised.reason)) == (
         AlarmLevel.DANGER,
         "3 stored rows are damaged, and left out",

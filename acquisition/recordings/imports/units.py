@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 
 from acquisition.errors import ConfigError
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
 
 _SAME = {

@@ -22,7 +22,8 @@ from acquisition.simulated.plant.scenario import (
     TransducerNoise,
 )
 from core.arrays import FloatArray
-from core.machine.unit import Measurand, Unit
+from core.machine.channel import Measurand
+from core.machine.unit import Unit
 from core.units import STANDARD_GRAVITY_M_S2
 
 

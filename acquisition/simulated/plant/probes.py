@@ -16,7 +16,8 @@ from acquisition.simulated.plant.rotor import (
 from acquisition.simulated.plant.rotor_steps import state_matrix
 from acquisition.simulated.plant.scenario import Scenario
 from core.arrays import ComplexArray, FloatArray
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Unit
 
 
 @dataclass(frozen=True)

@@ -1,54 +1,10 @@
 /** Alarms in words for people, and how each of them looks. */
 
+import { ALARM_KINDS } from "./alarm_kinds.js";
 import { amplitudeUnit, shownAmplitude } from "./amplitudes.js";
 import { stateWords as operationWords } from "./film_words.js";
 import { formatFixed, formatTime } from "./format.js";
 import { reasonWords } from "./words.js";
-
-const KINDS = {
-  channel_not_ok: "Channel not OK",
-  order1_shaft_x: "Shaft vibration 1×, x",
-  order1_shaft_y: "Shaft vibration 1×, y",
-  order1_change_shaft_x: "Shaft 1× vector moved, x",
-  order1_change_shaft_y: "Shaft 1× vector moved, y",
-  order1_change_bearing_x: "Bearing 1× vector moved, x",
-  order1_change_bearing_y: "Bearing 1× vector moved, y",
-  overall_shaft_x: "Shaft vibration, broad-band, x",
-  overall_shaft_y: "Shaft vibration, broad-band, y",
-  overall_bearing_x: "Bearing velocity, x",
-  overall_bearing_y: "Bearing velocity, y",
-  zone_shaft_x: "Vibration zone of the shaft, x",
-  zone_shaft_y: "Vibration zone of the shaft, y",
-  zone_shaft: "Vibration zone of the shaft",
-  zone_bearing_x: "Vibration zone of the bearing, x",
-  zone_bearing_y: "Vibration zone of the bearing, y",
-  eccentricity_ratio: "Eccentricity",
-  gap_x: "Probe gap x",
-  gap_y: "Probe gap y",
-  opposite_gap_x: "Gap of the probe opposite x",
-  opposite_gap_y: "Gap of the probe opposite y",
-  oil_temperature: "Oil temperature",
-  stiffness_x: "Film stiffness changed, x",
-  stiffness_y: "Film stiffness changed, y",
-  clock_offset: "Device clock off",
-  clock_drift: "Device clock drifts",
-  time_stamps: "Wrong time stamps",
-  link_lost: "Link lost",
-  samples_lost: "Samples lost",
-  results_not_stored: "Results are not being stored",
-  results_lost: "Results lost",
-  blocks_waiting: "Queue to the analysis fills",
-  analysis_late: "Analysis falls behind",
-  captures_not_kept: "Samples around alarms not kept",
-  samples_not_recorded: "Samples not recorded",
-  recordings_damaged: "Recordings damaged or missing",
-  questions_refused: "Too busy to answer",
-  disk_nearly_full: "Disk nearly full",
-  stored_data_damaged: "Stored data damaged or missing",
-  messages_refused: "Messages on the stream refused",
-  stream_away: "Stream does not answer",
-  analysis_gone: "Nobody analyses this unit",
-};
 
 const STATES = {
   normal: "Normal",
@@ -118,7 +74,7 @@ const WITHIN = {
   amplitude_change_only: "Within limits by length alone, no phase",
 };
 
-export const kindWords = (kind) => KINDS[kind] ?? kind.replaceAll("_", " ");
+export const kindWords = (kind) => ALARM_KINDS[kind]?.label ?? kind.replaceAll("_", " ");
 export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
 export const changeWords = (change) => CHANGES[change] ?? change.replaceAll("_", " ");
 
@@ -142,14 +98,15 @@ export function levelMark({ level, is_active: active }) {
   return level === "danger" ? ["bad", "Danger"] : ["uncertain", "Alert"];
 }
 
-/** Kinds of alarms whose value is the amplitude of a line; those of broad-band vibration are not. */
-const LINE_AMPLITUDE = /^order1_(change_)?(shaft|bearing)_[xy]$/;
+/** Rules whose alarms have the amplitude of a line as value; those of broad-band vibration have not. */
+const LINE_AMPLITUDES = ["shaft_order1", "shaft_change", "bearing_change"];
 
 /** `163.2 µm pk, limit 150.0`; nothing where there are no numbers. */
 export function valueWords({ kind, value, limit, value_unit: unit }) {
   if (value === null) return "";
-  if (kind?.startsWith("stiffness_")) return filmWords(value, limit);
-  const isLine = LINE_AMPLITUDE.test(kind);
+  const rule = ALARM_KINDS[kind]?.rule;
+  if (rule === "films") return filmWords(value, limit);
+  const isLine = LINE_AMPLITUDES.includes(rule);
   const digits = (number) => formatFixed(isLine ? shownAmplitude(number) : number, DECIMALS[unit] ?? 2);
   const shownUnit = isLine ? amplitudeUnit() : (unit ?? "");
   return `${digits(value)} ${shownUnit}${limit === null ? "" : `, limit ${digits(limit)}`}`;

@@ -1,5 +1,6 @@
 /** How a unit's samples arrive, in words: what is wrong, how bad it is, and what to do. */
 
+import { ALARM_KINDS } from "./alarm_kinds.js";
 import { kindWords, valueWords } from "./alarm_words.js";
 import { formatAge, formatCount, formatFixed } from "./format.js";
 import { sourceState } from "./words.js";
@@ -7,16 +8,8 @@ import { sourceState } from "./words.js";
 /** Older than this many seconds, samples that should arrive all the time do not. */
 const QUIET_S = 10;
 
-/** Alarms that are about the way of the samples; what to do about each. */
-const ADVICE = {
-  link_lost: "Find out why the device does not answer; padwatch connects again by itself.",
-  samples_lost: "Look at the network and at the load of the DAQ and of this computer.",
-  time_stamps: "Look at the clock of the device: its time jumps, repeats or runs backwards.",
-  clock_offset: "Set the clock of the device, or its time server.",
-  clock_drift: "Compare the sampling rate in the plant file with the device’s own.",
-  blocks_waiting: "This computer does not keep up; end what else runs on it.",
-  analysis_late: "This computer does not keep up; end what else runs on it.",
-};
+/** What to do about an alarm about the way of the samples; empty for any other. */
+const adviceOn = (kind) => ALARM_KINDS[kind]?.advice ?? "";
 
 /** What to do about a link that does not come about, by what the error says; the first that fits. */
 const LINK_ADVICE = [
@@ -96,18 +89,18 @@ function alarmTrouble(alarm) {
     rank: isDanger ? 2 : 3,
     look: isDanger ? "bad" : "uncertain",
     words: kindWords(alarm.kind) + (value ? `: ${value}` : ""),
-    advice: ADVICE[alarm.kind] ?? "",
+    advice: adviceOn(alarm.kind),
   };
 }
 
 function lostTrouble(lost) {
   if (lost === 0) return null;
-  return { rank: 4, look: "uncertain", words: `${formatCount(lost)} samples lost in the last minute`, advice: ADVICE.samples_lost };
+  return { rank: 4, look: "uncertain", words: `${formatCount(lost)} samples lost in the last minute`, advice: adviceOn("samples_lost") };
 }
 
 /** Whether an alarm is active and about the way of a unit's samples. */
 export function isAboutSamples(alarm, unit) {
-  if (!alarm.is_active || !(alarm.kind in ADVICE)) return false;
+  if (!alarm.is_active || !adviceOn(alarm.kind)) return false;
   return alarm.unit === unit || (alarm.unit === "plant" && alarm.subject === unit);
 }
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.machine.unit import Estimator
 from core.units import NS_PER_S
 from service.evidence.archive import EvidenceArchive, Occurrence, SamplesState

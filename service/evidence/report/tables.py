@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from service.evidence.bearing_part import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
 from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Iterator
 
-from core.alarms.event import AlarmChange
-from service.delivery.mail_text import KINDS
+from core.alarms.alarm import AlarmChange
+from core.alarms.kinds import FILM_KINDS
 from service.evidence.bearing_part import BearingPart, FindingPart, ReadingPart
 from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence
 from service.evidence.report.case import Case
+from service.settings.alarm_kinds import kind_words
 
 SURE_95 = 1.96
 
@@ -27,17 +28,10 @@ SAMPLES = {
     "none": "not kept for this alarm",
 }
 
-STIFFNESS_KINDS = ("stiffness_x", "stiffness_y")
-
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
 
 LONGEST = 160
 """Characters of what somebody wrote that a report has room for."""
-
-
-def kind_words(kind: str) -> str:
-    """What is wrong."""
-    return KINDS.get(kind, plain(kind))
 
 
 def plain(name: str) -> str:
@@ -77,7 +71,7 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 def value_words(case: Case) -> str:
     """Value and limit; of a film's change, in percent with its interval."""
     alarm, found = case.evidence.alarm, finding(case)
-    if alarm.kind in STIFFNESS_KINDS and found is not None and found.change is not None:
+    if alarm.kind in FILM_KINDS and found is not None and found.change is not None:
         limit = (
             ""
             if alarm.limit is None
@@ -153,7 +147,7 @@ def finding(case: Case) -> FindingPart | None:
 def story(case: Case) -> str:
     """What has happened, in a sentence or two."""
     found = finding(case)
-    if case.evidence.alarm.kind not in STIFFNESS_KINDS or found is None or found.change is None:
+    if case.evidence.alarm.kind not in FILM_KINDS or found is None or found.change is None:
         return ""
     hours = (
         ""

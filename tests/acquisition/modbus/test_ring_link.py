@@ -10,7 +10,7 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices import ring_faults as faults
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
-from core.alarms.kinds import drift_reading
+from core.alarms.judgements import drift_reading
 
 
 @pytest.mark.parametrize(

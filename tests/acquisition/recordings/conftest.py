@@ -10,7 +10,7 @@ import pytest
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 
 MADE_BY = "padwatch in a test"
 START_NS = 1_767_225_600_000_000_000

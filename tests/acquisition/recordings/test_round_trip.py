@@ -28,7 +28,7 @@ from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from core.arrays import CountArray, SampleArray
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.samples.blocks import Rejection
 
 Numbered = Callable[..., RawBlock]

@@ -21,7 +21,8 @@ from acquisition.recordings.selection import select
 from acquisition.recordings.source import RecordingSource
 from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import FeedEndedError
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Unit
 from core.samples.blocks import Rejection
 
 Record = Callable[[Iterable[RawBlock]], Path]

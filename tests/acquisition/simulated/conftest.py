@@ -15,7 +15,8 @@ from acquisition.simulated.plant.scenario import (
     VortexRope,
 )
 from acquisition.simulated.plant.unit import SimulatedUnit
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 
 RATE_HZ = 600.0
 CLEARANCE_UM = {"UJB": 200.0, "LJB": 300.0, "TJB": 200.0}

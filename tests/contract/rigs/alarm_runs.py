@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 from service.store.port import AlarmQuery

@@ -10,12 +10,11 @@ import numpy as np
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import RecordingWriter
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
 from core.alarms.operation import Shelve, operate
-from core.limits import AlarmLevel, Condition
-from core.machine.unit import Measurand
+from core.limits import AlarmLevel, Judgement
+from core.machine.channel import Measurand
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 from rigs.standing_clock import StandingClock
@@ -29,7 +28,7 @@ BLOCK = 10
 T0 = 1_767_225_600_000_000_000
 SECOND = 1_000_000_000
 SETTINGS = CaptureSettings(pre_s=3.0, post_s=5.0, max_s=12.0)
-ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
+ALERT = Judgement(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
 
 
 def recorded_unit(unit: str) -> RecordedUnit:
@@ -71,13 +70,13 @@ def block(
 
 
 def raised(
-    at_s: float, kind: AlarmKind = AlarmKind.SHAFT_X, unit: str = "U1", shelved: bool = False
+    at_s: float, kind: str = "order1_shaft_x", unit: str = "U1", shelved: bool = False
 ) -> AlarmNews:
     """An alarm that is raised so many seconds after the start."""
     alarm = Alarm(AlarmIdentity(unit, "UJB", kind))
     if shelved:
         alarm, _ = operate(alarm, Shelve("A. Name", "known", T0 + 10**15), T0)
-    return AlarmNews(*advance(alarm, ALERT, T0 + round(at_s * SECOND), AlarmRule()))
+    return AlarmNews(*update(alarm, ALERT, T0 + round(at_s * SECOND), AlarmRule()))
 
 
 class Rig:

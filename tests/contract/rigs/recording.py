@@ -10,7 +10,7 @@ from acquisition.recordings.source import RecordingSource
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.source import SampleSource
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 
 
 class RecordingRig:

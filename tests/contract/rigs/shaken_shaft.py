@@ -3,7 +3,7 @@
 import numpy as np
 
 from core.arrays import ComplexArray
-from core.machine.bracket import BracketDynamics
+from core.machine.unit import BracketDynamics
 from core.spectra.cross_spectrum import CrossSpectrum, average
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
 from core.stiffness.dynamic_settings import DynamicSettings

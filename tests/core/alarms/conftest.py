@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmEvent
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmRule
+from core.alarms.life_cycle import update
 from core.alarms.operation import Action, operate
-from core.limits import Condition
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.limits import Judgement
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
@@ -52,12 +52,12 @@ class Life:
 
     rule: AlarmRule
     alarm: Alarm = field(
-        default_factory=lambda: Alarm(AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X))
+        default_factory=lambda: Alarm(AlarmIdentity("U1", "UJB", "order1_shaft_x"))
     )
     events: list[AlarmEvent] = field(default_factory=list)
 
-    def find(self, condition: Condition, now_ns: int) -> list[str]:
-        self.alarm, events = advance(self.alarm, condition, now_ns, self.rule)
+    def find(self, condition: Judgement, now_ns: int) -> list[str]:
+        self.alarm, events = update(self.alarm, condition, now_ns, self.rule)
         self.events += events
         return [event.change.value for event in events]
 

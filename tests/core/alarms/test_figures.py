@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmState, Hold
-from core.alarms.event import AlarmChange, AlarmEvent
+from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmIdentity, AlarmState, Hold
 from core.alarms.statistics import ChatterRule, ChatterWatch, figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
@@ -24,7 +23,7 @@ def event(
     before: AlarmState = NORMAL,
     after: AlarmState = UNSEEN,
 ) -> AlarmEvent:
-    identity = AlarmIdentity("U1", subject, AlarmKind.SHAFT_X)
+    identity = AlarmIdentity("U1", subject, "order1_shaft_x")
     return AlarmEvent(identity, 1, change, level, before, after, round(at_s * NS_PER_S), 1)
 
 
@@ -97,7 +96,7 @@ def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long() 
 
 def test_what_is_active_for_more_than_a_day_is_stale_unless_hidden() -> None:
     def alarm(subject: str, **other: object) -> Alarm:
-        identity = AlarmIdentity("U1", subject, AlarmKind.SHAFT_X)
+        identity = AlarmIdentity("U1", subject, "order1_shaft_x")
         return Alarm(identity, **{"level": ALERT, "raised_ns": 0, **other})  # type: ignore[arg-type]
 
     alarms = [

@@ -6,17 +6,17 @@ from collections.abc import Mapping
 import pytest
 
 from core.alarms.alarm import AlarmState
+from core.alarms.judgements import OrderVector, VectorReference, vector_judgement
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.alarms.vector_change import OrderVector, VectorReference, vector_condition
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition, Limits, unknown
+from core.limits import AlarmLevel, Judgement, Limits, unknown
 from core.machine.unit import Unit
 from core.quality import Reading, Reason, missing
 
 FILM_X = "U1:UJB:stiffness_x"
 
-LOST = Condition(AlarmLevel.ALERT, value=-0.21, limit=0.1, reason="film")
+LOST = Judgement(AlarmLevel.ALERT, value=-0.21, limit=0.1, reason="film")
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def alarms(unit: Unit) -> UnitAlarms:
     return UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0)))
 
 
-def changes(alarms: UnitAlarms, conditions: Mapping[str, Condition], now_ns: int) -> list[str]:
+def changes(alarms: UnitAlarms, conditions: Mapping[str, Judgement], now_ns: int) -> list[str]:
     news = alarms.films(conditions, now_ns)
     return [event.change.value for told in news for event in told.events]
 
@@ -69,7 +69,7 @@ def test_a_latched_loss_outlasts_the_healthy_verdict(unit: Unit) -> None:
     alarms = UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0, is_latching=True)))
     changes(alarms, {FILM_X: LOST}, 0)
 
-    assert changes(alarms, {FILM_X: Condition()}, 1) == ["latched"]
+    assert changes(alarms, {FILM_X: Judgement()}, 1) == ["latched"]
     assert alarms.alarm(FILM_X).level is AlarmLevel.ALERT
 
 
@@ -86,12 +86,12 @@ def readings(amplitude: Reading | float, phase: Reading | float) -> dict[str, Re
 
 
 def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays() -> None:
-    found = vector_condition(readings(60.0, 70.0), "shaft_x", WELL, LIMITS, None)
+    found = vector_judgement(readings(60.0, 70.0), "shaft_x", WELL, LIMITS, None)
 
     assert found.value == pytest.approx(60.0)  # 60° of an equilateral triangle
     assert found.level is ALERT
     assert found.reason == "above_limit"
-    almost = vector_condition(readings(60.0, 350.0), "shaft_x", WELL, LIMITS, None)
+    almost = vector_judgement(readings(60.0, 350.0), "shaft_x", WELL, LIMITS, None)
 
     assert almost.value == pytest.approx(2 * 60.0 * math.sin(math.radians(10.0)))
 
@@ -101,26 +101,26 @@ def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays() -> 
 def test_without_a_phase_only_the_length_counts_and_that_is_said(
     reference: VectorReference, amplitude: float, level: AlarmLevel | None
 ) -> None:
-    found = vector_condition(readings(amplitude, NO_PHASE), "shaft_x", reference, LIMITS, None)
+    found = vector_judgement(readings(amplitude, NO_PHASE), "shaft_x", reference, LIMITS, None)
 
     assert (found.level, found.value) == (level, abs(amplitude - 60.0))
     assert found.reason.startswith("amplitude_change")
 
 
 def test_without_a_reference_or_its_phase_nothing_is_known_and_standstill_suppresses() -> None:
-    found = vector_condition(readings(60.0, NO_PHASE), "shaft_x", WELL, LIMITS, ALERT)
+    found = vector_judgement(readings(60.0, NO_PHASE), "shaft_x", WELL, LIMITS, ALERT)
 
     assert (found.is_known, found.reason) == (False, "no_phase")
 
     standing = readings(missing(Reason.STANDSTILL), NO_PHASE)
-    found = vector_condition(standing, "shaft_x", WELL, LIMITS, ALERT)
+    found = vector_judgement(standing, "shaft_x", WELL, LIMITS, ALERT)
 
     assert (found.is_known, found.suppressed_by) == (False, "standstill")
 
     for reference, place in ((None, "shaft_x"), (WELL, "bearing_y")):
         there = readings(60.0, 10.0)
         there |= {n.replace("shaft_x", place): r for n, r in there.items()}
-        found = vector_condition(there, place, reference, LIMITS, None)
+        found = vector_judgement(there, place, reference, LIMITS, None)
         assert (found.is_known, found.reason, found.suppressed_by) == (False, "no_reference", None)
 
 

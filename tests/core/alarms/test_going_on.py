@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmState
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import Alarm, AlarmNews, AlarmState
 from core.alarms.operation import Acknowledge, Action, Comment
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
@@ -19,7 +18,9 @@ OIL = "U1:UJB:oil_temperature"
 LINK = "U1:link:link_lost"
 WATCHED = UnitRules(
     bearings={"UJB": BearingRules(oil_temperature=LimitRule(Limits(65.0), rule_of(0.0, 0.0)))},
-    clock=None,
+    clock_offset=None,
+    clock_drift=None,
+    time_stamps=None,
     link=rule_of(10.0, 0.0),
 )
 NO_LIMIT = replace(WATCHED, bearings={})

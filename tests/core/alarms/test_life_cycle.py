@@ -17,13 +17,13 @@ from core.alarms.operation import (
     Unshelve,
     expire,
 )
-from core.limits import WITHIN, AlarmLevel, Condition, unknown
+from core.limits import WITHIN, AlarmLevel, Judgement, unknown
 from core.units import NS_PER_S
 
 Make = Callable[..., Any]
 
-ALERT = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
-DANGER = Condition(AlarmLevel.DANGER, value=210.0, limit=200.0, reason="above_limit")
+ALERT = Judgement(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
+DANGER = Judgement(AlarmLevel.DANGER, value=210.0, limit=200.0, reason="above_limit")
 LOST = unknown("sensor_failure")
 
 

@@ -8,9 +8,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmEvent
-from core.alarms.life_cycle import advance, interrupted, restored
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmEvent, AlarmIdentity, AlarmRule, AlarmState
+from core.alarms.life_cycle import interrupted, restored, update
 from core.alarms.operation import (
     Acknowledge,
     ActionRefusedError,
@@ -22,9 +21,9 @@ from core.alarms.operation import (
     expire,
     operate,
 )
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 
-IDENTITY = AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X)
+IDENTITY = AlarmIdentity("U1", "UJB", "order1_shaft_x")
 
 LEVELS = st.sampled_from([None, AlarmLevel.ALERT, AlarmLevel.DANGER])
 STEPS = st.integers(0, 7)
@@ -80,7 +79,7 @@ class LifeCycle(RuleBasedStateMachine):
     def judged(self, level: AlarmLevel | None, step: int, suppressed: str | None) -> None:
         self.now += step
         self._hide_by_design(suppressed)
-        self._advance(Condition(level, suppressed_by=suppressed))
+        self._advance(Judgement(level, suppressed_by=suppressed))
         self._model_sees(level, known=True)
         self._show_by_design(suppressed)
 
@@ -201,8 +200,8 @@ class LifeCycle(RuleBasedStateMachine):
         assert [e.state_before for e in self.events] == states[:-1]
         assert self.alarm.state is states[-1]
 
-    def _advance(self, condition: Condition) -> None:
-        self.alarm, events = advance(self.alarm, condition, self.now, self.rule)
+    def _advance(self, condition: Judgement) -> None:
+        self.alarm, events = update(self.alarm, condition, self.now, self.rule)
         self.events += events
 
     def _operate(self, action: object) -> None:

@@ -4,17 +4,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.alarms.condition_limits import AT_SPEED, ConditionLimits, Region
-from core.alarms.kinds import (
-    channel_condition,
+from core.alarms.alarm import AlarmRule
+from core.alarms.judgements import (
+    channel_judgement,
     drift_reading,
-    link_condition,
+    link_judgement,
     offset_reading,
-    slow_channel_condition,
-    stamp_condition,
+    slow_channel_judgement,
+    stamp_judgement,
 )
+from core.alarms.rules import LimitRule, Region
 from core.condition.cells import OperatingPoint
-from core.condition.operating_state import OperatingState
+from core.condition.operating_state import STEADY, OperatingState
 from core.limits import AlarmLevel, Limits, ZoneLimits, judge
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 from core.samples.device_clock import DeviceClock, StampFault
@@ -67,14 +68,14 @@ def test_a_reading_without_a_number_is_unknown_and_standstill_alone_hides(reason
 
 
 def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> None:
-    assert channel_condition(GOOD, None).level is None
-    outside = channel_condition(uncertain(Reason.SENSOR_FAILURE), None)
+    assert channel_judgement(GOOD, None).level is None
+    outside = channel_judgement(uncertain(Reason.SENSOR_FAILURE), None)
     assert (outside.level, outside.reason) == (ALERT, Reason.SENSOR_FAILURE)
-    assert channel_condition(bad(Reason.CLIPPED), None).reason == "clipped"
-    assert channel_condition(GOOD, Reason.STUCK).reason == "stuck"
-    assert channel_condition(bad(Reason.SENSOR_FAILURE), Reason.STUCK).reason == "sensor_failure"
-    assert slow_channel_condition(missing(Reason.OUT_OF_RANGE)).level is ALERT
-    assert slow_channel_condition(Reading(45.0)).level is None
+    assert channel_judgement(bad(Reason.CLIPPED), None).reason == "clipped"
+    assert channel_judgement(GOOD, Reason.STUCK).reason == "stuck"
+    assert channel_judgement(bad(Reason.SENSOR_FAILURE), Reason.STUCK).reason == "sensor_failure"
+    assert slow_channel_judgement(missing(Reason.OUT_OF_RANGE)).level is ALERT
+    assert slow_channel_judgement(Reading(45.0)).level is None
 
     unclear = DeviceClock(None, None, None)
     fast = DeviceClock(offset_s=-3.0, drift_ppm=-250.0, u_drift_ppm=10.0)
@@ -87,12 +88,12 @@ def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> N
     assert drift_reading(unclear).quality.reason is Reason.WAITING_FOR_DATA
     assert drift_reading(fast).value == pytest.approx(230.4)
     assert drift_reading(maybe).value == pytest.approx(152.0)  # more is not sure
-    assert stamp_condition(StampFault.JUMPED).reason == "stamp_jumped"
-    assert stamp_condition(None).level is None
+    assert stamp_judgement(StampFault.JUMPED).reason == "stamp_jumped"
+    assert stamp_judgement(None).level is None
 
-    assert link_condition(True, None).level is None
-    assert link_condition(False, "refused").reason == "refused"
-    assert link_condition(False, None).reason == "not connected"
+    assert link_judgement(True, None).level is None
+    assert link_judgement(False, "refused").reason == "refused"
+    assert link_judgement(False, None).reason == "not connected"
 
 
 FULL, PART, RUN_UP = OperatingState.FULL_LOAD, OperatingState.PART_LOAD, OperatingState.RUN_UP
@@ -124,7 +125,9 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
     assert judge(Reading(409.0), GAP, DANGER).level is DANGER
     assert judge(Reading(411.0), GAP, DANGER).level is ALERT
 
-    found = ConditionLimits(((in_(FULL), Limits(100.0)), (in_(PART), Limits(150.0))))
+    found = LimitRule(
+        None, AlarmRule(), tables=((in_(FULL), Limits(100.0)), (in_(PART), Limits(150.0)))
+    )
 
     assert found.judge(Reading(120.0), OperatingPoint(FULL), None).level is ALERT
     assert found.judge(Reading(120.0), OperatingPoint(PART), None).level is None
@@ -135,7 +138,7 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
 def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
     state: OperatingState, value: float
 ) -> None:
-    limits = ConditionLimits.single(Limits(100.0), AT_SPEED)
+    limits = LimitRule(Limits(100.0), AlarmRule(), STEADY)
     found = limits.judge(Reading(value), OperatingPoint(state), ALERT)
 
     assert not found.is_known
@@ -143,7 +146,9 @@ def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
 
 
 def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
-    found = ConditionLimits(((in_(PART), Limits(150.0)), (in_(FULL), Limits(100.0))))
+    found = LimitRule(
+        None, AlarmRule(), tables=((in_(PART), Limits(150.0)), (in_(FULL), Limits(100.0)))
+    )
     condition = found.judge(Reading(120.0), OperatingPoint(), None)
 
     assert (condition.level, condition.limit, condition.suppressed_by) == (ALERT, 100.0, None)
@@ -165,10 +170,10 @@ def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
 def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_count_that_may(
     eccentricity: float | None, attitude_deg: float | None, oil_c: float | None, passed: list[float]
 ) -> None:
-    cell = Region(AT_SPEED, (0.35, 0.4), (45.0, 47.5), (0.0, 90.0))
-    warm = Region(AT_SPEED, oil_temperature_c=(47.5, 50.0))
+    cell = Region(STEADY, (0.35, 0.4), (45.0, 47.5), (0.0, 90.0))
+    warm = Region(STEADY, oil_temperature_c=(47.5, 50.0))
     tables = ((cell, Limits(150.0)), (warm, Limits(60.0)))
-    found = ConditionLimits(tables, (Region(AT_SPEED), Limits(100.0)))
+    found = LimitRule(Limits(100.0), AlarmRule(), STEADY, tables)
     point = OperatingPoint(FULL, eccentricity, attitude_deg, oil_c)
 
     assert [limits.alert for limits in found.at(point)] == passed
@@ -180,13 +185,13 @@ def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_co
 def test_a_condition_has_one_table() -> None:
     tables = ((in_(FULL, PART), Limits(100.0)), (in_(FULL), Limits(150.0)))
     with pytest.raises(ValueError, match="two limits for the operating state full_load"):
-        ConditionLimits(tables)
+        LimitRule(None, AlarmRule(), tables=tables)
     with pytest.raises(ValueError, match="count in no operating state"):
         in_()
     with pytest.raises(ValueError, match="must rise"):
         Region(eccentricity_ratio=(0.4, 0.4))
     apart = [Region(oil_temperature_c=(low, low + 5.0)) for low in (40.0, 45.0)]
-    assert ConditionLimits(tuple((region, LIMITS) for region in apart)).tables
+    assert LimitRule(None, AlarmRule(), tables=tuple((region, LIMITS) for region in apart)).tables
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,13 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import AlarmState
-from core.alarms.condition_limits import AT_SPEED
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent, AlarmState
+from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.operation import Acknowledge
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.cells import BearingCondition, OperatingPoint
-from core.condition.operating_state import OperatingState
+from core.condition.operating_state import STEADY, OperatingState
 from core.limits import Limits
 from core.machine.unit import Unit
 from core.monitor.catalogue import CATALOGUE
@@ -28,7 +26,7 @@ RUN_DOWN, STANDING = OperatingState.RUN_DOWN, OperatingState.STANDSTILL
 SPAN = "U1:UJB:overall_shaft_x"
 
 
-def rule(limits: Limits, states: frozenset[OperatingState] = AT_SPEED) -> LimitRule:
+def rule(limits: Limits, states: frozenset[OperatingState] = STEADY) -> LimitRule:
     return LimitRule(limits, AT_ONCE, states)
 
 

@@ -6,9 +6,8 @@ import math
 import numpy as np
 import pytest
 
+from core.machine.channel import Channel, Measurand, displacement_factor
 from core.machine.response import HighPass, Resonance, Response, ResponseChain, ResponseTable
-from core.machine.transducers import displacement_factor
-from core.machine.unit import Channel, Measurand
 
 FREQUENCY_HZ = np.geomspace(0.05, 50.0, 200)
 SHEET = ResponseTable((0.1, 1.0, 10.0), (0.5, 1.0, 1.02), (60.0, 5.0, -2.0))

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reason, bad

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.monitor.monitor_state import MonitorState

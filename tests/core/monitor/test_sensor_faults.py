@@ -8,7 +8,8 @@ import pytest
 
 import core.monitor.bearing_results
 import core.stiffness.film_results
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings

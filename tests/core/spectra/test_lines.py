@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from core.arrays import FloatArray
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from core.arrays import FloatArray
+from core.machine.channel import Channel, Measurand
 from core.machine.response import HighPass
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.unit import Unit
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading, Reason, bad

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.machine.unit import SlowRollVector, Unit
+from core.machine.channel import SlowRollVector
+from core.machine.unit import Unit
 from core.quality import Reading, Reason, uncertain
 from core.spectra.key_phase import KeyPhase
 from core.spectra.runout import RunoutVerdict, take_off_runout

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.arrays import ComplexArray
-from core.machine.bracket import BracketDynamics
+from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, CrossSpectrum, average
 from core.stiffness.evidence import LineLimits, line_excitation

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 import structlog
 
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 

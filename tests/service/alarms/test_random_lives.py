@@ -18,8 +18,7 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.alarms.alarm import Alarm, AlarmState
-from core.alarms.event import ANNOUNCED, AlarmChange, AlarmEvent
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.alarms.operation import (
     Acknowledge,
     Action,
@@ -34,7 +33,7 @@ from core.alarms.operation import (
 )
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 from service.alarms.engine import AlarmEngine
@@ -81,7 +80,9 @@ class Life:
         self.rules = UnitRules(
             channel=rule_of(0.0, 0.0),
             films=rule_of(0.0, 0.0, is_latching=self.is_latching),
-            clock=None,
+            clock_offset=None,
+            clock_drift=None,
+            time_stamps=None,
             link=rule_of(0.0, 0.0),
         )
         self.store: SqliteStore | None = None
@@ -151,9 +152,9 @@ class Life:
             assert after[id_][0] == max(held, condition.level or 0)
             assert after[id_][3] == (condition.suppressed_by is not None)
 
-    def _film(self) -> Condition:
+    def _film(self) -> Judgement:
         level = self.random.choice([None, None, AlarmLevel.ALERT, AlarmLevel.DANGER])
-        known = Condition(level, value=0.1 * (level or 0), limit=0.1)
+        known = Judgement(level, value=0.1 * (level or 0), limit=0.1)
         others = unknown("no_baseline"), unknown("standstill", "standstill")
         return self.random.choice([known, known, known, known, *others])
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
-from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.alarm import PLANT, Alarm, AlarmChange, AlarmEvent, AlarmIdentity, AlarmNews
 from core.alarms.operation import Acknowledge
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
@@ -192,7 +191,7 @@ async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_as_s
 ) -> None:
     engine, recorder, (store, uncertain) = stored()
     uncertain.fate = "refuses"
-    other = Alarm(AlarmIdentity("U9", "sx", AlarmKind.CHANNEL_NOT_OK))
+    other = Alarm(AlarmIdentity("U9", "sx", "channel_not_ok"))
     recorder.put(_findings(other))  # something that waits
     for _ in range(15):
         await recorder.flush()
@@ -229,7 +228,7 @@ async def test_news_that_comes_during_a_write_is_stored_without_any_news_after_i
     uncertain.fate = "waits"
     recording = asyncio.create_task(recorder.run())
     first, second = (
-        Alarm(AlarmIdentity("U9", channel, AlarmKind.CHANNEL_NOT_OK)) for channel in ("sx", "sy")
+        Alarm(AlarmIdentity("U9", channel, "channel_not_ok")) for channel in ("sx", "sy")
     )
     recorder.put(_findings(first))
     await asyncio.to_thread(uncertain.is_asked.wait, 30)
@@ -248,7 +247,7 @@ async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(
     stored: Callable[[], tuple[Any, Any, Any]],
 ) -> None:
     engine, recorder, (store, _) = stored()
-    gone = AlarmIdentity("U9", "sx", AlarmKind.CHANNEL_NOT_OK)
+    gone = AlarmIdentity("U9", "sx", "channel_not_ok")
     lost = Alarm(gone, level=ALERT, occurrence=1, is_acknowledged=False, raised_ns=0, n_events=1)
     before = Alarm(gone).state
     raised = AlarmEvent(gone, 1, AlarmChange.RAISED, ALERT, before, lost.state, 0, 1)

@@ -17,8 +17,8 @@ from rigs.described import described_app
 from rigs.probes import Probes
 
 from acquisition.delivery.calibration import calibrate
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmRule
+from core.alarms.life_cycle import update
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
@@ -264,8 +264,8 @@ def capture(tmp_path: Path) -> Callable[..., Path]:
     """Puts a recording of blocks, made for an alarm, where captures are."""
 
     def make(unit: str, blocks: list[SampleBlock], writer: Any, at_s: int = 0) -> Path:
-        alarm = Alarm(AlarmIdentity(unit, "UJB", AlarmKind.SHAFT_X))
-        _, events = advance(alarm, ALERT, T0 + at_s * 1_000_000_000, AlarmRule())
+        alarm = Alarm(AlarmIdentity(unit, "UJB", "order1_shaft_x"))
+        _, events = update(alarm, ALERT, T0 + at_s * 1_000_000_000, AlarmRule())
         file = CaptureFile(tmp_path / "captures", events[0], writer)
         file.write(blocks)
         file.finish(events)

@@ -6,12 +6,11 @@ from typing import Any, get_args
 
 import pytest
 
-from core.alarms.alarm import AlarmKind, AlarmState
-from core.alarms.event import AlarmChange
+from core.alarms.alarm import AlarmChange, AlarmState
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
-from service.api.alarm_names import AlarmChangeName, AlarmKindName, AlarmStateName
+from service.api.alarm_names import AlarmChangeName, AlarmStateName
 
 RATES = "/api/v1/alarms/rates"
 LINK = "U1:link:link_lost"
@@ -33,7 +32,6 @@ async def lose_link(service: Any, n_times: int, every_s: float) -> None:
 
 
 def test_the_words_of_the_api_are_those_of_alarms() -> None:
-    assert set(get_args(AlarmKindName)) == {kind.value for kind in AlarmKind}
     assert set(get_args(AlarmChangeName)) == {change.value for change in AlarmChange}
     assert set(get_args(AlarmStateName)) == {state.value for state in AlarmState}
 

@@ -2,19 +2,18 @@
 
 from typing import Any
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
-from core.limits import AlarmLevel, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
+from core.limits import AlarmLevel, Judgement
 from service.store.outbox_port import Letter, LetterState
 from service.store.sqlite import SqliteStore
 
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
 
 
 def news(subject: str) -> AlarmNews:
-    identity = AlarmIdentity("U1", subject, AlarmKind.SHAFT_X)
-    return AlarmNews(*advance(Alarm(identity), ALERT, 5, AlarmRule()))
+    identity = AlarmIdentity("U1", subject, "order1_shaft_x")
+    return AlarmNews(*update(Alarm(identity), ALERT, 5, AlarmRule()))
 
 
 async def test_what_waits_for_somebody_who_has_left_the_plant_file_is_not_forgotten(

@@ -12,7 +12,6 @@ from rigs.capturing import BLOCK, block, recorded_unit
 
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
-from core.alarms.alarm import AlarmKind
 
 RECORDINGS = "/api/v1/recordings"
 Keep = Callable[..., Path]
@@ -46,7 +45,7 @@ async def test_recordings_are_listed_with_what_they_are_for(service: Any, keep: 
     assert one["start"].startswith("2026-01-01T00:00:00.000")
     assert one["alarms"] == [
         {
-            "alarm": f"U1:UJB:{AlarmKind.SHAFT_X.value}",
+            "alarm": f"U1:UJB:{'order1_shaft_x'}",
             "occurrence": 1,
             "change": "raised",
             "level": "alert",

@@ -9,13 +9,12 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.judgements import OrderVector, VectorReference
+from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, Action, Comment, Shelve, TakeOutOfService, operate
-from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import AuditEntry, Source
 from service.audit.life import Release, start_deeds, stop_deed
@@ -28,7 +27,7 @@ from service.store.sqlite.trail import verify_trail
 from service.store.vector_reference_port import SetVectorReference
 
 T0 = 1_767_225_600_000_000_000
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
 ENGINEER = Acting(Source.API, "192.0.2.7")
 
 
@@ -41,8 +40,8 @@ def count(store: SqliteStore) -> int:
 
 
 def raised() -> AlarmNews:
-    identity = AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X)
-    return AlarmNews(*advance(Alarm(identity), ALERT, T0, AlarmRule()))
+    identity = AlarmIdentity("U1", "UJB", "order1_shaft_x")
+    return AlarmNews(*update(Alarm(identity), ALERT, T0, AlarmRule()))
 
 
 @pytest.mark.parametrize(

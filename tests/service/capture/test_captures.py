@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from rigs.capturing import SECOND, T0, block, numbers, raised, running, samples
 
-from core.alarms.alarm import AlarmKind
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import AlarmNews
 from service.capture.outcome import Outcome
 from service.capture.span import CaptureSettings
 
@@ -110,8 +109,8 @@ async def test_two_units_are_captured_side_by_side(root: Path) -> None:
 @pytest.mark.parametrize(
     "news",
     [
-        raised(10.0, AlarmKind.CLOCK_DRIFT),
-        raised(10.0, AlarmKind.TIME_STAMPS),
+        raised(10.0, "clock_drift"),
+        raised(10.0, "time_stamps"),
         raised(10.0, shelved=True),
     ],
     ids=["clock", "stamps", "shelved"],
@@ -138,7 +137,7 @@ async def test_a_device_whose_clock_is_put_back_ends_its_capture_by_count(root: 
 async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root: Path) -> None:
     settings = CaptureSettings(pre_s=3.0, post_s=2.0, max_s=12.0, window_s=8.0)
     async with running(root, settings) as rig:
-        rig.send(0, 100, {49: raised(10.0, AlarmKind.STIFFNESS_X)})
+        rig.send(0, 100, {49: raised(10.0, "stiffness_x")})
         [recording] = await rig.written(1)
 
     assert samples(recording) == numbers(10, 60)
@@ -149,7 +148,7 @@ async def test_another_alarm_prolongs_the_capture_at_both_ends_instead_of_beginn
     root: Path, pause: bool
 ) -> None:
     settings = CaptureSettings(pre_s=3.0, post_s=4.0, max_s=14.0, window_s=8.0)
-    film = raised(12.0, AlarmKind.STIFFNESS_X)
+    film = raised(12.0, "stiffness_x")
     told: list[Outcome] = []
     async with running(root, settings) as rig:
         rig.captures.tell(told.append)

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmChange, AlarmNews
-from core.alarms.life_cycle import advance
-from core.limits import AlarmLevel, Condition
+from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
+from core.limits import AlarmLevel, Judgement
 from service.delivery.facts import Surroundings
 from service.delivery.message import Composer, Plant
 from service.delivery.network import Timeouts, Trust
@@ -28,9 +27,9 @@ T0 = 1_767_225_600_000_000_000
 PATIENCE_S = 30.0
 """Until a test gives up; none waits that long when all is well."""
 
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
-DANGER = Condition(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
-WELL = Condition(value=3.0)
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
+WELL = Judgement(value=3.0)
 
 
 class HandClock:
@@ -56,11 +55,11 @@ class HandClock:
         await asyncio.sleep(0)
 
 
-def news(number: int, *conditions: Condition, unit: str = "U1") -> AlarmNews:
+def news(number: int, *conditions: Judgement, unit: str = "U1") -> AlarmNews:
     """An alarm of its own that goes through some conditions."""
-    alarm, events = Alarm(AlarmIdentity(unit, f"B{number}", AlarmKind.SHAFT_X)), []
+    alarm, events = Alarm(AlarmIdentity(unit, f"B{number}", "order1_shaft_x")), []
     for step, condition in enumerate(conditions or (ALERT,)):
-        alarm, found = advance(alarm, condition, T0 + number * 10**9 + step, AlarmRule())
+        alarm, found = update(alarm, condition, T0 + number * 10**9 + step, AlarmRule())
         events += found
     return AlarmNews(alarm, tuple(events))
 

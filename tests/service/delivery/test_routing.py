@@ -7,9 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule, AlarmState
-from core.alarms.event import AlarmChange, AlarmNews
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule, AlarmState
+from core.alarms.life_cycle import update
 from core.alarms.operation import (
     Acknowledge,
     ReturnToService,
@@ -18,13 +17,13 @@ from core.alarms.operation import (
     Unshelve,
     operate,
 )
-from core.limits import AlarmLevel, Condition, unknown
+from core.limits import AlarmLevel, Judgement, unknown
 
 T0 = 1_767_225_600_000_000_000
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
-DANGER = Condition(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
-WELL = Condition(value=3.0)
-STANDS = Condition(value=3.0, suppressed_by="standstill")
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
+WELL = Judgement(value=3.0)
+STANDS = Judgement(value=3.0, suppressed_by="standstill")
 
 SHELVE, UNSHELVE = Shelve("A. Name", "cable", T0 + 10**15), Unshelve("A. Name")
 ANY = AlarmLevel.ALERT
@@ -34,14 +33,14 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 class Life:
     """An alarm that lives, step by step, and is stored after each."""
 
-    def __init__(self, store: Any, unit: str = "U1", kind: AlarmKind = AlarmKind.SHAFT_X) -> None:
+    def __init__(self, store: Any, unit: str = "U1", kind: str = "order1_shaft_x") -> None:
         self.alarm, self.store, self.now_ns = Alarm(AlarmIdentity(unit, "UJB", kind)), store, T0
 
     def go(self, *steps: Any) -> None:
         for step in steps:
             self.now_ns += 10**9
-            if isinstance(step, Condition):
-                self.alarm, events = advance(self.alarm, step, self.now_ns, AlarmRule())
+            if isinstance(step, Judgement):
+                self.alarm, events = update(self.alarm, step, self.now_ns, AlarmRule())
             else:
                 asked = step if not callable(step) else step(self.alarm)
                 self.alarm, events = operate(self.alarm, asked, self.now_ns)
@@ -87,11 +86,11 @@ def test_what_is_off_the_list_is_told_when_it_comes_back_active_and_ends_are_nev
 def test_each_is_told_of_the_units_and_kinds_that_it_has_asked_for(room: Any) -> None:
     store = room.open_store(
         room.routed("unit", units=frozenset({"U2"})),
-        room.routed("kind", kinds=frozenset({AlarmKind.LINK_LOST})),
+        room.routed("kind", kinds=frozenset({"link_lost"})),
         room.routed("seen", changes=(AlarmChange.ACKNOWLEDGED,)),
     )
 
-    Life(store, "U1", AlarmKind.LINK_LOST).go(ALERT)
+    Life(store, "U1", "link_lost").go(ALERT)
     Life(store, "U2").go(ALERT, lambda alarm: Acknowledge("A. Name", alarm.occurrence))
 
     found = {name: told(store, name) for name in ("unit", "kind", "seen")}

@@ -10,13 +10,13 @@ from zoneinfo import ZoneInfo
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.delivery.outcome import Failed
 from service.delivery.quiet import QuietHours
 from service.delivery.sender import SenderState
 from service.store.outbox_port import LetterState
 
-DANGER = Condition(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
+DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
 
 
 async def test_news_is_told_as_soon_as_the_sender_is_woken(room: Any) -> None:

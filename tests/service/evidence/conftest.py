@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
-from core.limits import AlarmLevel, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
+from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.conversion import machine_of
@@ -33,7 +32,7 @@ SECOND = 1_000_000_000
 
 def news_of(
     at_s: float = 0.0,
-    kind: AlarmKind = AlarmKind.SHAFT_X,
+    kind: str = "order1_shaft_x",
     subject: str = "UJB",
     unit: str = "U1",
     occurrence: int = 1,
@@ -42,8 +41,8 @@ def news_of(
     before = occurrence - 1
     identity = AlarmIdentity(unit, subject, kind)
     alarm = Alarm(identity, occurrence=before, n_events=before)
-    found = Condition(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
-    return AlarmNews(*advance(alarm, found, T0 + round(at_s * SECOND), AlarmRule()))
+    found = Judgement(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
+    return AlarmNews(*update(alarm, found, T0 + round(at_s * SECOND), AlarmRule()))
 
 
 class Rig:

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from acquisition.recordings.manifest import MANIFEST
-from core.alarms.alarm import AlarmKind
-from core.alarms.event import AlarmEvent
+from core.alarms.alarm import AlarmEvent
 from core.quality import Reading
 from service.capture.file import _write_alarms
 from service.capture.folders import ALARM
@@ -92,8 +91,8 @@ async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
 
 async def test_the_service_itself_and_lost_links_have_evidence_too(rig: Any, news: Make) -> None:
     await rig.write(
-        news(kind=AlarmKind.LINK_LOST, subject="link", unit="U2"),
-        news(kind=AlarmKind.RESULTS_LOST, subject="store", unit="plant"),
+        news(kind="link_lost", subject="link", unit="U2"),
+        news(kind="results_lost", subject="store", unit="plant"),
     )
 
     link, own = (document(folder) for folder in rig.bundles)
@@ -190,7 +189,7 @@ async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
     evidence = plant.evidence.model_copy(update={"max_per_alarm": 3})
     rig = await rig_of(plant.model_copy(update={"evidence": evidence}))
     async with rig.running():
-        rig.raise_(news(0.0, AlarmKind.SHAFT_Y))
+        rig.raise_(news(0.0, "order1_shaft_y"))
         for number in range(1, 6):
             rig.raise_(news(float(number), occurrence=number))
         await rig.until(lambda: len(rig.bundles) == 4 and rig.keeper.n_written == 6)

@@ -13,7 +13,8 @@ from core.change.decision import JUDGED
 from core.change.film_judge import FilmJudge, FilmNews
 from core.change.settings import FilmRules
 from core.condition.cells import CellGrid
-from core.machine.unit import Bearing, Channel, Estimator, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Estimator, Unit
 from service.films.actions import Accept, BaselineRefusedError, Freeze, Reject, Renew, Thaw
 from service.films.keeper import FilmKeeper
 from service.films.learning import FilmPlace

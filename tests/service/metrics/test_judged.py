@@ -10,7 +10,8 @@ from core.alarms.rules import UnitRules
 from core.alarms.unit_alarms import UnitAlarms
 from core.change.decision import Verdict
 from core.change.film_judge import FilmFinding, FilmNews
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from service.alarms.engine import AlarmEngine
 from service.delivery.deliveries import ReceiverView
 from service.delivery.sender import Receiver, SenderStatus

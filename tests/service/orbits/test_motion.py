@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from core.arrays import FloatArray
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.quality import Reading
 from service.orbits.motion import ShaftMotion, motion_of
 from service.orbits.stretch import ShaftStretch

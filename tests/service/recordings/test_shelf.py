@@ -9,7 +9,7 @@ import pytest
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from service.recordings.shelf import Shelf
 from service.store.waveform_port import WaveformKind
 

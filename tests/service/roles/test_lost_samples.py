@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmKind
-from core.alarms.event import AlarmChange, AlarmNews, changed
+from core.alarms.alarm import PLANT, Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
 from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
 from service.alarms.engine import AlarmEngine
@@ -18,7 +17,7 @@ from service.roles.partition import Partition
 from service.settings.loading import load_plant_file
 from service.store.sqlite import SqliteStore
 
-LOST = Alarm(AlarmIdentity(PLANT, "U2", AlarmKind.SAMPLES_LOST))
+LOST = Alarm(AlarmIdentity(PLANT, "U2", "samples_lost"))
 
 
 async def test_a_standing_alarm_goes_on_with_the_process_of_its_unit(

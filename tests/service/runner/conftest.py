@@ -13,7 +13,8 @@ from acquisition.recordings.writer import RecordingWriter
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD

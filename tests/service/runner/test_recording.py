@@ -17,10 +17,9 @@ from rigs.alarm_runs import PROBE, Make, changes, play
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
-from core.limits import AlarmLevel, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
+from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.samples.account import Gap
 from service import recorder as recording
@@ -211,8 +210,8 @@ async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothin
 
 def news_of(subject: str) -> AlarmNews:
     """That a channel has failed."""
-    identity = AlarmIdentity("U1", subject, AlarmKind.CHANNEL_NOT_OK)
-    return AlarmNews(*advance(Alarm(identity), Condition(AlarmLevel.ALERT), at(0), AlarmRule()))
+    identity = AlarmIdentity("U1", subject, "channel_not_ok")
+    return AlarmNews(*update(Alarm(identity), Judgement(AlarmLevel.ALERT), at(0), AlarmRule()))
 
 
 def without_coverage(found: Assessment) -> Assessment:

@@ -6,12 +6,11 @@ from collections.abc import Callable
 import pytest
 
 from core.alarms.alarm import AlarmRule
-from core.alarms.condition_limits import AT_SPEED, EVERY_STATE, Region
-from core.alarms.rules import BearingRules, LimitRule
+from core.alarms.judgements import OrderVector, VectorReference
+from core.alarms.rules import EVERY_STATE, BearingRules, LimitRule, Region
 from core.alarms.statistics import ChatterRule
-from core.alarms.vector_change import OrderVector, VectorReference
 from core.condition.cells import OperatingPoint
-from core.condition.operating_state import OperatingState
+from core.condition.operating_state import STEADY, OperatingState
 from core.limits import Limits
 from service.alarms.rules import chatter_rule_of, references_of, rules_of
 from service.origin import Origin
@@ -63,12 +62,12 @@ def test_without_limits_nothing_of_a_bearing_is_watched_and_in_a_replay_neither_
     assert set(rules.bearings.values()) == {BearingRules(None, None)}
     assert rules.channel == AlarmRule(SECOND // 2, 10 * SECOND)
     assert rules.link == AlarmRule(10 * SECOND, 0)
-    assert rules.clock is not None
-    assert rules.clock.offset.limits == Limits(2.0, deadband=0.2)
+    assert rules.clock_offset is not None
+    assert rules.clock_offset.limits == Limits(2.0, deadband=0.2)
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.REPLAY)
 
-    assert (rules.link, rules.clock) == (None, None)
+    assert {rules.link, rules.clock_offset, rules.clock_drift, rules.time_stamps} == {None}
     assert captures_of(plant, Origin.REPLAY, None)._histories == {}  # type: ignore[arg-type]
     assert set(captures_of(plant, Origin.LIVE, None)._histories) == {"U1", "U2"}  # type: ignore[arg-type]
 
@@ -89,7 +88,7 @@ def test_limits_of_a_bearing_become_its_rules_at_speed_unless_said_otherwise(
     )
 
     assert found.shaft_order1 == LimitRule(
-        Limits(150.0, 250.0, 5.0), AlarmRule(0, 30 * SECOND), AT_SPEED
+        Limits(150.0, 250.0, 5.0), AlarmRule(0, 30 * SECOND), STEADY
     )
     assert found.oil_temperature == LimitRule(
         Limits(None, 75.0, 2.0), AlarmRule(10 * SECOND, 3 * SECOND // 2), EVERY_KNOWN_STATE
@@ -101,7 +100,7 @@ def test_limits_of_a_bearing_become_its_rules_at_speed_unless_said_otherwise(
     assert found.gap.limits == Limits(2400.0, 2600.0, 10.0, 600.0, 400.0)
     for rule in (found.bearing_overall, found.eccentricity, found.shaft_change):
         assert isinstance(rule, LimitRule)
-        assert rule.states == AT_SPEED
+        assert rule.states == STEADY
         assert not rule.rule.is_latching
 
 
@@ -113,10 +112,10 @@ def test_zones_differ_from_state_to_state(rules: Callable[[str], BearingRules]) 
     ).shaft_zones
 
     assert found is not None
-    [full], [part] = (found.by_condition.at(OperatingPoint(state)) for state in (FULL, PART))
+    [full], [part] = (found.at(OperatingPoint(state)) for state in (FULL, PART))
     assert (full.alert, full.danger, full.deadband) == (200.0, 300.0, 5.0)
     assert (part.alert, part.danger, part.deadband) == (250.0, 400.0, 1.0)
-    assert not found.by_condition.at(OperatingPoint(OperatingState.SPEED_NO_LOAD))
+    assert not found.at(OperatingPoint(OperatingState.SPEED_NO_LOAD))
     assert found.rule.off_delay_ns == 5 * SECOND
 
 
@@ -141,11 +140,11 @@ def test_every_limit_may_differ_by_operating_state_and_by_condition_cell(
     )
     assert found.gap is not None
     [(region, limits)] = found.gap.tables
-    assert region == Region(AT_SPEED, attitude_deg=(0.0, 90.0))
+    assert region == Region(STEADY, attitude_deg=(0.0, 90.0))
     assert limits == Limits(2400.0, None, 10.0, 500.0)
     assert found.shaft_zones is not None
-    [(region, _)] = found.shaft_zones.by_condition.tables
-    assert region == Region(AT_SPEED, (0.35, 0.4), (45.0, 47.5))
+    [(region, _)] = found.shaft_zones.tables
+    assert region == Region(STEADY, (0.35, 0.4), (45.0, 47.5))
 
 
 def test_a_reference_holds_in_each_state_it_names(plant_of: PlantOf) -> None:
@@ -167,7 +166,7 @@ def test_clocks_captures_and_chattering_can_be_set(plant_of: PlantOf) -> None:
         'chattering_window_s = 600.0\n[capture]\nsamples = "not_kept"'
     )
 
-    assert rules_of(plant.unit[0], plant.alarms, Origin.LIVE).clock is None
+    assert rules_of(plant.unit[0], plant.alarms, Origin.LIVE).clock_drift is None
     assert captures_of(plant, Origin.LIVE, None)._histories == {}  # type: ignore[arg-type]
     assert chatter_rule_of(plant.alarms) == ChatterRule(5, 600 * SECOND)
     assert chatter_rule_of(plant_of().alarms) == ChatterRule(3, 60 * SECOND)

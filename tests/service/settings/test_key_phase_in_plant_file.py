@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from core.machine.unit import Measurand, SlowRollVector
+from core.machine.channel import Measurand, SlowRollVector
 from service.conversion import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 

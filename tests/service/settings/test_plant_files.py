@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import calibrate
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from core.monitor.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file

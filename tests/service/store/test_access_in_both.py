@@ -3,12 +3,11 @@
 import pytest
 from harness.places import Place
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
-from core.alarms.vector_change import OrderVector, VectorReference
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.judgements import OrderVector, VectorReference
+from core.alarms.life_cycle import update
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from service.security.keys import ApiKey
 from service.security.roles import Role
 from service.security.sessions import Session
@@ -119,8 +118,8 @@ def test_what_is_on_record_is_never_changed_or_taken_away(
 ) -> None:
     store.add_reference(GAP)
     store.order1_references.add(VECTOR)
-    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X))
-    news = AlarmNews(*advance(alarm, Condition(AlarmLevel.ALERT), 7, AlarmRule()))
+    alarm = Alarm(AlarmIdentity("U1", "UJB", "order1_shaft_x"))
+    news = AlarmNews(*update(alarm, Judgement(AlarmLevel.ALERT), 7, AlarmRule()))
     store.append([], [], [news])
     column = "author" if table.endswith("reference") else "actor"
     for statement in (f"UPDATE {table} SET {column} = 'x'", f"DELETE FROM {table}"):  # noqa: S608

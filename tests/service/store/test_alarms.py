@@ -8,13 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rigs.store_fixtures import Execute, gap
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmEvent, AlarmNews
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
 from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.limits import RESTED, AlarmLevel, Condition, unknown
+from core.limits import INACTIVE, AlarmLevel, Judgement, unknown
 from service.store.port import AlarmQuery, StoreError
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
@@ -22,26 +21,26 @@ from service.store.value_range import ValueRange
 T0 = 1_767_225_600_000_000_000
 FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
 POINT = OperatingPoint(FULL, 0.37, -12.5, 46.2)
-ALERT = Condition(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit", point=POINT)
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit", point=POINT)
 
 
 def identity(subject: str = "UJB", unit: str = "U1") -> AlarmIdentity:
-    return AlarmIdentity(unit, subject, AlarmKind.SHAFT_X)
+    return AlarmIdentity(unit, subject, "order1_shaft_x")
 
 
 def raised(n_ns: int = T0, subject: str = "UJB", unit: str = "U1") -> AlarmNews:
-    alarm, events = advance(Alarm(identity(subject, unit)), ALERT, n_ns, AlarmRule())
+    alarm, events = update(Alarm(identity(subject, unit)), ALERT, n_ns, AlarmRule())
     return AlarmNews(alarm, events)
 
 
-def then(news: AlarmNews, condition: Condition, now_ns: int) -> AlarmNews:
-    return AlarmNews(*advance(news.alarm, condition, now_ns, AlarmRule()))
+def then(news: AlarmNews, condition: Judgement, now_ns: int) -> AlarmNews:
+    return AlarmNews(*update(news.alarm, condition, now_ns, AlarmRule()))
 
 
 def as_stored(alarm: Alarm) -> Alarm:
     """All of an alarm but its timers, which a restart forgets."""
     condition = replace(alarm.condition, suppressed_by=alarm.suppressed_by, point=None)
-    return replace(alarm, condition=condition, timers=(RESTED, RESTED))
+    return replace(alarm, condition=condition, timers=(INACTIVE, INACTIVE))
 
 
 ACTIONS = [
@@ -54,8 +53,8 @@ LIFE = st.lists(
     st.sampled_from(
         [
             ALERT,
-            Condition(AlarmLevel.DANGER, value=250.0, limit=200.0, point=OperatingPoint()),
-            Condition(value=3.0),
+            Judgement(AlarmLevel.DANGER, value=250.0, limit=200.0, point=OperatingPoint()),
+            Judgement(value=3.0),
             unknown("sensor_failure"),
             unknown("standstill", "standstill"),
             *ACTIONS,
@@ -74,8 +73,8 @@ def test_an_alarm_and_its_events_are_read_as_they_were_written(store: SqliteStor
     def check(steps: list[object]) -> None:
         alarm, told = Alarm(identity(f"bearing {next(numbers)}")), list[AlarmEvent]()
         for number, step in enumerate(steps):
-            if isinstance(step, Condition):
-                alarm, events = advance(alarm, step, T0 + number, AlarmRule())
+            if isinstance(step, Judgement):
+                alarm, events = update(alarm, step, T0 + number, AlarmRule())
             else:
                 alarm, events = operate(alarm, step(alarm), T0 + number)
             if events:
@@ -93,7 +92,7 @@ def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later
     store: SqliteStore,
 ) -> None:
     first = raised()
-    second = then(first, Condition(), T0 + 5)
+    second = then(first, Judgement(), T0 + 5)
 
     store.append([], [], [first])
     store.append([], [], [first, second])
@@ -155,9 +154,9 @@ def test_events_are_found_by_the_condition_at_which_their_occurrence_was_raised(
     points = dict(zip("ABCDE", (POINT, *others, OperatingPoint(), None), strict=True))
     for subject, point in points.items():
         first = AlarmNews(
-            *advance(Alarm(identity(subject)), replace(ALERT, point=point), T0, AlarmRule())
+            *update(Alarm(identity(subject)), replace(ALERT, point=point), T0, AlarmRule())
         )
-        store.append([], [], [first, then(first, Condition(), T0 + 5)])
+        store.append([], [], [first, then(first, Judgement(), T0 + 5)])
 
     events = [s.event for s in store.alarm_events(AlarmQuery(**wanted))]  # type: ignore[arg-type]
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind
-from core.alarms.event import AlarmChange, AlarmNews, changed
+from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
 from service.store.commands import KEPT_NS
 from service.store.commands_port import DONE, Answer, Command, CommandState, OpenCommand
 from service.store.sqlite import SqliteStore
@@ -54,7 +53,7 @@ def test_a_command_is_answered_with_the_events_that_it_has_caused_or_not_at_all(
     store: SqliteStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store.commands.ask(COMMAND)
-    before = Alarm(AlarmIdentity("U1", "link", AlarmKind.LINK_LOST))
+    before = Alarm(AlarmIdentity("U1", "link", "link_lost"))
     after, event = changed(before, before, AlarmChange.COMMENTED, NOW_NS, "vera", "seen")
     news = AlarmNews(after, (event,), "10.0.0.9", "c1")
     with monkeypatch.context() as broken:

@@ -8,7 +8,7 @@ import pytest
 from rigs.assessments import assessment
 from rigs.store_fixtures import at
 
-from core.alarms.vector_change import OrderVector, VectorReference
+from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.quality import Reading, Reason, missing, uncertain
 from service.store import sql_store

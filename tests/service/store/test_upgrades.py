@@ -11,10 +11,9 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import gather_all, n_rows
 from rigs.store_fixtures import query
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
-from core.limits import AlarmLevel, Condition
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
+from core.limits import AlarmLevel, Judgement
 from service.store import schema
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
@@ -43,8 +42,8 @@ def test_an_older_database_keeps_its_data_and_gets_room_for_what_is_new(
             " VALUES ('U1', 1, 2, 3, 4)"
         )
         old.commit()
-    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.SHAFT_X))
-    raised = AlarmNews(*advance(alarm, Condition(AlarmLevel.ALERT), 7, AlarmRule()))
+    alarm = Alarm(AlarmIdentity("U1", "UJB", "order1_shaft_x"))
+    raised = AlarmNews(*update(alarm, Judgement(AlarmLevel.ALERT), 7, AlarmRule()))
     reference = GapReference("U1", "UJB", 5, "A", (1.0, 2.0), None, ReferenceSource.GIVEN)
 
     with closing(SqliteStore(path)) as store:

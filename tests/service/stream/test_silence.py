@@ -13,7 +13,6 @@ from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Life, Message, MovingUnit
 from harness.stream_rig import analysing, blocks
 
-from core.alarms.alarm import AlarmKind
 from service.live import LinkState
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery
@@ -81,7 +80,7 @@ class Process:
     def n_judged(self) -> int:
         """How many alarms of channels count as judged."""
         alarms = self.life.analysis.alarms
-        channels = [a for a in alarms.alarms if a.identity.kind is AlarmKind.CHANNEL_NOT_OK]
+        channels = [a for a in alarms.alarms if a.identity.kind == "channel_not_ok"]
         return sum(alarms.is_judged(alarm) for alarm in channels)
 
 

@@ -12,7 +12,7 @@ from rigs.standing_clock import StandingClock
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 from service.space.disk import DiskSpace
 from service.space.limits import SpaceLimits
 from service.store.sqlite import SqliteStore

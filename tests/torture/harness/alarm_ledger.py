@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from core.alarms.event import AlarmChange, AlarmEvent
+from core.alarms.alarm import AlarmChange, AlarmEvent
 from harness.ledger_plant import RECEIVER, LedgerPlant
 from harness.lives import Rows
 from harness.truth import BEARINGS, Spell, Truth

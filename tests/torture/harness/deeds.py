@@ -7,9 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmChange, AlarmEvent, AlarmNews
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.baseline.history import ReadingOutcome
 from core.change.decision import INITIAL_DECISION, Verdict
@@ -17,7 +16,7 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel, Condition
+from core.limits import AlarmLevel, Judgement
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
@@ -66,9 +65,9 @@ def deed(seed: int, number: int, build: Build) -> Deed:
 def _alarm(readings: Mapping[str, float], number: int) -> AlarmNews:
     """An alarm that is raised; every third one is acknowledged at once."""
     time_ns = T0_NS + number * HOP_NS
-    alarm, events = advance(
-        Alarm(AlarmIdentity("U1", f"B{number}", AlarmKind.SHAFT_X)),
-        Condition(AlarmLevel.ALERT, value=150.0 + readings["speed_rpm"], limit=150.0),
+    alarm, events = update(
+        Alarm(AlarmIdentity("U1", f"B{number}", "order1_shaft_x")),
+        Judgement(AlarmLevel.ALERT, value=150.0 + readings["speed_rpm"], limit=150.0),
         time_ns,
         AlarmRule(),
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
-from core.alarms.event import AlarmNews
+from core.alarms.alarm import AlarmNews
 from core.monitor.assessment import Assessment
 from core.monitor.monitored_unit import MonitoredUnit
 from core.samples.blocks import SampleBlock

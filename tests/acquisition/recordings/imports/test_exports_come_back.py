@@ -16,7 +16,7 @@ from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, 
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import RecordingWriter
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 
 START_NS = 1_767_225_600_000_000_000
 MEASURANDS = {

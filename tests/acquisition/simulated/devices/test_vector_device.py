@@ -12,7 +12,8 @@ from acquisition.modbus.polled_source import PolledSettings, PolledSource, vecto
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.map_device import VectorDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.monitor.settings import AnalysisSettings
 from core.monitor.vector_monitor import VectorMonitor
 from core.spectra.vector_rows import VectorPart, VectorRow

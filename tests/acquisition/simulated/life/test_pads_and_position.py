@@ -23,7 +23,7 @@ from acquisition.simulated.plant.rotor import (
     unbalance_force_n,
 )
 from benchmarks.accuracy_plant import machine
-from core.machine.unit import Measurand
+from core.machine.channel import Measurand
 
 Life = Callable[..., UnitLife]
 

@@ -12,8 +12,9 @@ from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
 from acquisition.simulated.plant.unit import SimulatedUnit
 from core.arrays import CountArray, FloatArray
+from core.machine.channel import Channel, Measurand
 from core.machine.response import HighPass, Resonance
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.unit import Unit
 
 BuildUnit = Callable[..., SimulatedUnit]
 UJB = 0

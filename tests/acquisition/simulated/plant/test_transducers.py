@@ -13,7 +13,8 @@ from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario, TransducerNoise
 from core.arrays import FloatArray
-from core.machine.unit import Bearing, Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
 from core.spectra.key_phase import KeyPhase, read_key_phase
 from core.spectra.lines import exact_phasors, tapered
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from rigs.racks import AMPLITUDES, GAPS, K_B, RATE_HZ, SLOW, VORTEX, blocks_of, polls, watch
 
-from core.machine.unit import Channel, Measurand, Unit
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Unit
 from core.monitor.assessment import Evidence
 from core.monitor.catalogue import CATALOGUE
 from core.monitor.settings import AnalysisSettings

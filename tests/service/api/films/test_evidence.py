@@ -13,9 +13,8 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
-from core.alarms.event import AlarmNews
-from core.alarms.life_cycle import advance
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_judge import alarm_condition
 from service.security.people import create_key
@@ -41,8 +40,8 @@ def raised(service: Any, machine: Any) -> AlarmNews:
     rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
     condition = alarm_condition(told.findings[0], rules.change)
     assert condition.level is not None
-    alarm = Alarm(AlarmIdentity("U1", "UJB", AlarmKind.STIFFNESS_X))
-    news = AlarmNews(*advance(alarm, condition, machine.time_ns, AlarmRule()))
+    alarm = Alarm(AlarmIdentity("U1", "UJB", "stiffness_x"))
+    news = AlarmNews(*update(alarm, condition, machine.time_ns, AlarmRule()))
     service.evidence.see([news])
     service.store.append([], [], [news])
     return news

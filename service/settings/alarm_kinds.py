@@ -1,0 +1,113 @@
+"""`ALARM_KINDS`: all kinds of alarms, those of units and those about the service itself."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+from core.alarms import kinds as units
+from core.alarms.kinds import AlarmKind, kind_table
+
+STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
+RECORDINGS, STREAM, UNIT = "recordings", "stream", "unit"
+"""Subjects of alarms about the service; in the place of `UNIT`, the name of a unit."""
+
+SAMPLES_LOST, ANALYSIS_GONE, MESSAGES_REFUSED = "samples_lost", "analysis_gone", "messages_refused"
+"""Kinds with one alarm for each unit."""
+
+END_OTHERS = "This computer does not keep up; end what else runs on it."
+
+SERVICE_KINDS = kind_table(
+    AlarmKind(
+        SAMPLES_LOST,
+        "Samples lost",
+        "1",
+        UNIT,
+        "loss",
+        advice="Look at the network and at the load of the DAQ and of this computer.",
+    ),
+    AlarmKind("results_not_stored", "Results are not being stored", "s", STORE, "store_behind"),
+    AlarmKind("results_lost", "Results lost", "findings", STORE, "lasting"),
+    AlarmKind(
+        "blocks_waiting",
+        "Queue to the analysis fills",
+        "1",
+        SERVICE,
+        "waiting",
+        "waiting_share",
+        advice=END_OTHERS,
+    ),
+    AlarmKind(
+        "analysis_late",
+        "Analysis falls behind",
+        "s",
+        SERVICE,
+        "delay",
+        "analysis_delay_s",
+        advice=END_OTHERS,
+    ),
+    AlarmKind(
+        "captures_not_kept",
+        "Samples around alarms not kept",
+        None,
+        CAPTURES,
+        "at_once",
+        "captures_error",
+    ),
+    AlarmKind(
+        "samples_not_recorded",
+        "Samples not recorded",
+        None,
+        RECORDINGS,
+        "at_once",
+        "recording_error",
+    ),
+    AlarmKind(
+        "recordings_damaged", "Recordings damaged or missing", "recordings", RECORDINGS, "lasting"
+    ),
+    AlarmKind("questions_refused", "Too busy to answer", None, SERVICE, "steady", "refused"),
+    AlarmKind("disk_nearly_full", "Disk nearly full", "1", DISK, "steady"),
+    AlarmKind(
+        "stored_data_damaged",
+        "Stored data damaged or missing",
+        None,
+        STORE,
+        "at_once",
+        "stored_trouble",
+    ),
+    AlarmKind(MESSAGES_REFUSED, "Messages on the stream refused", None, STREAM, "lasting"),
+    AlarmKind("stream_away", "Stream does not answer", None, STREAM, "steady", "stream_trouble"),
+    AlarmKind(ANALYSIS_GONE, "Nobody analyses this unit", None, UNIT, "at_once"),
+)
+"""The service's own kinds. `rule` is a field of `ServiceRules`, `reading` one of `ServiceHealth`:
+a value that is compared with limits, or the words of a trouble that raises the alarm."""
+
+ALARM_KINDS: Mapping[str, AlarmKind] = MappingProxyType({**units.ALARM_KINDS, **SERVICE_KINDS})
+
+SAMPLED_KINDS = frozenset(
+    kind.name for kind in ALARM_KINDS.values() if kind.subject in (units.CHANNEL, units.BEARING)
+)
+"""Kinds of alarms that samples can explain."""
+
+if TYPE_CHECKING:
+    AlarmKindName = str
+else:
+    AlarmKindName = Literal[tuple(ALARM_KINDS)]
+"""Name of a kind; anything else is refused where it is read."""
+
+
+def kind_label(kind: str) -> str:
+    """Words for people; of a kind that is not in the table, its name as words."""
+    found = ALARM_KINDS.get(kind)
+    return kind.replace("_", " ") if found is None else found.label
+
+
+def kind_words(kind: str) -> str:
+    """The label within a sentence: "shaft vibration 1×, x"."""
+    label = kind_label(kind)
+    return label[:1].lower() + label[1:]
+
+
+def value_unit(kind: str) -> str | None:
+    """Unit of the value of a kind's alarms."""
+    found = ALARM_KINDS.get(kind)
+    return None if found is None else found.unit
