@@ -1,7 +1,9 @@
-"""The manifest of a recording: what was recorded, how to read it, and what its files must be."""
+"""The manifest of a recording: what was recorded, how to read it, its files and its bounds."""
 
 import hashlib
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -16,14 +18,8 @@ from acquisition.delivery.calibration import (
     UnitCalibration,
 )
 from acquisition.errors import ConfigError
-from acquisition.recordings.limits import (
-    MAX_BLOCK_SAMPLES,
-    MAX_CHANNELS,
-    MAX_MANIFEST_BYTES,
-    MAX_SAMPLES,
-    MAX_SLOW_CHANNELS,
-)
 from core.machine.unit import Measurand
+from core.samples.blocks import Rejection
 from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"
@@ -31,6 +27,29 @@ VERSION = 3
 MANIFEST = "manifest.json"
 SAMPLES = "samples.parquet"
 BLOCKS = "blocks.parquet"
+
+MAX_CHANNELS = 32
+MAX_SLOW_CHANNELS = 50
+
+ROWS_PER_GROUP = 131_072
+"""Samples of each channel that are written and read at once: 1 MB for four channels."""
+
+BLOCKS_PER_GROUP = 8192
+
+MAX_BLOCK_SAMPLES = ROWS_PER_GROUP
+
+MAX_SAMPLES = 2**29
+"""Per channel: ten days at 600 Hz."""
+
+MAX_INDEX = 2**53
+"""Of a sample, and of an epoch; exact even where numbers are doubles."""
+
+MAX_REJECTIONS = 32
+"""Reasons for which samples before one block may have been refused."""
+
+MAX_REASON_LENGTH = 64
+
+MAX_MANIFEST_BYTES = 1_000_000
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
@@ -141,6 +160,60 @@ class Manifest(RecordedUnit):
     n_samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     files: Annotated[dict[FileName, RecordedFile], Field(min_length=2)]
     checksum: Sha256 | None = None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Position in a recording: what the next block, written or read, must follow on.
+
+    Parameters
+    ----------
+    n_passed
+        Samples per channel, gaps within an epoch included.
+    epoch, stop_index
+        Where the last block ended; no epoch before the first.
+    """
+
+    n_passed: int = 0
+    epoch: int | None = None
+    stop_index: int = 0
+
+    def after(
+        self, epoch: int, first_index: int, n_samples: int, rejected: Sequence[Rejection]
+    ) -> "Progress":
+        """Return the position after one more block.
+
+        Raises
+        ------
+        ConfigError
+            If no device can have delivered it here.
+        """
+        if not 1 <= n_samples <= MAX_BLOCK_SAMPLES:
+            raise ConfigError(
+                f"a block of {n_samples} samples; it must have 1 to {MAX_BLOCK_SAMPLES}"
+            )
+        for name, value in (("epoch", epoch), ("first index", first_index)):
+            if not 0 <= value <= MAX_INDEX:
+                raise ConfigError(f"a block of {name} {value}; it must be 0 to {MAX_INDEX}")
+        expected = self.stop_index if epoch == self.epoch else 0
+        n_missing = max(first_index - expected, 0)
+        _require_room(rejected, n_missing)
+        n_gap = n_missing if epoch == self.epoch else 0
+        return Progress(self.n_passed + n_gap + n_samples, epoch, first_index + n_samples)
+
+
+def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
+    if len(rejected) > MAX_REJECTIONS:
+        raise ConfigError(f"a block with {len(rejected)} rejections; at most {MAX_REJECTIONS}")
+    for rejection in rejected:
+        if not 1 <= len(rejection.reason) <= MAX_REASON_LENGTH or rejection.n_samples < 1:
+            raise ConfigError(
+                f"a rejection of {rejection.n_samples} samples for {rejection.reason[:80]!r}; it"
+                f" needs at least one, and a reason of 1 to {MAX_REASON_LENGTH} letters"
+            )
+    n_rejected = sum(rejection.n_samples for rejection in rejected)
+    if n_rejected > n_missing:
+        raise ConfigError(f"a block with {n_rejected} samples rejected in a jump of {n_missing}")
 
 
 class _Head(BaseModel):

@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from acquisition.recordings.reader import BlockHead, Recording
+from acquisition.recordings.messages import BlockHead
+from acquisition.recordings.reader import Recording
 from core.samples.account import Gap
 from core.units import ns_from_s
 

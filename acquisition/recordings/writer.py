@@ -14,21 +14,23 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.inversion import raw_of
-from acquisition.recordings.limits import BLOCKS_PER_GROUP, MAX_SAMPLES, ROWS_PER_GROUP
 from acquisition.recordings.manifest import (
     BLOCKS,
+    BLOCKS_PER_GROUP,
     FORMAT,
     MANIFEST,
+    MAX_SAMPLES,
+    ROWS_PER_GROUP,
     SAMPLES,
     VERSION,
     Manifest,
+    Progress,
     RecordedFile,
     RecordedUnit,
     SampleType,
     manifest_text,
     start_text,
 )
-from acquisition.recordings.progress import Progress
 from acquisition.recordings.tables import (
     blocks_table,
     blocks_writer,

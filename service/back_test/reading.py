@@ -7,7 +7,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from acquisition.recordings.confined import ReadingProcess, reading_process
+from acquisition.recordings.confined import ConfinedProcess, confined_process
 from core.baseline.history_rows import BearingRows, Place, histories_from_columns
 from service.back_test.child import WRONG_FILE
 from service.back_test.coded import Gathered
@@ -51,7 +51,7 @@ def read_histories(
 
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
-    with reading_process("service.back_test.child", path, _ENVIRONMENT) as process:
+    with confined_process("service.back_test.child", path, _ENVIRONMENT) as process:
         try:
             gathered = _gathered(process, word, advanced)
         except (pa.ArrowException, OSError):
@@ -61,8 +61,8 @@ def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mappin
         return gathered.columns()
 
 
-def _gathered(process: ReadingProcess, word: str, advanced: Callable[[int], object]) -> Gathered:
-    reader = pa.ipc.open_stream(process.found)
+def _gathered(process: ConfinedProcess, word: str, advanced: Callable[[int], object]) -> Gathered:
+    reader = pa.ipc.open_stream(process.output)
     gathered, before = Gathered(reader.schema, word), 0
     try:
         while True:
@@ -75,6 +75,6 @@ def _gathered(process: ReadingProcess, word: str, advanced: Callable[[int], obje
         return gathered
 
 
-def _why(process: ReadingProcess) -> str:
+def _why(process: ConfinedProcess) -> str:
     words = process.last_words()
     return words if process.exit_code() == WRONG_FILE else f"not readable: {words}"

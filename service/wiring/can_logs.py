@@ -7,7 +7,7 @@ from acquisition.can.settings import CanSettings
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.frames import FrameBatch
+from acquisition.recordings.messages import FrameBatch
 from service.conversion import calibration_of
 from service.settings.can import CanSettings as CanSourceSettings
 from service.settings.units import UnitSettings
@@ -37,7 +37,7 @@ class CanLogDecoder:
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: FrameBatch) -> list[RawBlock]:
-        """Decode frames; see :class:`acquisition.recordings.frames.FrameDecoder`.
+        """Decode frames; see :class:`acquisition.recordings.messages.FrameDecoder`.
 
         Raises
         ------

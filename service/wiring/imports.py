@@ -9,7 +9,6 @@ from pathlib import Path
 from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.frames import FrameDecoder
 from acquisition.recordings.imports.job import (
     ChannelColumn,
     CsvLayout,
@@ -20,7 +19,8 @@ from acquisition.recordings.imports.job import (
 )
 from acquisition.recordings.imports.units import slow_conversion, waveform_factor
 from acquisition.recordings.manifest import Manifest, read_manifest
-from acquisition.recordings.reading import Reading, reading
+from acquisition.recordings.messages import FrameDecoder
+from acquisition.recordings.reading import ImportReader, import_reader
 from acquisition.recordings.writer import RecordingWriter
 from service.conversion import calibration_of
 from service.settings.import_mapping import (
@@ -93,7 +93,7 @@ def import_recording(
     decoder = None if job.channels else log_decoder_of(unit)
     if not job.channels and decoder is None:
         raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is needed')
-    with reading(path, job) as found:
+    with import_reader(path, job) as found:
         blocks = _decoded(found, decoder, job.block_samples) if decoder else found.blocks()
         first = next(blocks, None)
         if first is None:
@@ -105,7 +105,7 @@ def import_recording(
     return read_manifest(folder)
 
 
-def _decoded(found: Reading, decoder: FrameDecoder, block_samples: int) -> Iterator[RawBlock]:
+def _decoded(found: ImportReader, decoder: FrameDecoder, block_samples: int) -> Iterator[RawBlock]:
     grid = BlockGrid(block_samples)
     for frames in found.frames():
         for block in decoder.take(frames):

@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
 from acquisition.recordings.imports.job import ImportJob, Place
 from acquisition.recordings.imports.series import SeriesTable
-from acquisition.recordings.imports.times import TimeArray
+from acquisition.recordings.imports.times import TimeArray, library
 
 UNIT_ATTRIBUTES = ("unit", "units")
 PER_COUNT_ATTRIBUTE = "unit_per_count"

@@ -7,10 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
 from acquisition.recordings.imports.job import ImportJob, Place
 from acquisition.recordings.imports.series import SeriesTable, require_one
-from acquisition.recordings.imports.times import TimeArray, utc_ns
+from acquisition.recordings.imports.times import TimeArray, library, utc_ns
 
 _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1

@@ -1,4 +1,4 @@
-"""`Rows`: what every reader makes of its file, and the blocks that come of them."""
+"""Rows of a file to blocks: time stamps to uniform stretches, exact gaps and restarts."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -10,9 +10,23 @@ from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.imports.stretches import Indexer, Stretch
 from acquisition.recordings.imports.times import TimeArray
 from core.arrays import FloatArray, RawArray
+from core.units import NS_PER_S
+
+_PIECE = 512
+"""Rows that are laid on one straight line: short against the drift of a sampling clock."""
+
+_FIRST_ROWS = 64
+_FOLLOWED_ROWS = 256
+"""Over how many rows the line follows the stamps: longer than their jitter, shorter than drift."""
+
+_GAP_STEP = 1.5
+
+_MEDIAN_STEP = (0.6, 1.4)
+"""In samples: what most steps are at the right rate, even where stamps are coarse."""
+
+_MIN_STEPS = 16
 
 
 @dataclass(frozen=True)
@@ -52,6 +66,124 @@ class Table(Protocol):
     def rows(self) -> Iterator[Rows]:
         """All rows; raises ConfigError where the file is not what it should be."""
         ...
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rows that follow each other without a gap, and the index of the first of them."""
+
+    start: int
+    stop: int
+    epoch: int
+    first_index: int
+
+
+class Indexer:
+    """Gives rows their sample index by their time, at the rate of the unit.
+
+    A line of constant rate is laid through the stamps, and follows the drift of the clock that made
+    them. A step off the line by a whole number of samples is a gap of just so many; one by a part
+    of a sample, after a pause, is a restart of the device: a new epoch. Everything else, another
+    rate too, is refused. Nothing is ever interpolated.
+
+    Parameters
+    ----------
+    tolerance
+        How far a stamp may be from its place on the line, in samples.
+    """
+
+    def __init__(self, rate_hz: float, tolerance: float) -> None:
+        self._period_ns = NS_PER_S / rate_hz
+        self._rate_hz = rate_hz
+        self._tolerance = tolerance
+        self._row = 0
+        self._epoch = 0
+        self._next_index = 0
+        self._expected_ns: float | None = None
+        self._origin_ns = 0
+        self._last_ns = 0
+
+    def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
+        """Go through the next rows; rows of a stretch are counted from the first of these.
+
+        Raises
+        ------
+        ConfigError
+            If time goes back, is irregular, or goes on at another rate; the message has the row.
+        """
+        start = 0
+        while start < len(times_ns):
+            if self._expected_ns is None:
+                self._lay_line(times_ns[start : start + _FIRST_ROWS])
+            piece = times_ns[start : start + _PIECE]
+            n_fit = self._n_fitting(piece)
+            if n_fit:
+                yield Stretch(start, start + n_fit, self._epoch, self._next_index)
+                self._pass(piece[:n_fit])
+                start += n_fit
+            if n_fit < len(piece):
+                self._step(int(times_ns[start]), piece)
+
+    def _lay_line(self, piece: TimeArray) -> None:
+        """Through the middle of the first stamps: gaps are whole, so that only parts matter."""
+        self._origin_ns, self._expected_ns = int(piece[0]), 0.0
+        turns = np.exp(2j * np.pi * self._deviations(piece))
+        self._expected_ns = float(np.angle(turns.mean())) / (2 * np.pi) * self._period_ns
+
+    def _deviations(self, piece: TimeArray) -> np.ndarray:
+        """In samples, from the line."""
+        since_ns = (piece - self._origin_ns).astype(np.float64) - (self._expected_ns or 0.0)
+        return np.asarray(since_ns / self._period_ns - np.arange(len(piece)))
+
+    def _n_fitting(self, piece: TimeArray) -> int:
+        off = np.abs(self._deviations(piece)) > self._tolerance
+        self._require_rate(piece)
+        return int(off.argmax()) if off.any() else len(piece)
+
+    def _pass(self, piece: TimeArray) -> None:
+        gain = len(piece) / (len(piece) + _FOLLOWED_ROWS)
+        off_ns = float(self._deviations(piece).mean()) * self._period_ns
+        ahead_ns = (self._expected_ns or 0.0) + len(piece) * self._period_ns + gain * off_ns
+        moved = int(piece[-1]) - self._origin_ns
+        self._origin_ns, self._expected_ns = int(piece[-1]), ahead_ns - moved
+        self._last_ns = int(piece[-1])
+        self._next_index += len(piece)
+        self._row += len(piece)
+
+    def _step(self, time_ns: int, piece: TimeArray) -> None:
+        """Go over a gap or a restart to the row at this time."""
+        step = (time_ns - self._last_ns) / self._period_ns
+        if step <= 0:
+            raise ConfigError(f"row {self._row + 1}: time goes back by {-step:.3f} samples")
+        off = float(self._deviations(np.array([time_ns], dtype=np.int64))[0])
+        n_missing = round(off)
+        is_whole = abs(off - n_missing) <= self._tolerance
+        in_one_step = abs(step - 1 - n_missing) <= 2 * self._tolerance
+        if step < _GAP_STEP or not in_one_step or n_missing < 1:
+            raise self._irregular(piece, f"a stamp {off:+.3f} samples off its place")
+        if is_whole:
+            self._next_index += n_missing
+            self._expected_ns = (self._expected_ns or 0.0) + n_missing * self._period_ns
+        else:
+            self._epoch, self._next_index = self._epoch + 1, 0
+            self._expected_ns = None
+
+    def _require_rate(self, piece: TimeArray) -> None:
+        """Refuse another rate before its every step is taken for a gap."""
+        steps = np.diff(piece) / self._period_ns
+        if len(steps) >= _MIN_STEPS or (self._row == 0 and len(steps) > 1):
+            low, high = _MEDIAN_STEP
+            if not low <= float(np.median(steps)) <= high:
+                raise self._irregular(piece, f"a step of {np.median(steps):.4g} samples")
+
+    def _irregular(self, piece: TimeArray, what: str) -> ConfigError:
+        steps = np.diff(piece)
+        plain = steps[(steps > 0) & (steps <= 2 * np.median(steps))] if len(steps) else steps
+        found = f"; there they come at {NS_PER_S / plain.mean():.6g} Hz" if len(plain) else ""
+        return ConfigError(
+            f"row {self._row + 1}: {what} where samples at {self._rate_hz:.9g} Hz are needed"
+            f"{found}; padwatch does not resample"
+        )
 
 
 class _Hold:

@@ -1,5 +1,6 @@
 """Files whose columns can be read from anywhere: one way to rows for HDF5, TDMS and MDF."""
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
@@ -7,15 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.job import ImportJob, Place, SlowColumn
+from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, SlowColumn
 from acquisition.recordings.imports.rows import Rows, SlowValues
-from acquisition.recordings.imports.scaling import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
 from acquisition.recordings.imports.units import require_unit
-from core.arrays import RawArray
+from core.arrays import RawArray, SampleArray
 
 MAX_SAMPLES = 2**29
 """Per channel, as in a recording."""
+
+_SAME_GAIN = 1e-6
+"""Gains that differ by less come from rounding in files; 24 bits cannot tell them apart."""
 
 _ROWS = 65_536
 _SLOW_ROWS = 4096
@@ -205,3 +208,35 @@ def require_one(found: Sequence[Any], place: Place, known: Sequence[str]) -> Any
         names = ", ".join(known[:12])[:300]
         raise ConfigError(f"column {str(place)[:200]!r} is {words}; the file has {names}")
     return found[0]
+
+
+def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
+    """Whether all columns have counts, with just the gain of their channel's calibration.
+
+    Parameters
+    ----------
+    per_count
+        Unit of the file per count of each column by the file itself; None if it does not say.
+    """
+    return all(
+        gain is not None
+        and math.isclose(gain * c.factor, c.calibrated_per_count, rel_tol=_SAME_GAIN)
+        for c, gain in (
+            (c, found or c.per_count) for c, found in zip(job.channels, per_count, strict=True)
+        )
+    )
+
+
+def engineering_units(
+    values: npt.NDArray[np.generic], channel: ChannelColumn, per_count: float | None
+) -> SampleArray:
+    """Values of a column in the unit of its channel; integers that are counts are scaled.
+
+    Parameters
+    ----------
+    per_count
+        As in :func:`counts_are_kept`.
+    """
+    gain = channel.factor * (per_count or channel.per_count or 1.0)
+    with np.errstate(over="ignore"):  # beyond float32 is infinite, and so not finite
+        return (values.astype(np.float64) * gain).astype(np.float32)

@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
 from acquisition.recordings.imports.job import ImportJob, Place
 from acquisition.recordings.imports.series import SeriesTable, require_one
-from acquisition.recordings.imports.times import TimeArray, from_start
+from acquisition.recordings.imports.times import TimeArray, from_start, library
 
 _EPOCH_1904_S = -2_082_844_800
 _UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")

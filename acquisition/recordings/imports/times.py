@@ -1,5 +1,6 @@
-"""Time as files have it, to UTC nanoseconds in whole microseconds."""
+"""Times of files to UTC nanoseconds in whole microseconds; libraries that are optional."""
 
+import importlib
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Any
 
@@ -96,3 +97,17 @@ def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArra
     """Times of the samples from one index to another, without a gap."""
     number = np.arange(first, stop, dtype=np.float64)
     return utc_ns(np.floor(number * (1e6 / rate_hz)).astype(np.int64), start_ns)
+
+
+def library(name: str, what: str) -> Any:
+    """Import a library that not every installation has.
+
+    Raises
+    ------
+    ConfigError
+        If this one has not.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise ConfigError(f"{what} needs {name}: pip install 'padwatch[imports]'") from error

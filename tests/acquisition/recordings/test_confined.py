@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
+from acquisition.recordings.imports.times import library
 
 CONFINED = """
 import resource

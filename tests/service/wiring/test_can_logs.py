@@ -14,7 +14,7 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import FeedEndedError, RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.reading import reading
+from acquisition.recordings.reading import import_reader
 from acquisition.simulated.devices.can_dbc import daq_dbc, daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_frames import WireFrame
@@ -65,7 +65,7 @@ def test_every_sample_flag_and_stamp_comes_back(
     settings: CanSettings = daq_settings(shape, link, ("um", "um"))
     decoder = CanLogDecoder(settings, counts_calibration())
     job = ImportJob(format=kind, rate_hz=600.0, time=TimeAxis("file", 0))
-    with reading(tmp_path / "log", job) as found:
+    with import_reader(tmp_path / "log", job) as found:
         raws = [raw for frames in found.frames() for raw in decoder.take(frames)]
     assert on_grid(raws) == on_grid(feed.sent)
 
@@ -87,7 +87,7 @@ def test_a_log_of_two_devices_under_the_same_ids_is_refused(
     link = CanLinkSettings(interface="virtual", channel="none")
     decoder = CanLogDecoder(daq_settings(shape, link, ("um", "um")), counts_calibration())
     job = ImportJob(format="candump", rate_hz=600.0, time=TimeAxis("file", 0))
-    with reading(tmp_path / "log", job) as found:
+    with import_reader(tmp_path / "log", job) as found:
         every_batch = map(decoder.take, found.frames())
         with pytest.raises(ConfigError, match="do two devices send the same ids"):
             list(every_batch)

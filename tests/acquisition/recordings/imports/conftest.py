@@ -1,78 +1,19 @@
 """A run of two waveform channels and a slow one, and jobs that read it back."""
 
-import gc
-import sys
-import tempfile
-import traceback
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
 from acquisition.delivery.raw import RawBlock
-from acquisition.recordings import reading as reading_module
-from acquisition.recordings.child import answer
-from acquisition.recordings.confined import printable
 from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
-from acquisition.recordings.reading import reading
+from acquisition.recordings.reading import import_reader
 
 START_NS = 1_767_225_600_000_000_000
 PER_COUNT = 12.0 / 32768 * 250.0
-
-
-class _ReadingHere:
-    """Stands in for the reading process, and for its pipes: reads as soon as the job is closed."""
-
-    def __init__(self, path: Path, found: IO[bytes]) -> None:
-        self._path, self.found = path, found
-        self._job, self._last_words = b"", ""
-
-    @property
-    def job(self) -> "_ReadingHere":
-        return self
-
-    def write(self, job: bytes) -> None:
-        self._job += job
-
-    def close(self) -> None:
-        gc.freeze()  # only what the reader leaves behind is collected below
-        try:
-            with _without_warnings():
-                self._answer()
-                gc.collect()
-        finally:
-            gc.unfreeze()
-        self.found.seek(0)
-
-    def _answer(self) -> None:
-        try:
-            answer(self._path, TypeAdapter(ImportJob).validate_json(self._job), self.found)
-        except Exception as error:  # as the end of a process
-            self._last_words = traceback.format_exception_only(error)[-1].strip()
-
-    def last_words(self) -> str:
-        return printable(self._last_words)
-
-
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """A process that has read its file ends without closing it, and without a test to fail."""
-    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
-        warnings.simplefilter("ignore")
-        patch.setattr(sys, "unraisablehook", lambda _: None)
-        yield
-
-
-@contextmanager
-def _reads_here(_module: str, path: Path, _environment: object) -> Iterator[_ReadingHere]:
-    with tempfile.TemporaryFile() as found:
-        yield _ReadingHere(path.absolute(), found)
 
 
 @pytest.fixture
@@ -81,9 +22,9 @@ def confined() -> None:
 
 
 @pytest.fixture(autouse=True)
-def _reading_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def _reading_process(request: pytest.FixtureRequest) -> None:
     if "confined" not in request.fixturenames:
-        monkeypatch.setattr(reading_module, "reading_process", _reads_here)
+        request.getfixturevalue("reads_here")
 
 
 @dataclass(frozen=True)
@@ -151,7 +92,7 @@ class Found:
 @pytest.fixture
 def read() -> Callable[[Path, ImportJob], Found]:
     def read_all(path: Path, job: ImportJob) -> Found:
-        with reading(path, job) as found:
+        with import_reader(path, job) as found:
             return Found(found.sample_type, list(found.blocks()))
 
     return read_all

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.frames import FrameBatch
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.reading import reading
+from acquisition.recordings.messages import FrameBatch
+from acquisition.recordings.reading import import_reader
 
 START_S = 1_767_225_600
 WRITERS = {"candump": can.CanutilsLogWriter, "blf": can.BLFWriter}
@@ -46,7 +46,7 @@ def messages(n: int = 20_000) -> list[can.Message]:
 
 
 def all_frames(path: Path, job: ImportJob) -> list[FrameBatch]:
-    with reading(path, job) as found:
+    with import_reader(path, job) as found:
         return list(found.frames())
 
 
@@ -109,17 +109,17 @@ def test_like_frames_of_two_buses_are_never_mixed(
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (["(1.0) can0 12345678901#00"], "line 1: .* is no frame"),
-        (["(1.0) can0 123#00", "(1.0) can0 FFFFFFFF#00"], "frame 2: id .* cannot have been on a"),
+        (["(1.0) can0 12345678901#00"], "line 1: .* is not a frame"),
+        (["(1.0) can0 123#00", "(1.0) can0 FFFFFFFF#00"], "line 2: .* is not a frame"),
         (["(1.0) can0 800#00"], "frame 1: id 0x800, length 1, 1 bytes of data cannot"),
         (["(1.0) can0 123#000102030405060708"], "9 bytes of data cannot have been on a bus"),
         (["(1.0) can0 123##1" + "00" * 63], "63 bytes of data cannot have been on a bus"),
-        (["(1.0) can0 123#0"], "line 1: .* is no frame"),
-        (["(nan) can0 123#00"], "line 1: .* is no frame"),
+        (["(1.0) can0 123#0"], "line 1: .* is not a frame"),
+        (["(nan) can0 123#00"], "line 1: .* is not a frame"),
         (["(999999999999.0) can0 123#00"], "is no time"),
-        (["(1.0) can0 123#00" * 1000], "line 1: .* is no frame"),
-        (["\x00\x01\x02"], "line 1: .* is no frame"),
-        (["(1.0) can0 123#" + "zz"], "line 1: .* is no frame"),
+        (["(1.0) can0 123#00" * 1000], "line 1: .* is not a frame"),
+        (["\x00\x01\x02"], "line 1: .* is not a frame"),
+        (["(1.0) can0 123#" + "zz"], "line 1: .* is not a frame"),
     ],
 )
 def test_frames_that_were_on_no_bus_are_refused(

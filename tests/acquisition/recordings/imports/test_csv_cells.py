@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import CsvLayout, ImportJob, Place, TimeAxis
-from acquisition.recordings.imports.stretches import Indexer, Stretch
+from acquisition.recordings.imports.rows import Indexer, Stretch
 
 ReadText = Callable[..., Any]
 START_NS = 1_767_225_600_000_000_000

@@ -16,7 +16,7 @@ from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.reading import reading
+from acquisition.recordings.reading import import_reader
 
 SINCE_S = np.arange(600) / 600.0
 NAMES = ("time", "shaft x", "shaft y")
@@ -86,7 +86,7 @@ def job_for(job: ImportJob) -> Callable[[str], ImportJob]:
 
 
 def read_all(path: Path, job: ImportJob) -> int:
-    with reading(path, job) as found:
+    with import_reader(path, job) as found:
         if job.channels:
             return sum(block.n_samples for block in found.blocks())
         return sum(len(batch.times_ns) for batch in found.frames())
