@@ -22,11 +22,12 @@ from acquisition.recordings import tables  # loaded once, before the forks
 from acquisition.recordings.confined import confine, memory_in_use_bytes
 from acquisition.recordings.imports.can_log import read_frames
 from acquisition.recordings.imports.csv_file import CsvTable
-from acquisition.recordings.imports.hdf5_file import Hdf5Table
+from acquisition.recordings.imports.hdf5_file import Hdf5File
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.imports.mdf_file import MdfTable
+from acquisition.recordings.imports.mdf_file import MdfFile
 from acquisition.recordings.imports.rows import Table, raw_blocks
-from acquisition.recordings.imports.tdms_file import TdmsTable
+from acquisition.recordings.imports.series import SeriesTable
+from acquisition.recordings.imports.tdms_file import TdmsFile
 from acquisition.recordings.manifest import (
     BLOCKS,
     BLOCKS_PER_GROUP,
@@ -48,9 +49,9 @@ _LOG_BYTES = 1_000_000
 
 _TABLES: Mapping[str, Callable[[Path, ImportJob], Table]] = {
     "csv": CsvTable,
-    "hdf5": Hdf5Table,
-    "tdms": TdmsTable,
-    "mdf4": MdfTable,
+    "hdf5": lambda path, job: SeriesTable(Hdf5File(path), job),
+    "tdms": lambda path, job: SeriesTable(TdmsFile(path), job),
+    "mdf4": lambda path, job: SeriesTable(MdfFile(path, job), job),
 }
 
 
@@ -115,13 +116,10 @@ def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
 def _import(path: Path, request: Mapping[str, Any]) -> Iterator[Message]:
     job = TypeAdapter(ImportJob).validate_python(request["job"])
     if job.format in ("candump", "blf"):
-        yield {"kind": "start", "sample_type": ""}, b""
         for batch, done in read_frames(path, job):
             yield frames_message(batch, done)
     else:
-        table = _TABLES[job.format](path, job)
-        yield {"kind": "start", "sample_type": table.sample_type}, b""
-        for block, done in raw_blocks(table.rows(), job):
+        for block, done in raw_blocks(_TABLES[job.format](path, job).rows(), job):
             yield block_message(block, done)
 
 

@@ -6,8 +6,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -15,7 +15,12 @@ _LOG_BYTES_SHOWN = 4000
 
 
 class ConfinedProcess:
-    """A Python module that runs in a child process; see :func:`confined_process`.
+    """Child process ``python -m module arguments``; to be closed.
+
+    Parameters
+    ----------
+    environment
+        Added to the environment of this process.
 
     Raises
     ------
@@ -83,24 +88,6 @@ class ConfinedProcess:
             with suppress(BrokenPipeError):
                 _piped(pipe).close()
         self._log.close()
-
-
-@contextmanager
-def confined_process(
-    module: str, path: Path, environment: Mapping[str, str]
-) -> Iterator[ConfinedProcess]:
-    """Start ``python -m module path``; leaving the context ends it.
-
-    Parameters
-    ----------
-    environment
-        Added to the environment of this process.
-    """
-    process = ConfinedProcess(module, str(path.absolute()), environment=environment)
-    try:
-        yield process
-    finally:
-        process.close()
 
 
 def confine(memory_bytes: int, cpu_s: int, log_bytes: int) -> None:

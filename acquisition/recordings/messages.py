@@ -1,17 +1,19 @@
 """Messages of the confined child: short JSON heads and plain bytes, never pickled objects."""
 
 import json
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO
 
 import can
 import numpy as np
 import numpy.typing as npt
+from pydantic import BaseModel, NonNegativeInt, ValidationError
 
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.manifest import MAX_BLOCK_SAMPLES
+from acquisition.recordings.manifest import SampleType
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
 
@@ -23,6 +25,9 @@ MAX_DATA = 64
 HEAD_NUMBERS = ("epoch", "first_index", "start_ns", "n_samples", "ok")
 
 Message = tuple[dict[str, Any], bytes]
+
+Frames = npt.NDArray[np.void]
+"""(n,) of `FRAME`, in the order of the log, without error frames and remote requests."""
 
 Rejected = tuple[int, str, int]
 """Row of the block, reason, number of samples."""
@@ -54,9 +59,9 @@ def receive(read: Callable[[int], bytes]) -> Message:
     try:
         head = json.loads(read(n_head))
     except (ValueError, RecursionError) as error:
-        raise ConfigError("a malformed message from the reading process") from error
+        raise _malformed() from error
     if not isinstance(head, dict):
-        raise ConfigError("a malformed message from the reading process")
+        raise _malformed()
     return head, read(n_body)
 
 
@@ -109,7 +114,9 @@ def blocks_message(
         Share of the file that has been read.
     """
     head = {"kind": "blocks", "done": done, "n": len(heads), "rejected": rejected}
-    return head, heads.tobytes() + (b"" if counts is None else np.ascontiguousarray(counts).data)
+    if counts is None:
+        return head, heads.tobytes()
+    return head | {"sample_type": counts.dtype.name}, heads.tobytes() + counts.tobytes()
 
 
 def block_message(block: RawBlock, done: float) -> Message:
@@ -122,11 +129,11 @@ def block_message(block: RawBlock, done: float) -> Message:
 
 @dataclass(frozen=True)
 class BlockLayout:
-    """Shape of the blocks that a child sends."""
+    """Shape of the blocks that a child sends, and the types that their samples may have."""
 
     n_channels: int
     n_slow: int
-    sample_type: str
+    sample_types: tuple[str, ...] = ("int16", "float32")
 
     def heads(self, message: Message) -> tuple[list[BlockHead], bytes]:
         """Heads of the blocks of a message, and the bytes behind them.
@@ -136,12 +143,15 @@ class BlockLayout:
         ConfigError
             If the message is not one of blocks of this layout.
         """
-        head, body = message
-        type_, n_blocks = head_type(self.n_slow), head.get("n")
-        if type(n_blocks) is not int or not 0 <= n_blocks * type_.itemsize <= len(body):
-            raise ConfigError("malformed blocks from the reading process")
-        rejected = _rejections(head.get("rejected"), n_blocks)
-        rows = np.frombuffer(body, type_, n_blocks)
+        head, body, type_ = _blocks_head(message), message[1], head_type(self.n_slow)
+        n_bytes = head.n * type_.itemsize
+        if n_bytes > len(body):
+            raise _malformed()
+        rejected = defaultdict(list)
+        for row, reason, n_rejected in head.rejected:
+            rejected[row].append(Rejection(reason, n_rejected))
+        rows = np.frombuffer(body, type_, head.n)
+        numbers = zip(rows[list(HEAD_NUMBERS)].tolist(), rows["slow"].tolist(), strict=True)
         heads = [
             BlockHead(
                 epoch,
@@ -150,16 +160,14 @@ class BlockLayout:
                 n_samples,
                 tuple(bool(ok >> n & 1) for n in range(max(self.n_channels, ok.bit_length()))),
                 tuple(slow),
-                tuple(rejections),
+                tuple(rejected[row]),
             )
-            for (epoch, first_index, start_ns, n_samples, ok), slow, rejections in zip(
-                rows[list(HEAD_NUMBERS)].tolist(), rows["slow"].tolist(), rejected, strict=True
-            )
+            for row, ((epoch, first_index, start_ns, n_samples, ok), slow) in enumerate(numbers)
         ]
-        return heads, body[n_blocks * type_.itemsize :]
+        return heads, body[n_bytes:]
 
     def blocks(self, message: Message) -> Iterator[tuple[BlockHead, RawArray]]:
-        """Blocks of a message with their samples, (n_channels, n_samples) of `sample_type`.
+        """Blocks of a message with their samples, (n_channels, n_samples).
 
         Raises
         ------
@@ -167,121 +175,77 @@ class BlockLayout:
             As :meth:`heads`, and if the samples are not those of the heads.
         """
         heads, body = self.heads(message)
-        n_samples = [head.n_samples for head in heads]
-        size = np.dtype(self.sample_type).itemsize * self.n_channels
-        if not all(0 < n <= MAX_BLOCK_SAMPLES for n in n_samples) or len(body) != size * sum(
-            n_samples
-        ):
-            raise ConfigError("malformed blocks from the reading process")
-        counts: RawArray = np.frombuffer(body, self.sample_type).reshape(self.n_channels, -1)
+        sample_type, n_samples = _blocks_head(message).sample_type, [h.n_samples for h in heads]
+        n_bytes = np.dtype(sample_type).itemsize * self.n_channels * sum(n_samples)
+        is_possible = sample_type in self.sample_types and min(n_samples, default=0) > 0
+        if not is_possible or len(body) != n_bytes:
+            raise _malformed()
+        counts: RawArray = np.frombuffer(body, dtype=sample_type).reshape(self.n_channels, -1)
         stop = 0
         for head in heads:
             start, stop = stop, stop + head.n_samples
             yield head, counts[:, start:stop]
 
 
-def _rejections(rejected: object, n_blocks: int) -> list[list[Rejection]]:
-    found: list[list[Rejection]] = [[] for _ in range(n_blocks)]
+class _BlocksHead(BaseModel):
+    n: NonNegativeInt
+    rejected: list[Rejected]
+    sample_type: SampleType | None = None
+
+
+def _blocks_head(message: Message) -> _BlocksHead:
     try:
-        for row, reason, n_samples in rejected:  # type: ignore[attr-defined]
-            if type(n_samples) is not int or not isinstance(reason, str) or row < 0:
-                raise ConfigError("malformed blocks from the reading process")
-            found[row].append(Rejection(reason, n_samples))
-    except (TypeError, ValueError, IndexError) as error:
-        raise ConfigError("malformed blocks from the reading process") from error
-    return found
+        return _BlocksHead.model_validate(message[0])
+    except ValidationError as error:
+        raise _malformed() from error
 
 
-@dataclass(frozen=True)
-class FrameBatch:
-    """Data frames in the order of the log; error frames and remote requests are left out.
-
-    Parameters
-    ----------
-    times_ns
-        (n,) int64, UTC.
-    ids
-        (n,) uint32 without flags.
-    extended
-        (n,) bool: whether the id has 29 bits.
-    fd
-        (n,) bool: whether it is a CAN FD frame.
-    lengths
-        (n,) uint8: bytes of data.
-    data
-        (n, 64) uint8, zero behind the length.
-    """
-
-    times_ns: npt.NDArray[np.int64]
-    ids: npt.NDArray[np.uint32]
-    extended: npt.NDArray[np.bool_]
-    fd: npt.NDArray[np.bool_]
-    lengths: npt.NDArray[np.uint8]
-    data: npt.NDArray[np.uint8]
-
-    def messages(self) -> Iterator[can.Message]:
-        """The frames one by one."""
-        data = self.data.tobytes()
-        columns = (self.times_ns, self.ids, self.extended, self.fd, self.lengths)
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
-            yield can.Message(
-                timestamp=time_ns / 1e9,
-                arbitration_id=id_,
-                is_extended_id=extended,
-                is_fd=fd,
-                dlc=length,
-                data=data[n * MAX_DATA : n * MAX_DATA + length],
-            )
-
-
-class FrameDecoder(Protocol):
-    """Makes raw blocks of CAN frames by a DBC file."""
-
-    def take(self, frames: FrameBatch) -> list[RawBlock]:
-        """Decode the next frames of a log.
-
-        Raises
-        ------
-        ConfigError
-            If they cannot be those of the unit.
-        """
-        ...
-
-    def flush(self) -> list[RawBlock]:
-        """Blocks that are left at the end of the log."""
-        ...
-
-
-_FRAME = np.dtype(
+FRAME = np.dtype(
     [
-        ("times_ns", "<i8"),
-        ("ids", "<u4"),
+        ("time_ns", "<i8"),
+        ("id", "<u4"),
         ("extended", "?"),
         ("fd", "?"),
-        ("lengths", "u1"),
+        ("length", "u1"),
         ("data", "u1", (MAX_DATA,)),
     ]
 )
+"""A CAN data frame: time in UTC, id without flags and whether it has 29 bits, CAN FD or classic,
+length of the data; the data are zero behind that."""
 
 
-def frames_message(frames: FrameBatch, done: float) -> Message:
-    """Frames as a message."""
-    rows = np.zeros(len(frames.times_ns), _FRAME)
-    for name, column in vars(frames).items():
-        rows[name] = column
-    return {"kind": "frames", "done": done}, rows.tobytes()
+def frames_message(frames: Frames, done: float) -> Message:
+    """Frames as a message; `done` is the share of the file that has been read."""
+    return {"kind": "frames", "done": done}, frames.tobytes()
 
 
-def frames_of(message: Message) -> FrameBatch:
+def frames_of(message: Message) -> Frames:
     """The frames of a message.
 
     Raises
     ------
     ConfigError
-        If it is not one of frames.
+        If it is malformed.
     """
-    if len(message[1]) % _FRAME.itemsize:
-        raise ConfigError("malformed frames from the reading process")
-    rows = np.frombuffer(message[1], _FRAME)
-    return FrameBatch(**{name: rows[name] for name in _FRAME.names or ()})
+    if len(message[1]) % FRAME.itemsize:
+        raise _malformed()
+    return np.frombuffer(message[1], FRAME)
+
+
+def can_messages(frames: Frames) -> Iterator[can.Message]:
+    """The frames one by one."""
+    rows = frames[["time_ns", "id", "extended", "fd", "length"]].tolist()
+    data = frames["data"].tobytes()
+    for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
+        yield can.Message(
+            timestamp=time_ns / 1e9,
+            arbitration_id=id_,
+            is_extended_id=extended,
+            is_fd=fd,
+            dlc=length,
+            data=data[n * MAX_DATA : n * MAX_DATA + length],
+        )
+
+
+def _malformed() -> ConfigError:
+    return ConfigError("a malformed message from the reading process")

@@ -3,7 +3,6 @@
 import hashlib
 import stat
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from acquisition.recordings.manifest import (
     read_manifest,
 )
 from acquisition.recordings.messages import BlockHead, BlockLayout, Message
-from acquisition.recordings.reading import confined_reader
+from acquisition.recordings.reading import confined_messages
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,9 @@ class Recording:
             If a file cannot be read any more.
         """
         stop_block = self.manifest.n_blocks if stop_block is None else stop_block
-        with self._messages(first_block, stop_block, with_samples=True) as messages:
-            for message in messages:
-                for head, counts in self._layout.blocks(message):
-                    yield head.raw(self.manifest.rate_hz, counts)
+        for message in self._messages(first_block, stop_block, with_samples=True):
+            for head, counts in self._layout.blocks(message):
+                yield head.raw(self.manifest.rate_hz, counts)
 
     def heads(self) -> Iterator[BlockHead]:
         """All blocks without their samples.
@@ -54,9 +52,8 @@ class Recording:
         ConfigError
             If the file cannot be read any more.
         """
-        with self._messages(0, self.manifest.n_blocks, with_samples=False) as messages:
-            for message in messages:
-                yield from self._layout.heads(message)[0]
+        for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
+            yield from self._layout.heads(message)[0]
 
     def require_lengths(self) -> None:
         """Go through the blocks without their samples: each must be possible, all must add up.
@@ -79,16 +76,12 @@ class Recording:
     @property
     def _layout(self) -> BlockLayout:
         found = self.manifest
-        return BlockLayout(len(found.channels), len(found.slow_channels), found.sample_type)
+        return BlockLayout(len(found.channels), len(found.slow_channels), (found.sample_type,))
 
-    @contextmanager
-    def _messages(
-        self, first: int, stop: int, *, with_samples: bool
-    ) -> Iterator[Iterator[Message]]:
+    def _messages(self, first: int, stop: int, *, with_samples: bool) -> Iterator[Message]:
         request = {"first": first, "stop": stop, "samples": with_samples}
         manifest = {"manifest": self.manifest.model_dump(mode="json")}
-        with confined_reader(self.folder, "recording", request | manifest) as reader:
-            yield reader.messages("blocks")
+        return confined_messages(self.folder, "recording", "blocks", request | manifest)
 
     def _past(self, progress: Progress, head: BlockHead, place: str) -> Progress:
         if len(head.ok) > len(self.manifest.channels):

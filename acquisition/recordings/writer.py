@@ -2,8 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -90,7 +89,7 @@ class RecordingWriter:
                 f"{self._aside}: is there already: being written, or left by a program that was"
                 " killed; delete it then"
             )
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             self._aside.mkdir()
             self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
 
@@ -142,7 +141,7 @@ class RecordingWriter:
         self._counts.append(raw.counts)
         self._n_waiting += n_samples
         self._blocks.append(raw)
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             if self._n_waiting >= ROWS_PER_GROUP:
                 self._write_counts(ROWS_PER_GROUP)
             if len(self._blocks) >= BLOCKS_PER_GROUP:
@@ -172,7 +171,7 @@ class RecordingWriter:
         if self.n_blocks == 0:
             self.abandon()
             raise ConfigError(f"{self._folder}: no samples arrived, nothing was recorded")
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             self._write_counts(self._n_waiting)
             self._write_blocks()
             self._close()
@@ -193,9 +192,12 @@ class RecordingWriter:
         ConfigError
             If the disk refuses.
         """
-        with suppress(ConfigError), self._renamed_errors():  # a full disk may refuse the footer
+        with (
+            suppress(ConfigError),
+            foreign_errors_of(self._aside),
+        ):  # a full disk may refuse the footer
             self._close()
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             for name in (SAMPLES, BLOCKS, MANIFEST):
                 (self._aside / name).unlink(missing_ok=True)
             self._aside.rmdir()
@@ -234,19 +236,13 @@ class RecordingWriter:
             n_blocks=self.n_blocks,
             n_samples=self.n_samples,
             files={
-                SAMPLES: recorded_file(self._aside / SAMPLES),
-                BLOCKS: recorded_file(self._aside / BLOCKS),
+                SAMPLES: _recorded_file(self._aside / SAMPLES),
+                BLOCKS: _recorded_file(self._aside / BLOCKS),
             },
         )
 
-    @contextmanager
-    def _renamed_errors(self) -> Iterator[None]:
-        with foreign_errors_of(self._aside):
-            yield
 
-
-def recorded_file(path: Path) -> RecordedFile:
-    """Size and checksum of a file."""
+def _recorded_file(path: Path) -> RecordedFile:
     with path.open("rb") as file:
         return RecordedFile(
             size=os.fstat(file.fileno()).st_size,

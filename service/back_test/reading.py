@@ -2,12 +2,13 @@
 
 import stat
 from collections.abc import Callable, Collection, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
-from acquisition.recordings.confined import ConfinedProcess, confined_process
+from acquisition.recordings.confined import ConfinedProcess
 from core.baseline.history_rows import BearingRows, Place, histories_from_columns
 from service.back_test.child import WRONG_FILE
 from service.back_test.coded import Gathered
@@ -51,7 +52,8 @@ def read_histories(
 
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
-    with confined_process("service.back_test.child", path, _ENVIRONMENT) as process:
+    module, file = "service.back_test.child", str(path.absolute())
+    with closing(ConfinedProcess(module, file, environment=_ENVIRONMENT)) as process:
         try:
             gathered = _gathered(process, word, advanced)
         except (pa.ArrowException, OSError):

@@ -7,7 +7,7 @@ from acquisition.can.settings import CanSettings
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.messages import FrameBatch
+from acquisition.recordings.messages import Frames, can_messages
 from service.conversion import calibration_of
 from service.settings.can import CanSettings as CanSourceSettings
 from service.settings.units import UnitSettings
@@ -36,8 +36,8 @@ class CanLogDecoder:
         )
         self._gate = FrameGate(plan, self._assembler.refused)
 
-    def take(self, frames: FrameBatch) -> list[RawBlock]:
-        """Decode frames; see :class:`acquisition.recordings.messages.FrameDecoder`.
+    def take(self, frames: Frames) -> list[RawBlock]:
+        """Decode the next frames of a log.
 
         Raises
         ------
@@ -45,17 +45,13 @@ class CanLogDecoder:
             If they cannot all be those of one device.
         """
         blocks: list[RawBlock] = []
-        for time_ns, message in zip(frames.times_ns.tolist(), frames.messages(), strict=True):
+        for time_ns, message in zip(frames["time_ns"].tolist(), can_messages(frames), strict=True):
             frame = self._gate.admit(message)
             if frame is not None:
                 blocks += self._assembler.take([frame], time_ns)
         if self._assembler.trouble:
             raise ConfigError(self._assembler.trouble)
         return blocks
-
-    def flush(self) -> list[RawBlock]:
-        """Frames of a sample that never became complete are nothing."""
-        return []
 
 
 def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:

@@ -13,7 +13,7 @@ from can.io.blf import BLFParseError
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.csv_file import CUT_OFF
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.messages import MAX_DATA, FrameBatch
+from acquisition.recordings.messages import FRAME, MAX_DATA, Frames
 
 _BATCH = 8192
 _LENGTHS = {*range(9), 12, 16, 20, 24, 32, 48, 64}
@@ -27,7 +27,7 @@ _CANDUMP_LINE = re.compile(
 """python-can takes an id of more than 29 bits for another one, and most error frames for data."""
 
 
-def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]]:
+def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     """Data frames of a log and the share of it that has been read.
 
     candump writes seconds since 1970 in UTC. BLF has the clock of whoever recorded it: its time
@@ -81,7 +81,10 @@ def _blf_frames(stream: BinaryIO) -> Iterator[can.Message]:
     """All frames, error frames included; python-can passes over what it cannot read."""
     size = stream.seek(0, 2)
     stream.seek(0)
-    logging.getLogger("can.io.blf").addHandler(_Refusal())
+    warnings = logging.getLogger("can.io.blf")
+    warnings.disabled = False
+    warnings.setLevel(logging.WARNING)
+    warnings.addHandler(_Refusal())
     reader = _CountingBlfReader(stream)
     if reader.file_size != size:
         raise ConfigError(
@@ -163,18 +166,16 @@ def _require_possible(frame: can.Message, number: int) -> None:
         raise ConfigError(f"frame {number}: {frame.timestamp} s is no time")
 
 
-def _batch(frames: list[can.Message], job: ImportJob) -> FrameBatch:
-    data = np.zeros((len(frames), MAX_DATA), np.uint8)
-    for row, frame in zip(data, frames, strict=True):
-        row[: len(frame.data)] = np.frombuffer(frame.data, np.uint8)
+def _batch(frames: list[can.Message], job: ImportJob) -> Frames:
+    found = np.zeros(len(frames), FRAME)
     # a double of seconds since 1970 is good to a fourth of a microsecond
     us = np.rint(np.array([frame.timestamp for frame in frames]) * 1e6).astype(np.int64)
     offset_s = job.time.utc_offset_s if job.format == "blf" else 0
-    return FrameBatch(
-        times_ns=us * 1000 - offset_s * 1_000_000_000,
-        ids=np.array([frame.arbitration_id for frame in frames], np.uint32),
-        extended=np.array([frame.is_extended_id for frame in frames], np.bool_),
-        fd=np.array([frame.is_fd for frame in frames], np.bool_),
-        lengths=np.array([len(frame.data) for frame in frames], np.uint8),
-        data=data,
-    )
+    found["time_ns"] = us * 1000 - offset_s * 1_000_000_000
+    found["id"] = [frame.arbitration_id for frame in frames]
+    found["extended"] = [frame.is_extended_id for frame in frames]
+    found["fd"] = [frame.is_fd for frame in frames]
+    found["length"] = [len(frame.data) for frame in frames]
+    for row, frame in zip(found["data"], frames, strict=True):
+        row[: len(frame.data)] = np.frombuffer(frame.data, np.uint8)
+    return found

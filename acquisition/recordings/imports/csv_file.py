@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.job import ImportJob, Place
+from acquisition.recordings.imports.job import ColumnName, ImportJob
 from acquisition.recordings.imports.rows import Rows, SlowValues
 from acquisition.recordings.imports.series import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns, text_to_ns
@@ -86,7 +86,7 @@ class CsvTable:
         except csv.Error as error:
             raise self._wrong(str(error)) from error
 
-    def _column(self, place: Place) -> int:
+    def _column(self, place: ColumnName) -> int:
         found = [n for n, heading in enumerate(self._headings) if heading == place.name]
         if len(found) != 1:
             words = f"there {len(found)} times" if found else "not there"

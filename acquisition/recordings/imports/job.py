@@ -22,7 +22,7 @@ TimeForm: TypeAlias = Literal[
 
 
 @dataclass(frozen=True)
-class Place:
+class ColumnName:
     """Where a column is.
 
     Parameters
@@ -63,7 +63,7 @@ class TimeAxis:
 
     kind: TimeKind
     utc_offset_s: int
-    place: Place | None = None
+    place: ColumnName | None = None
     form: TimeForm = "elapsed_s"
     start_ns: int | None = None
     tolerance: float = 0.4
@@ -87,7 +87,7 @@ class ChannelColumn:
     """
 
     id: str
-    place: Place
+    place: ColumnName
     unit: str
     factor: float
     calibrated_per_count: float
@@ -105,11 +105,11 @@ class SlowColumn:
     """
 
     id: str
-    place: Place
+    place: ColumnName
     unit: str
     factor: float
     offset: float = 0.0
-    time: Place | None = None
+    time: ColumnName | None = None
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 
 from acquisition.delivery.raw import RawBlock
-from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
-from acquisition.recordings.reading import import_reader
+from acquisition.recordings.imports.job import (
+    ChannelColumn,
+    ColumnName,
+    ImportJob,
+    SlowColumn,
+    TimeAxis,
+)
+from acquisition.recordings.reading import imported_blocks
 
 START_NS = 1_767_225_600_000_000_000
 PER_COUNT = 12.0 / 32768 * 250.0
@@ -64,12 +70,12 @@ def job() -> ImportJob:
     return ImportJob(
         format="csv",
         rate_hz=600.0,
-        time=TimeAxis("column", 0, Place("time"), "elapsed_s", START_NS),
+        time=TimeAxis("column", 0, ColumnName("time"), "elapsed_s", START_NS),
         channels=(
-            ChannelColumn("x", Place("shaft x"), "um", 1.0, PER_COUNT),
-            ChannelColumn("y", Place("shaft y"), "um", 1.0, PER_COUNT),
+            ChannelColumn("x", ColumnName("shaft x"), "um", 1.0, PER_COUNT),
+            ChannelColumn("y", ColumnName("shaft y"), "um", 1.0, PER_COUNT),
         ),
-        slow=(SlowColumn("oil", Place("oil"), "degC", 1.0, time=Place("oil time")),),
+        slow=(SlowColumn("oil", ColumnName("oil"), "degC", 1.0, time=ColumnName("oil time")),),
     )
 
 
@@ -92,8 +98,8 @@ class Found:
 @pytest.fixture
 def read() -> Callable[[Path, ImportJob], Found]:
     def read_all(path: Path, job: ImportJob) -> Found:
-        with import_reader(path, job) as found:
-            return Found(found.sample_type, list(found.blocks()))
+        blocks = [block for block, _ in imported_blocks(path, job)]
+        return Found(blocks[0].counts.dtype.name, blocks)
 
     return read_all
 
@@ -118,10 +124,12 @@ def placed() -> Callable[[ImportJob, str], ImportJob]:
     def in_groups(job: ImportJob, waveforms: str = "waveforms", slow: str = "slow") -> ImportJob:
         return replace(
             job,
-            time=replace(job.time, place=Place("time", waveforms)),
-            channels=tuple(replace(c, place=Place(c.place.name, waveforms)) for c in job.channels),
+            time=replace(job.time, place=ColumnName("time", waveforms)),
+            channels=tuple(
+                replace(c, place=ColumnName(c.place.name, waveforms)) for c in job.channels
+            ),
             slow=tuple(
-                replace(c, place=Place(c.place.name, slow), time=Place("oil time", slow))
+                replace(c, place=ColumnName(c.place.name, slow), time=ColumnName("oil time", slow))
                 for c in job.slow
             ),
         )

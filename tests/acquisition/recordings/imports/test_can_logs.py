@@ -10,8 +10,8 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.messages import FrameBatch
-from acquisition.recordings.reading import import_reader
+from acquisition.recordings.messages import Frames, can_messages
+from acquisition.recordings.reading import imported_frames
 
 START_S = 1_767_225_600
 WRITERS = {"candump": can.CanutilsLogWriter, "blf": can.BLFWriter}
@@ -45,9 +45,8 @@ def messages(n: int = 20_000) -> list[can.Message]:
     return made
 
 
-def all_frames(path: Path, job: ImportJob) -> list[FrameBatch]:
-    with import_reader(path, job) as found:
-        return list(found.frames())
+def all_frames(path: Path, job: ImportJob) -> list[Frames]:
+    return [batch for batch, _ in imported_frames(path, job)]
 
 
 @pytest.mark.parametrize("kind", WRITERS)
@@ -62,14 +61,14 @@ def test_data_frames_come_back_with_time_to_a_microsecond(
     found = all_frames(tmp_path / "log", log_job(kind))
     sent = [message for message in sent if not message.is_remote_frame]
     assert len(found) == 3
-    columns = ("ids", "extended", "fd", "lengths", "data", "times_ns")
+    columns = ("id", "extended", "fd", "length", "data", "time_ns")
     ids, extended, fd, lengths, data, times_ns = (
-        np.concatenate([getattr(batch, name) for batch in found]) for name in columns
+        np.concatenate([batch[name] for batch in found]) for name in columns
     )
     np.testing.assert_array_equal(ids, [m.arbitration_id for m in sent])
     np.testing.assert_array_equal(extended, [m.is_extended_id for m in sent])
     np.testing.assert_array_equal(fd, [m.is_fd for m in sent])
-    again = [message for batch in found for message in batch.messages()]
+    again = [message for batch in found for message in can_messages(batch)]
     assert [bytes(m.data) for m in sent] == [m.data for m in again]
     assert [m.arbitration_id for m in sent] == [m.arbitration_id for m in again]
     np.testing.assert_array_equal(lengths, [len(m.data) for m in sent])
@@ -84,7 +83,7 @@ def test_a_blf_log_is_in_the_zone_of_the_mapping(
     with can.BLFWriter(tmp_path / "log") as log:
         log(messages(8)[0])
     (batch,) = all_frames(tmp_path / "log", log_job("blf", utc_offset_s=-10_800))
-    assert batch.times_ns.tolist() == [(START_S + 10_800) * 10**9]
+    assert batch["time_ns"].tolist() == [(START_S + 10_800) * 10**9]
 
 
 @pytest.mark.parametrize(("kind", "buses"), [("candump", ("can0", "can1")), ("blf", ("1", "2"))])
@@ -101,7 +100,7 @@ def test_like_frames_of_two_buses_are_never_mixed(
         all_frames(tmp_path / "log", job)
     for n, bus in enumerate(buses):
         (batch,) = all_frames(tmp_path / "log", replace(job, bus=bus))
-        assert batch.data[:, 0].tolist() == list(range(n, 100, 2))
+        assert batch["data"][:, 0].tolist() == list(range(n, 100, 2))
     with pytest.raises(ConfigError, match='has no frame of bus "9", but of bus'):
         all_frames(tmp_path / "log", replace(job, bus="9"))
 

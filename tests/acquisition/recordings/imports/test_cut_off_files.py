@@ -16,7 +16,7 @@ from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.reading import import_reader
+from acquisition.recordings.reading import imported_blocks, imported_frames
 
 SINCE_S = np.arange(600) / 600.0
 NAMES = ("time", "shaft x", "shaft y")
@@ -86,10 +86,9 @@ def job_for(job: ImportJob) -> Callable[[str], ImportJob]:
 
 
 def read_all(path: Path, job: ImportJob) -> int:
-    with import_reader(path, job) as found:
-        if job.channels:
-            return sum(block.n_samples for block in found.blocks())
-        return sum(len(batch.times_ns) for batch in found.frames())
+    if job.channels:
+        return sum(block.n_samples for block, _ in imported_blocks(path, job))
+    return sum(len(batch) for batch, _ in imported_frames(path, job))
 
 
 @pytest.mark.parametrize("kind", WRITERS)

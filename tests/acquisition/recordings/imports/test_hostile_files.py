@@ -17,8 +17,8 @@ import pytest
 from rigs.hostile_files import Placed, Read, measured, refusal, write_hdf5
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.job import ImportJob, Place, TimeAxis
-from acquisition.recordings.reading import import_reader
+from acquisition.recordings.imports.job import ColumnName, ImportJob, TimeAxis
+from acquisition.recordings.reading import imported_frames
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: Import
     with nptdms.TdmsWriter(tmp_path / "run") as file:
         for group in ("a", "b"):
             file.write_segment([nptdms.ChannelObject(group, "shaft x", np.zeros(5))])
-    one = replace(job.channels[0], place=Place("shaft x"))
+    one = replace(job.channels[0], place=ColumnName("shaft x"))
     start = TimeAxis("start", 0, start_ns=0)
     both = replace(job, format="tdms", channels=(one,), slow=(), time=start)
     assert "'shaft x' is there 2 times: name its group" in refusal(read, tmp_path / "run", both)
@@ -242,8 +242,7 @@ def write(path: Path, content: bytes, n_objects: int = 100, n_bytes: int | None 
 
 
 def n_frames(path: Path, job: ImportJob) -> int:
-    with import_reader(path, job) as found:
-        return sum(len(batch.times_ns) for batch in found.frames())
+    return sum(len(batch) for batch, _ in imported_frames(path, job))
 
 
 def changed(objects: bytes, number: int, at: int, value: int) -> bytes:
