@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-import can
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, NonNegativeInt, ValidationError
@@ -230,21 +229,6 @@ def frames_of(message: Message) -> Frames:
     if len(message[1]) % FRAME.itemsize:
         raise _malformed()
     return np.frombuffer(message[1], FRAME)
-
-
-def can_messages(frames: Frames) -> Iterator[can.Message]:
-    """The frames one by one."""
-    rows = frames[["time_ns", "id", "extended", "fd", "length"]].tolist()
-    data = frames["data"].tobytes()
-    for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
-        yield can.Message(
-            timestamp=time_ns / 1e9,
-            arbitration_id=id_,
-            is_extended_id=extended,
-            is_fd=fd,
-            dlc=length,
-            data=data[n * MAX_DATA : n * MAX_DATA + length],
-        )
 
 
 def _malformed() -> ConfigError:

@@ -1,5 +1,9 @@
 """Frames of an imported CAN log through the decoder of live ones."""
 
+from collections.abc import Iterator
+
+import can
+
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
@@ -7,7 +11,7 @@ from acquisition.can.settings import CanSettings
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.messages import Frames, can_messages
+from acquisition.recordings.messages import MAX_DATA, Frames
 from service.conversion import calibration_of
 from service.settings.can import CanSettings as CanSourceSettings
 from service.settings.units import UnitSettings
@@ -45,7 +49,7 @@ class CanLogDecoder:
             If they cannot all be those of one device.
         """
         blocks: list[RawBlock] = []
-        for time_ns, message in zip(frames["time_ns"].tolist(), can_messages(frames), strict=True):
+        for time_ns, message in zip(frames["time_ns"].tolist(), _messages(frames), strict=True):
             frame = self._gate.admit(message)
             if frame is not None:
                 blocks += self._assembler.take([frame], time_ns)
@@ -65,3 +69,17 @@ def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
     if not isinstance(unit.source, CanSourceSettings):
         return None
     return CanLogDecoder(can_settings_of(unit, unit.source), calibration_of(unit))
+
+
+def _messages(frames: Frames) -> Iterator[can.Message]:
+    rows = frames[["time_ns", "id", "extended", "fd", "length"]].tolist()
+    data = frames["data"].tobytes()
+    for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
+        yield can.Message(
+            timestamp=time_ns / 1e9,
+            arbitration_id=id_,
+            is_extended_id=extended,
+            is_fd=fd,
+            dlc=length,
+            data=data[n * MAX_DATA : n * MAX_DATA + length],
+        )

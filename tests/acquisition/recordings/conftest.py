@@ -1,24 +1,19 @@
 """A unit of two channels, blocks whose samples are their own numbers, and a recording of them."""
 
-import gc
-import json
+import io
 import math
-import sys
-import tempfile
-import traceback
-import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition.delivery.raw import RawBlock
-from acquisition.recordings import reading
+from acquisition.errors import ConfigError
+from acquisition.recordings import reader
 from acquisition.recordings.child import answer
-from acquisition.recordings.confined import printable
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recordings.messages import Message, receive
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.unit import Measurand
 
@@ -84,51 +79,17 @@ def record(tmp_path: Path, unit: RecordedUnit) -> Callable[..., Path]:
     return recorded
 
 
-class _ReadingHere:
-    """Stands in for the confined process, and for its pipes: reads as soon as it is asked."""
-
-    def __init__(self) -> None:
-        self.input, self.output = self, tempfile.TemporaryFile()  # noqa: SIM115
-        self.close = self.output.close
-        self._request, self._last_words = b"", ""
-
-    def write(self, request: bytes) -> None:
-        self._request += request
-
-    def flush(self) -> None:
-        gc.freeze()  # only what the reader leaves behind is collected below
-        try:
-            with _without_warnings():
-                self._answer()
-                gc.collect()
-        finally:
-            gc.unfreeze()
-        self.output.seek(0)
-
-    def _answer(self) -> None:
-        try:
-            answer(json.loads(self._request), self.output)
-        except Exception as error:  # as the end of a process
-            self._last_words = traceback.format_exception_only(error)[-1].strip()
-
-    def last_words(self) -> str:
-        return printable(self._last_words)
-
-    def exit_code(self) -> int:
-        return 1
-
-
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """A process that has read its file ends without closing it, and without a test to fail."""
-    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
-        warnings.simplefilter("ignore")
-        patch.setattr(sys, "unraisablehook", lambda _: None)
-        yield
-
-
 @pytest.fixture
 def reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Read within the process of the test, where it can change the reader."""
-    monkeypatch.setattr(reading, "_idle_or_new", _ReadingHere)
-    monkeypatch.setattr(reading, "_MAX_IDLE", 0)
+    """Read recordings within the process of the test, where it can change the reader."""
+
+    def messages(path: Path, format_: str, _: str, request: dict[str, object]) -> Iterator[Message]:
+        out = io.BytesIO()
+        answer({"path": str(path), "format": format_} | request, out)
+        out.seek(0)
+        while (message := receive(out.read))[0]["kind"] == "blocks":
+            yield message
+        if message[0]["kind"] == "error":
+            raise ConfigError(message[0]["message"])
+
+    monkeypatch.setattr(reader, "confined_messages", messages)

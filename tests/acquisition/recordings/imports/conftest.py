@@ -22,17 +22,6 @@ START_NS = 1_767_225_600_000_000_000
 PER_COUNT = 12.0 / 32768 * 250.0
 
 
-@pytest.fixture
-def confined() -> None:
-    """Read in a process of its own, as in a plant; the other tests read within their own."""
-
-
-@pytest.fixture(autouse=True)
-def _reading_process(request: pytest.FixtureRequest) -> None:
-    if "confined" not in request.fixturenames:
-        request.getfixturevalue("reads_here")
-
-
 @dataclass(frozen=True)
 class Run:
     """What is in the file: a gap of 37 samples after 500, slow values once a second."""

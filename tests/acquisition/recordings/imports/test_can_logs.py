@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.messages import Frames, can_messages
+from acquisition.recordings.messages import Frames
 from acquisition.recordings.reading import imported_frames
 
 START_S = 1_767_225_600
@@ -50,7 +50,6 @@ def all_frames(path: Path, job: ImportJob) -> list[Frames]:
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-@pytest.mark.usefixtures("confined")
 def test_data_frames_come_back_with_time_to_a_microsecond(
     tmp_path: Path, log_job: Callable[..., ImportJob], kind: str
 ) -> None:
@@ -68,9 +67,6 @@ def test_data_frames_come_back_with_time_to_a_microsecond(
     np.testing.assert_array_equal(ids, [m.arbitration_id for m in sent])
     np.testing.assert_array_equal(extended, [m.is_extended_id for m in sent])
     np.testing.assert_array_equal(fd, [m.is_fd for m in sent])
-    again = [message for batch in found for message in can_messages(batch)]
-    assert [bytes(m.data) for m in sent] == [m.data for m in again]
-    assert [m.arbitration_id for m in sent] == [m.arbitration_id for m in again]
     np.testing.assert_array_equal(lengths, [len(m.data) for m in sent])
     assert data.tobytes() == b"".join(bytes(m.data).ljust(64, b"\0") for m in sent)
     due_us = START_S * 10**6 + 1666 * np.delete(np.arange(20_000), 7)

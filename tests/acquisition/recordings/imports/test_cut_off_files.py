@@ -122,7 +122,6 @@ def test_parts_that_are_missing_at_the_end_are_noticed_at_their_border_too(
 
 @pytest.mark.parametrize("n_damaged", fast_and_long(2, 8))
 @pytest.mark.parametrize("kind", ["tdms", "mdf4", "blf", "hdf5"])
-@pytest.mark.usefixtures("confined")
 def test_any_damage_is_read_or_refused_but_never_more(
     tmp_path: Path, job_for: Callable[[str], ImportJob], kind: str, n_damaged: int
 ) -> None:

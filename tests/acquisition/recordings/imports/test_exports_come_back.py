@@ -94,7 +94,6 @@ JOB = ImportJob(
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
-@pytest.mark.usefixtures("confined")
 def test_every_block_is_the_same_to_the_last_bit(
     recording: Recording, tmp_path: Path, read: Callable[..., Any]
 ) -> None:

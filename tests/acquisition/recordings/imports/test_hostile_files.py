@@ -107,7 +107,6 @@ def test_an_archive_is_not_unpacked(tmp_path: Path, read: Read, job: ImportJob) 
     assert [path.name for path in tmp_path.iterdir()] == ["run.mf4"]
 
 
-@pytest.mark.usefixtures("confined")
 def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
     lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
     (tmp_path / "run").write_bytes(lead + struct.pack("<II", 1, 64) + b"\xff" * 64)
