@@ -1,8 +1,8 @@
 """The confined child: ``python -m acquisition.recordings.child``, requests on standard input.
 
 Each request is a line of JSON. A fork with bounded memory and time that cannot write files answers
-it with :mod:`acquisition.recordings.messages`. Whatever a hostile file does to a library happens
-there, and is over with it.
+it with :mod:`acquisition.recordings.messages`. A hostile file can harm
+that fork only.
 """
 
 import json

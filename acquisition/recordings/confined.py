@@ -116,7 +116,7 @@ def memory_in_use_bytes() -> int:
 
 
 def printable(text: str, max_length: int = 300) -> str:
-    """Text that is safe to print on a terminal, whatever a file has put into it."""
+    """Text without control characters, safe to print on a terminal."""
     return "".join(c if c.isprintable() else "�" for c in text)[:max_length]
 
 

@@ -1,4 +1,4 @@
-"""Recordings as CSV and Parquet: engineering units, UTC, a row for each sample, gaps in sight."""
+"""Recordings as CSV and Parquet: engineering units, UTC, a row for each sample."""
 
 import math
 import os
@@ -32,7 +32,7 @@ UNITS = {
     Measurand.ACCELERATION_M_S2: "m/s2",
     Measurand.KEY_PHASE_V: "V",
 }
-"""Of waveform channels, spelt so that every tool can print them."""
+"""ASCII units of waveform channels."""
 
 _BLOCKS_AT_ONCE = 512
 _OWN = ("time_utc", "epoch", "index")
@@ -40,7 +40,7 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
 class ExportFormat(StrEnum):
-    """What a recording can be exported as."""
+    """File formats of exports."""
 
     CSV = "csv"
     PARQUET = "parquet"
@@ -134,7 +134,7 @@ def parquet_schema(manifest: Manifest) -> Any:
     Raises
     ------
     ConfigError
-        If a channel has the name of a column that is there anyway.
+        If a channel has the name of a column of every export.
     """
     columns = _columns(manifest)
     for id_, _ in columns:

@@ -42,7 +42,7 @@ MAX_SAMPLES = 2**29
 """Per channel: ten days at 600 Hz."""
 
 MAX_INDEX = 2**53
-"""Of a sample, and of an epoch; exact even where numbers are doubles."""
+"""Largest index of a sample and number of an epoch; exact as a double, too."""
 
 MAX_REJECTIONS = 32
 """Reasons for which samples before one block may have been refused."""
@@ -117,7 +117,7 @@ class RecordedUnit(ManifestPart):
 
     @property
     def calibration(self) -> UnitCalibration:
-        """How the samples were read when they were recorded."""
+        """Calibration at the time of the recording."""
         return UnitCalibration(
             unit=self.unit,
             rate_hz=self.rate_hz,
@@ -131,14 +131,14 @@ class RecordedUnit(ManifestPart):
 
 
 class RecordedFile(ManifestPart):
-    """What a file beside the manifest must be."""
+    """Expected size and checksum of a file beside the manifest."""
 
     size: Annotated[int, Field(ge=1, le=2**50)]
     sha256: Sha256
 
 
 class Manifest(RecordedUnit):
-    """All of a manifest.
+    """Contents of ``manifest.json``.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class Manifest(RecordedUnit):
     n_samples
         Per channel.
     checksum
-        SHA-256 of all else in it, so that no number of it changes unnoticed; see `manifest_text`.
+        SHA-256 of all other values, see :func:`checksum_of`.
     """
 
     format: Literal["padwatch-recording"]
@@ -186,7 +186,7 @@ class Progress:
         Raises
         ------
         ConfigError
-            If no device can have delivered it here.
+            If no device can have delivered it at this position.
         """
         if not 1 <= n_samples <= MAX_BLOCK_SAMPLES:
             raise ConfigError(
@@ -217,7 +217,7 @@ def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
 
 
 class _Head(BaseModel):
-    """What every version of the format has."""
+    """Keys of every version of the format."""
 
     format: str
     version: int
@@ -229,7 +229,7 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     ConfigError
-        If there is none, or anything about it is wrong; the message names the first mistake.
+        If there is none, or anything in it is wrong; the message names the first mistake.
     """
     path = folder / MANIFEST
     text = _read(path)
@@ -252,7 +252,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """The manifest as its file has it: what it is comes first, its checksum last."""
+    """Text of the manifest file: format and version first, checksum last."""
     values = manifest.model_dump(mode="json", exclude={"checksum"})
     first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
     checksum = checksum_of(first | values)
@@ -260,13 +260,13 @@ def manifest_text(manifest: Manifest) -> str:
 
 
 def start_text(start_ns: int) -> str:
-    """Time with all its nanoseconds, for people."""
+    """ISO 8601 time with nanoseconds."""
     seconds, ns = divmod(start_ns, NS_PER_S)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{ns:09d}Z"
 
 
 def checksum_of(document: dict[str, object]) -> str:
-    """Of all but the checksum itself, whatever the order and the spaces."""
+    """SHA-256 of all values but the checksum, independent of order and white space."""
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

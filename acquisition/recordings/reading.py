@@ -93,7 +93,7 @@ class _Pipe:
             self._process.input.write(json.dumps(request).encode() + b"\n")
             self._process.input.flush()
         except BrokenPipeError:
-            return  # the log of the child says why
+            return  # the log of the child has the reason
 
     def read(self, n_bytes: int) -> bytes:
         """Exactly this many bytes; raises EOFError if the child ends or falls silent before."""
@@ -151,7 +151,7 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, flo
     Raises
     ------
     ConfigError
-        If there is no such file, or it is not what the job says; one sentence with its path.
+        If there is no such file, or the job does not describe it; one sentence with its path.
     """
     layout = BlockLayout(len(job.channels), len(job.slow))
     for message in _imported(path, job, "blocks"):

@@ -17,7 +17,7 @@ from core.samples.blocks import SampleBlock
 
 @dataclass(frozen=True)
 class Selection:
-    """Columns of a recording in the order in which they are wanted, and how to read them.
+    """Columns of a recording in the order of a unit's channels, and their calibration.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ class Selection:
 
 
 def all_of(recorded: RecordedUnit) -> Selection:
-    """Everything, as it was recorded."""
+    """All columns with the recorded calibration."""
     n_channels, n_slow = len(recorded.channels), len(recorded.slow_channels)
     return Selection(tuple(range(n_channels)), tuple(range(n_slow)), recorded.calibration)
 
 
 def select(recorded: RecordedUnit, unit: Unit, slow_units: Mapping[str, str]) -> Selection:
-    """Find what a unit needs in a recording, read with the calibration of the recording.
+    """Find the channels of a unit in a recording; the calibration is that of the recording.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def _listed(ids: Iterable[str]) -> str:
 
 
 class RecordingSource:
-    """Calibrated blocks of a recording, as fast as they are taken or as they once came.
+    """Calibrated blocks of a recording, as fast as they are taken or at their own pace.
 
-    Paced, the recording runs from the first connection on, connected or not: what passed while
-    nobody was connected is missing, and the sample index jumps. Unpaced, a new connection goes on
-    where the last one stopped. Gaps within an epoch take the time they took; a restart of the
-    device, whose length nobody knows, takes none.
+    A paced recording runs from the first connection on: what passes without a connection is
+    missing, and the sample index jumps. Unpaced, a new connection continues where the last one
+    stopped. Gaps within an epoch take their time; a restart of the device, whose length is not
+    known, takes none.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Packed, then zstd: 6 bits a count where int16 itself takes 11."""
+    """Packed by differences, then zstd: 6 bits a count; int16 alone packs to 11."""
     schema = samples_schema(unit)
     return pq.ParquetWriter(
         path,
@@ -93,7 +93,7 @@ def samples_writer(path: Path, unit: RecordedUnit) -> Any:
 
 
 def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Few and repetitive: dictionaries and zstd; but no dictionary can multiply long texts."""
+    """Dictionaries and zstd, for rows that are few and repetitive; texts have no dictionary."""
     schema = blocks_schema(unit)
     return pq.ParquetWriter(
         path,

@@ -1,4 +1,4 @@
-"""`RecordingWriter`: raw blocks in, a finished recording out, or nothing that looks like one."""
+"""`RecordingWriter`: raw blocks in, a finished recording out, or nothing."""
 
 import hashlib
 import os
@@ -41,11 +41,11 @@ from core.arrays import RawArray
 from core.samples.blocks import SampleBlock
 
 INCOMPLETE = ".incomplete"
-"""Ending of the folder's name while it is being written."""
+"""Suffix of the name of a folder that is being written."""
 
 
 class RecordingWriter:
-    """Writes a recording aside and gives it its name when it is complete and on the disk.
+    """Writes a recording under another name and renames it when it is complete and synced.
 
     As a context manager it finishes on a regular end, and leaves nothing behind on an exception.
 
@@ -56,7 +56,7 @@ class RecordingWriter:
     made_by
         Program and person, for the manifest.
     first_decides
-        Whether the first block decides about the sample type, instead of the unit: counts if it is
+        Whether the first block decides on the sample type, instead of the unit: counts if it is
         exactly counts, else engineering units.
 
     Raises
@@ -118,7 +118,7 @@ class RecordingWriter:
         return self._progress.n_passed / self.unit.rate_hz
 
     def write(self, raw: RawBlock) -> None:
-        """Append a block exactly as a device delivered it.
+        """Append a raw block.
 
         Raises
         ------
@@ -148,7 +148,7 @@ class RecordingWriter:
                 self._write_blocks()
 
     def write_calibrated(self, block: SampleBlock) -> None:
-        """Append a block as an adapter hands it out.
+        """Append a block of a source.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class RecordingWriter:
         self.write(raw_of(block, self._calibration, np.dtype(self.unit.sample_type)))
 
     def finish(self) -> Manifest:
-        """Bring everything to the disk and give the recording its name.
+        """Sync all files and rename the recording.
 
         Raises
         ------

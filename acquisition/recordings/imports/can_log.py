@@ -30,8 +30,8 @@ _CANDUMP_LINE = re.compile(
 def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     """Data frames of a log and the share of it that has been read.
 
-    candump writes seconds since 1970 in UTC. BLF has the clock of whoever recorded it: its time
-    zone is that of the mapping.
+    candump writes seconds since 1970 in UTC. BLF has the local time of its writer, in the
+    time zone of the mapping.
 
     Raises
     ------

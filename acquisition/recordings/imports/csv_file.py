@@ -1,4 +1,4 @@
-"""CSV files, line by line, with a limit to everything."""
+"""CSV files, read line by line with limits on lines and columns."""
 
 import csv
 import math
@@ -25,7 +25,7 @@ _CELLS = 2**20
 
 
 class CsvTable:
-    """One heading for each column; an empty cell of a slow channel means: as before."""
+    """One heading for each column; an empty cell of a slow channel repeats the value before it."""
 
     def __init__(self, path: Path, job: ImportJob) -> None:
         self._job, self._path = job, path

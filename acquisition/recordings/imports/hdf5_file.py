@@ -67,7 +67,7 @@ class Hdf5File(SeriesFile):
         return dataset
 
     def _is_written(self, dataset: Any) -> bool:
-        """HDF5 gives zeros, or what it was told to, in the place of what nobody has written."""
+        """Whether all values were written; HDF5 returns a fill value for the others."""
         if dataset.chunks is None:
             return bool(dataset.size == 0 or dataset.id.get_storage_size())
         return bool(dataset.id.get_num_chunks() * dataset.chunks[0] >= dataset.shape[0])

@@ -15,7 +15,7 @@ _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1
 _NO_CONVERSION, _LINEAR = 0, 1
 _INVALID = 0b11
-"""All samples are invalid, or a bit says which: then there is no count for each of them."""
+"""Flags of a channel whose samples are all invalid, or invalid where a bit is set."""
 
 
 class MdfFile(SeriesFile):

@@ -15,7 +15,7 @@ from core.arrays import FloatArray, RawArray
 from core.units import NS_PER_S
 
 _PIECE = 512
-"""Rows that are laid on one straight line: short against the drift of a sampling clock."""
+"""Rows that are compared with one straight line: short against the drift of a clock."""
 
 _FIRST_ROWS = 64
 _FOLLOWED_ROWS = 256
@@ -24,14 +24,14 @@ _FOLLOWED_ROWS = 256
 _GAP_STEP = 1.5
 
 _MEDIAN_STEP = (0.6, 1.4)
-"""In samples: what most steps are at the right rate, even where stamps are coarse."""
+"""Median step in samples at the right rate, even with coarse stamps."""
 
 _MIN_STEPS = 16
 
 
 @dataclass(frozen=True)
 class SlowValues:
-    """Values of a slow channel and since when each was valid."""
+    """Values of a slow channel, and the time from which each is valid."""
 
     times_ns: TimeArray
     values: FloatArray
@@ -46,7 +46,7 @@ class Rows:
     samples
         (n_channels, n_rows) int16 counts or float32 engineering units.
     slow
-        For each slow channel what is new up to the last of the rows.
+        New values of each slow channel, at least up to the last row.
     done
         Share of the file that has been read.
     """
@@ -70,7 +70,7 @@ class Table(Protocol):
 
 @dataclass(frozen=True)
 class Stretch:
-    """Rows that follow each other without a gap, and the index of the first of them."""
+    """Consecutive rows without a gap, and the sample index of the first one."""
 
     start: int
     stop: int
@@ -79,12 +79,12 @@ class Stretch:
 
 
 class Indexer:
-    """Gives rows their sample index by their time, at the rate of the unit.
+    """Assigns sample indices to rows by their time stamps, at the rate of the unit.
 
-    A line of constant rate is laid through the stamps, and follows the drift of the clock that made
-    them. A step off the line by a whole number of samples is a gap of just so many; one by a part
-    of a sample, after a pause, is a restart of the device: a new epoch. Everything else, another
-    rate too, is refused. Nothing is ever interpolated.
+    A line of constant rate is fitted to the stamps and follows the drift of their clock. A step off
+    the line by a whole number of samples is a gap of that number; a step by a fraction of a sample
+    after a pause is a restart of the device, a new epoch. Everything else, another rate included,
+    is refused. Nothing is interpolated.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Go through the next rows; rows of a stretch are counted from the first of these.
+        """Divide the next rows into stretches, whose rows are counted from the first of these.
 
         Raises
         ------
         ConfigError
-            If time goes back, is irregular, or goes on at another rate; the message has the row.
+            If time goes back, is irregular or of another rate; the message names the row.
         """
         start = 0
         while start < len(times_ns):
@@ -125,7 +125,7 @@ class Indexer:
                 self._step(int(times_ns[start]), piece)
 
     def _lay_line(self, piece: TimeArray) -> None:
-        """Through the middle of the first stamps: gaps are whole, so that only parts matter."""
+        """Fit the phase of the line to the first stamps; gaps of whole samples do not matter."""
         self._origin_ns, self._expected_ns = int(piece[0]), 0.0
         turns = np.exp(2j * np.pi * self._deviations(piece))
         self._expected_ns = float(np.angle(turns.mean())) / (2 * np.pi) * self._period_ns
@@ -151,7 +151,7 @@ class Indexer:
         self._row += len(piece)
 
     def _step(self, time_ns: int, piece: TimeArray) -> None:
-        """Go over a gap or a restart to the row at this time."""
+        """Pass a gap or a restart before the row at this time."""
         step = (time_ns - self._last_ns) / self._period_ns
         if step <= 0:
             raise ConfigError(f"row {self._row + 1}: time goes back by {-step:.3f} samples")
@@ -169,7 +169,7 @@ class Indexer:
             self._expected_ns = None
 
     def _require_rate(self, piece: TimeArray) -> None:
-        """Refuse another rate before its every step is taken for a gap."""
+        """Refuse another rate, every step of which would look like a gap."""
         steps = np.diff(piece) / self._period_ns
         if len(steps) >= _MIN_STEPS or (self._row == 0 and len(steps) > 1):
             low, high = _MEDIAN_STEP
@@ -187,7 +187,7 @@ class Indexer:
 
 
 class _Hold:
-    """The last value that was valid at a time."""
+    """Holds the values of a slow channel until their time."""
 
     def __init__(self, id_: str) -> None:
         self._id = id_
@@ -234,7 +234,7 @@ def raw_blocks(tables: Iterable[Rows], job: ImportJob) -> Iterator[tuple[RawBloc
 
 
 def _pieces(rows: Rows, stretch: Stretch, holds: list[_Hold], job: ImportJob) -> Iterator[RawBlock]:
-    """Parts of a stretch that begin at multiples of the grid, so that slow values are theirs."""
+    """Parts of a stretch, cut at multiples of the block length, where slow values are taken."""
     to_grid = -stretch.first_index % job.block_samples or job.block_samples
     starts = [stretch.start, *range(stretch.start + to_grid, stretch.stop, job.block_samples)]
     for start, stop in zip(starts, [*starts[1:], stretch.stop], strict=True):

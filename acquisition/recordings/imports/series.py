@@ -34,7 +34,7 @@ class Series(Protocol):
     n_samples: int
 
     per_count: float | None
-    """Unit of the file per count, where the column has int16 counts and says so."""
+    """Unit of the file per count, for a column of int16 counts with a linear scale."""
 
     time_key: object
     """Columns of the same key have the same times."""
@@ -187,7 +187,7 @@ def _times_ns(
     start: int,
     stop: int,
 ) -> TimeArray:
-    """Times of samples of a series by its own time column, or as the job says."""
+    """Times of samples of a series by its own time column, or as the job describes them."""
     if column is None and job.time.kind == "start":
         return from_start(job.time.start_ns or 0, start, stop, job.rate_hz)
     column = column or job.time.place
@@ -229,7 +229,7 @@ def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
     Parameters
     ----------
     per_count
-        Unit of the file per count of each column by the file itself; None if it does not say.
+        Unit of the file per count of each column, as stated in the file; None if it states none.
     """
     return all(
         gain is not None

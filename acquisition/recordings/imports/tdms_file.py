@@ -28,7 +28,7 @@ class TdmsFile(SeriesFile):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        # an open file, not a path: npTDMS would believe an index file that lies beside it
+        # an open file, not a path: npTDMS would use an index file beside it
         self._stream = path.open("rb")
         _require_whole(self._stream)
         self._file = library("nptdms", "TDMS").TdmsFile.open(self._stream, raw_timestamps=True)

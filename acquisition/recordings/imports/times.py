@@ -27,12 +27,12 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     Parameters
     ----------
     start_ns
-        What "elapsed" counts from, in UTC.
+        Origin of "elapsed" times, in UTC.
 
     Raises
     ------
     ConfigError
-        If a value is no time, or a start is missing.
+        If a value is not a time, or a start is missing.
     """
     origin, _, unit = axis.form.partition("_")
     if unit not in _US_PER:
@@ -77,7 +77,7 @@ def text_to_ns(texts: list[str], axis: TimeAxis) -> TimeArray:
     Raises
     ------
     ConfigError
-        If one is no time.
+        If one is not a time.
     """
     zone = timezone(timedelta(seconds=axis.utc_offset_s))
     return utc_ns(np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64), 0)
@@ -100,12 +100,12 @@ def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArra
 
 
 def library(name: str, what: str) -> Any:
-    """Import a library that not every installation has.
+    """Import an optional library.
 
     Raises
     ------
     ConfigError
-        If this one has not.
+        If it is not installed.
     """
     try:
         return importlib.import_module(name)
