@@ -36,6 +36,8 @@ from acquisition.recordings.manifest import (
     Manifest,
 )
 from acquisition.recordings.messages import (
+    FAILED,
+    READY,
     Message,
     block_message,
     blocks_message,
@@ -57,6 +59,8 @@ _TABLES: Mapping[str, Callable[[Path, ImportJob], Table]] = {
 
 def main() -> None:
     """Answer requests, each in a fork, until standard input ends or one of them ends badly."""
+    sys.stdout.buffer.write(READY)
+    sys.stdout.buffer.flush()
     for line in sys.stdin.buffer:
         child = os.fork()
         if child == 0:
@@ -70,7 +74,7 @@ def main() -> None:
 
 
 def _answer_and_exit(line: bytes) -> None:
-    code = 1
+    code = FAILED
     try:
         request = json.loads(line)
         limit = _memory_bytes(request)

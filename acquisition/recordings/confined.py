@@ -106,7 +106,8 @@ def confine(memory_bytes: int, cpu_s: int, log_bytes: int) -> None:
     ):
         highest = resource.getrlimit(kind)[1]  # inherited; an unprivileged process cannot raise it
         limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
-        resource.setrlimit(kind, (limit, limit))
+        is_lower = kind == resource.RLIMIT_CPU and limit != highest
+        resource.setrlimit(kind, (limit, limit + is_lower))  # SIGXCPU comes before SIGKILL
 
 
 def memory_in_use_bytes() -> int:

@@ -16,6 +16,12 @@ from acquisition.recordings.manifest import SampleType
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
 
+READY = b"\n"
+"""First byte of a child that can take requests."""
+
+FAILED = 3
+"""Exit code of a child after an exception that a file has caused."""
+
 MAX_HEAD_BYTES = 2**22
 MAX_BODY_BYTES = 2**26
 MAX_DATA = 64

@@ -1,6 +1,7 @@
 """Foreign files read in a confined child process, as the process sees it that asks for them."""
 
 import atexit
+import errno
 import json
 import os
 import select
@@ -17,7 +18,15 @@ from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.confined import ConfinedProcess, printable
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.messages import BlockLayout, Frames, Message, frames_of, receive
+from acquisition.recordings.messages import (
+    FAILED,
+    READY,
+    BlockLayout,
+    Frames,
+    Message,
+    frames_of,
+    receive,
+)
 
 SILENCE_S = 300.0
 """Longest time without a message before the child is taken for hung."""
@@ -28,6 +37,16 @@ _ENVIRONMENT = {
     "HDF5_PLUGIN_PRELOAD": "::",  # no filters from libraries that a file names
     "OPENBLAS_NUM_THREADS": "1",  # each thread takes address space
 }
+_SIGNALS_OF_FAULTS = {
+    signal.SIGABRT,
+    signal.SIGBUS,
+    signal.SIGFPE,
+    signal.SIGILL,
+    signal.SIGSEGV,
+    signal.SIGXCPU,
+}
+"""Signals that a file can bring about; another one comes from the system or an operator."""
+
 _MAX_IDLE = 2
 _idle: deque[ConfinedProcess] = deque()
 """Children without a request: starting one costs 0.2 s, a request to one some milliseconds."""
@@ -83,7 +102,9 @@ class _Pipe:
     """The pipes to and from a child."""
 
     def __init__(self, process: ConfinedProcess) -> None:
-        self._process = process
+        self._process, self._out = process, process.output.fileno()
+        self._readable = select.poll()  # not select(), which stops at 1024 open files
+        self._readable.register(self._out, select.POLLIN)
         self._held = bytearray()
         self._is_silent = False
 
@@ -97,10 +118,9 @@ class _Pipe:
 
     def read(self, n_bytes: int) -> bytes:
         """Exactly this many bytes; raises EOFError if the child ends or falls silent before."""
-        out = self._process.output.fileno()
         while len(self._held) < n_bytes:
-            self._is_silent = not select.select([out], [], [], SILENCE_S)[0]
-            more = b"" if self._is_silent else os.read(out, _CHUNK_BYTES)
+            self._is_silent = not self._readable.poll(SILENCE_S * 1000)
+            more = b"" if self._is_silent else os.read(self._out, _CHUNK_BYTES)
             if not more:
                 raise EOFError
             self._held += more
@@ -108,13 +128,15 @@ class _Pipe:
         del self._held[:n_bytes]
         return found
 
-    def why_broken(self) -> tuple[str, Exception | None]:
-        """Why there is no more to read, and the cause if that is no fault of the file."""
+    def why_broken(self) -> tuple[str, OSError | None]:
+        """Why there is no more to read, and the cause if it is not the file."""
         if self._is_silent:
-            return f"nothing came out of it for {SILENCE_S:g} s", None
-        words = self._process.last_words()
-        was_killed = self._process.exit_code() == -signal.SIGKILL  # the system had no memory left
-        return words, MemoryError() if was_killed else None
+            words = f"no answer for {SILENCE_S:g} s"
+            return words, TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+        words, code = self._process.last_words(), self._process.exit_code()
+        if code == FAILED or -code in _SIGNALS_OF_FAULTS:
+            return words, None
+        return words, InterruptedError(errno.EINTR, os.strerror(errno.EINTR))
 
 
 def _refusal(head: Mapping[str, Any]) -> ConfigError:
@@ -129,11 +151,20 @@ def _idle_or_new() -> ConfinedProcess:
         try:
             process = _idle.pop()
         except IndexError:
-            return ConfinedProcess("acquisition.recordings.child", environment=_ENVIRONMENT)
+            return _started()
         if process.is_running():
             process.clear_log()
             return process
         process.close()
+
+
+def _started() -> ConfinedProcess:
+    process = ConfinedProcess("acquisition.recordings.child", environment=_ENVIRONMENT)
+    if not process.output.read(len(READY)):
+        words = process.last_words()
+        process.close()
+        raise OSError(errno.ENOEXEC, words)
+    return process
 
 
 def close_idle_children() -> None:

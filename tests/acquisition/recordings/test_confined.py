@@ -49,8 +49,11 @@ def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
         library("absent_one", "XYZ")
 
 
-@pytest.mark.parametrize(("number", "cause"), [("SIGKILL", MemoryError), ("SIGSEGV", EOFError)])
-def test_a_child_that_the_system_has_killed_is_no_fault_of_the_recording(
+@pytest.mark.parametrize(
+    ("number", "cause"),
+    [("SIGKILL", InterruptedError), ("SIGTERM", InterruptedError), ("SIGSEGV", EOFError)],
+)
+def test_a_child_that_the_system_has_ended_is_no_fault_of_the_recording(
     record: Record,
     numbered: Numbered,
     tmp_path: Path,
@@ -67,6 +70,12 @@ def test_a_child_that_the_system_has_killed_is_no_fault_of_the_recording(
         with pytest.raises(ConfigError, match=f"recording: reading it was ended by {number}") as it:
             list(recording.heads())
     assert isinstance(it.value.__cause__, cause)
+    with monkeypatch.context() as patch:
+        patch.setattr(reading, "ConfinedProcess", lambda *_, **__: ended())
+        reading.close_idle_children()
+        with pytest.raises(ConfigError, match=f"no process to read it: .*{number}") as it:
+            list(recording.heads())
+    assert isinstance(it.value.__cause__, OSError)
     assert len(list(recording.heads())) == 1
 
 
