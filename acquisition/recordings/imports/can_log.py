@@ -42,7 +42,7 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:
         waiting: list[can.Message] = []
-        for frame in _of_one_bus(_data_frames(stream, job), job.bus):
+        for frame in _of_one_bus(_data_frames(stream, job), job):
             waiting.append(frame)
             if len(waiting) == _BATCH:
                 yield _batch(waiting, job), min(stream.tell() / size, 1.0)
@@ -108,7 +108,7 @@ class _Refusal(logging.Handler):
 class _CountingBlfReader(can.BLFReader):
     """Counts objects: python-can takes a log that breaks off for one that ends."""
 
-    n_objects = n_frames = 0
+    n_objects = 0
 
     def require_all(self) -> None:
         if self._tail.strip(b"\0"):
@@ -117,20 +117,21 @@ class _CountingBlfReader(can.BLFReader):
             raise ConfigError(f"{self.n_objects} objects, the header says {self.object_count}")
 
     def _parse_container(self, data: bytes) -> Iterator[can.Message]:
-        known = self._tail + data
+        known, at = self._tail + data, -1
         for frame in super()._parse_container(data):
-            self.n_frames += 1
-            if self.n_frames > self.object_count:  # an object of no length never ends
-                raise ConfigError(f"more frames than the {self.object_count} of the header")
+            if self._pos == at:  # python-can would read it for ever
+                raise ConfigError("damaged: an object of no length")
+            at = self._pos
             yield frame
         self.n_objects += known.count(b"LOBJ", 0, len(known) - len(self._tail))
 
 
-def _of_one_bus(frames: Iterator[can.Message], wanted: str) -> Iterator[can.Message]:
+def _of_one_bus(frames: Iterator[can.Message], job: ImportJob) -> Iterator[can.Message]:
     """Frames of the same id on two buses come from two devices."""
+    wanted = job.bus
     bus, other, n_taken = wanted, "", 0
     for frame in frames:
-        found = _bus(frame)
+        found = _bus(frame, job)
         bus = bus or found
         if found == bus:
             n_taken += 1
@@ -146,10 +147,10 @@ def _of_one_bus(frames: Iterator[can.Message], wanted: str) -> Iterator[can.Mess
         raise ConfigError(f'has no frame of bus "{wanted}", but of bus "{other}"')
 
 
-def _bus(frame: can.Message) -> str:
-    """As a log has it: candump names buses, BLF counts them from 1."""
-    bus = frame.channel
-    return bus if isinstance(bus, str) else str((bus if isinstance(bus, int) else 0) + 1)
+def _bus(frame: can.Message, job: ImportJob) -> str:
+    """Name of the bus: candump has names, BLF counts from 1 and python-can from 0."""
+    is_counted = job.format == "blf" and isinstance(frame.channel, int)
+    return str(frame.channel + 1 if is_counted else frame.channel)  # type: ignore[operator]
 
 
 def _require_possible(frame: can.Message, number: int) -> None:
