@@ -11,6 +11,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -67,18 +68,19 @@ def main() -> None:
             _answer_and_exit(line)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         if code < 0:
-            signal.signal(-code, signal.SIG_DFL)
+            with suppress(OSError):  # SIGKILL has no other handler
+                signal.signal(-code, signal.SIG_DFL)
             os.kill(os.getpid(), -code)
         elif code:
             sys.exit(code)
 
 
 def _answer_and_exit(line: bytes) -> None:
-    code = FAILED
+    code = 1
     try:
         request = json.loads(line)
-        limit = _memory_bytes(request)
-        confine(memory_in_use_bytes() + limit, CPU_S, _LOG_BYTES)
+        confine(memory_in_use_bytes() + _memory_bytes(request), CPU_S, _LOG_BYTES)
+        code = FAILED  # from here on by the file
         answer(request, sys.stdout.buffer)
         code = 0
     except BaseException:
