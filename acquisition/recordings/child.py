@@ -73,6 +73,8 @@ def main() -> None:
             os.kill(os.getpid(), -code)
         elif code:
             sys.exit(code)
+        send(sys.stdout.buffer, {"kind": "end"})  # not before the fork has closed the file
+        sys.stdout.buffer.flush()
 
 
 def _answer_and_exit(line: bytes) -> None:
@@ -109,7 +111,6 @@ def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
     try:
         for head, body in _recording(path, request) if is_recording else _import(path, request):
             send(out, head, body)
-        send(out, {"kind": "end"})
     except (ConfigError, MemoryError) as error:
         words, number = str(error), getattr(error.__cause__, "errno", None)
         if isinstance(error, MemoryError) or isinstance(error.__cause__, MemoryError):

@@ -73,20 +73,23 @@ def confined_messages(
         process = _idle_or_new()
     except OSError as error:
         raise ConfigError(f"{path}: no process to read it: {error.strerror}") from error
-    pipe, has_ended = _Pipe(process), False
+    pipe, has_ended, refusal = _Pipe(process), False, None
     try:
         pipe.ask({"path": str(path.absolute()), "format": format_} | dict(request))
         while True:
             message = receive(pipe.read)
             found = message[0].get("kind")
-            has_ended = found in ("end", "error")
-            if found == "end":
+            has_ended = found == "end"
+            if has_ended and refusal is not None:
+                raise refusal
+            if has_ended:
                 return
             if found == "error":
-                raise _refusal(message[0])
-            if found != kind:
+                refusal = _refusal(message[0])
+            elif found == kind:
+                yield message
+            else:
                 raise ConfigError(f"{path}: an answer out of turn from the reading process")
-            yield message
     except EOFError as error:
         reason, cause = pipe.why_broken()
         words = f"{path}: not readable as {format_}: {reason}"

@@ -13,7 +13,7 @@ from acquisition.errors import ConfigError
 from acquisition.recordings import reader
 from acquisition.recordings.child import answer
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
-from acquisition.recordings.messages import Message, receive
+from acquisition.recordings.messages import Message, receive, send
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.unit import Measurand
 
@@ -86,6 +86,7 @@ def reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
     def messages(path: Path, format_: str, _: str, request: dict[str, object]) -> Iterator[Message]:
         out = io.BytesIO()
         answer({"path": str(path), "format": format_} | request, out)
+        send(out, {"kind": "end"})
         out.seek(0)
         while (message := receive(out.read))[0]["kind"] == "blocks":
             yield message
